@@ -1,0 +1,1 @@
+"""Benchmarks: the paper's figures, error against run time, stability, scaling, peers."""

@@ -1,0 +1,176 @@
+"""Piecewise polynomial curves in the plane and the closest points on them.
+
+A curve is a chain of facets; facet ``k`` has nodes ``k p .. (k + 1) p`` of a polynomial of degree ``p`` in ``xi`` in
+[0, 1]. The body lies on the left of the direction of travel, so the outward normal is the tangent turned clockwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+_END_MARGIN = 0.05  # a polynomial facet may be continued by this much beyond a free end of its curve
+_NEWTON_STEPS = 30
+
+
+class ProjectionError(RuntimeError):
+    """A point that has a partner on the opposite curve did not find it."""
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Closest points ``y`` on an opposite curve of ``m`` points ``x``, and what their linearisation needs.
+
+    With ``n`` the outward normal of the opposite curve at ``y``, ``gap = (x - y) . n``: positive when open.
+    """
+
+    found: npt.NDArray[np.bool_]  # (m,) False: the point lies beyond a free end of the curve, or faces away
+    point: Array  # (m, 2)
+    normal: Array  # (m, 2) unit
+    tangent: Array  # (m, 2) d y / d xi
+    bend: Array  # (m,) n . d2y / d xi2
+    slides: npt.NDArray[np.bool_]  # (m,) False: the closest point is a vertex, xi stands still
+    nodes: Index  # (m, k) curve nodes that carry y (k = 0: rigid)
+    shape: Array  # (m, k) their shape functions
+    slope: Array  # (m, k) and the derivatives in xi
+    facet: Index  # (m,) facet of the opposite curve
+    xi: Array  # (m,) position on it
+
+
+def lagrange(degree: int) -> Array:
+    """Monomial coefficients ``(degree + 1, degree + 1)`` of the Lagrange polynomials of equispaced nodes in [0, 1]."""
+    nodes = np.linspace(0.0, 1.0, degree + 1)
+    return np.linalg.inv(np.vander(nodes, increasing=True)).T
+
+
+class Curve:
+    """A chain of ``n`` polynomial facets with nodes ``X`` ``(n p + 1, 2)``."""
+
+    def __init__(self, X: Array, degree: int) -> None:
+        self.X = X
+        self.degree = degree
+        self.n_facets = (len(X) - 1) // degree
+        self.connectivity = np.arange(self.n_facets)[:, None] * degree + np.arange(degree + 1)
+        self._coefficients = lagrange(degree)
+
+    def shapes(self, xi: Array) -> tuple[Array, Array, Array]:
+        """Shape functions and their first and second derivatives, each ``(..., p + 1)``, at ``xi`` ``(...)``."""
+        k = np.arange(self.degree + 1)
+        zero = np.zeros_like(xi)[..., None]
+        powers = xi[..., None] ** k
+        first = np.concatenate([zero, powers[..., :-1] * k[1:]], axis=-1)
+        second = np.concatenate([zero, first[..., :-1] * k[1:]], axis=-1)
+        c = self._coefficients.T
+        return powers @ c, first @ c, second @ c
+
+    def arc_length(self, xi: Array) -> Array:
+        """Length ``(n, len(xi))`` along the curve from its start to ``xi`` of each facet."""
+        q, w = np.polynomial.legendre.leggauss(8)
+        ends = np.concatenate([np.atleast_1d(xi), [1.0]])
+        at = ends[:, None] * (q + 1) / 2
+        _, slope, _ = self.shapes(at)
+        speed = np.linalg.norm(np.einsum("fai,mqa->fmqi", self.X[self.connectivity], slope), axis=-1)
+        lengths = (speed @ w) * ends / 2
+        start = np.concatenate([[0.0], np.cumsum(lengths[:, -1])[:-1]])
+        return start[:, None] + lengths[:, :-1]
+
+    def closest_point(self, x: Array, outward: Array, displacement: Array) -> Projection:
+        """Closest points on the curve displaced by ``displacement`` (as ``X``) of the points ``x`` ``(m, 2)``.
+
+        ``outward`` ``(m, 2)`` is the outward normal of the own body at ``x``; a partner must face it. The start is the
+        nearest of four samples a facet, without a search radius; Newton then runs on that facet and its two
+        neighbours, kept within each, and the nearest result is taken. Raises `ProjectionError` when a point between
+        the ends of the curve gets none.
+        """
+        from scipy.spatial import cKDTree
+
+        nodes = self.X + displacement
+        by_facet = nodes[self.connectivity]
+        m = len(x)
+        samples = (np.arange(4) + 0.5) / 4
+        sampled = np.einsum("qa,fai->fqi", self.shapes(samples)[0], by_facet).reshape(-1, 2)
+        _, nearest = cKDTree(sampled).query(x)
+        home = nearest // 4
+        facet = np.clip(home[:, None] + np.array([-1, 0, 1]), 0, self.n_facets - 1)
+        xi = samples[nearest % 4][:, None] + np.array([0.0, 0.0, 0.0])
+        xi = np.where(facet < home[:, None], 1.0, np.where(facet > home[:, None], 0.0, xi))
+        low = np.where(facet == 0, -_END_MARGIN, 0.0)
+        high = np.where(facet == self.n_facets - 1, 1.0 + _END_MARGIN, 1.0)
+        control = by_facet[facet]
+        target = x[:, None, :]
+        for _ in range(_NEWTON_STEPS):
+            N, dN, ddN = self.shapes(xi)
+            y, t, k = (np.einsum("mca,mcai->mci", s, control) for s in (N, dN, ddN))
+            d = target - y
+            speed2 = (t * t).sum(-1)
+            # beyond the centre of curvature the distance is no longer convex: fall back to the first-order metric
+            metric = speed2 - (d * k).sum(-1)
+            metric = np.where(metric > 0.1 * speed2, metric, speed2)
+            new = np.clip(xi + (d * t).sum(-1) / metric, low, high)
+            moved = np.abs(new - xi).max(initial=0.0)
+            xi = new
+            if moved < 1e-14:
+                break
+        N, dN, ddN = self.shapes(xi)
+        y, t, k = (np.einsum("mca,mcai->mci", s, control) for s in (N, dN, ddN))
+        d = target - y
+        best = np.argmin((d * d).sum(-1), axis=1)
+        pick = (np.arange(m), best)
+        facet, xi, d, t, k = facet[pick], xi[pick], d[pick], t[pick], k[pick]
+        speed = np.linalg.norm(t, axis=1)
+        normal = np.stack([t[:, 1], -t[:, 0]], axis=1) / speed[:, None]
+        along = (d * t).sum(1) / speed**2  # what is left of the Newton step, in xi
+        clamped = (xi <= low[pick]) | (xi >= high[pick])
+        first, last = facet == 0, facet == self.n_facets - 1
+        beyond = (first & (xi <= -_END_MARGIN) & (along < 0)) | (last & (xi >= 1 + _END_MARGIN) & (along > 0))
+        lost = ~clamped & (np.abs(along) > 1e-9 * (1 + np.linalg.norm(d, axis=1) / speed))
+        if lost.any():
+            at = x[lost][0]
+            raise ProjectionError(f"{lost.sum()} contact points found no closest point, the first at ({at[0]:g}, {at[1]:g})")
+        facing = (normal * outward).sum(1) < 0
+        return Projection(
+            found=~beyond & facing,
+            point=y[pick],
+            normal=normal,
+            tangent=t,
+            bend=(normal * k).sum(1),
+            slides=~clamped,
+            nodes=self.connectivity[facet],
+            shape=N[pick],
+            slope=dN[pick],
+            facet=facet,
+            xi=xi,
+        )
+
+
+class RigidCircle:
+    """A rigid disc of the given centre and radius, as an opposite curve without nodes."""
+
+    def __init__(self, centre: Array, radius: float) -> None:
+        self.centre = np.asarray(centre, dtype=float)
+        self.radius = radius
+
+    def closest_point(self, x: Array, outward: Array, displacement: Array) -> Projection:
+        """Closest points on the disc moved by ``displacement`` ``(2,)``; see `Curve.closest_point`."""
+        m = len(x)
+        ray = x - self.centre - displacement
+        normal = ray / np.linalg.norm(ray, axis=1)[:, None]
+        none = np.zeros((m, 0))
+        return Projection(
+            found=(normal * outward).sum(1) < 0,
+            point=x - ray + self.radius * normal,
+            normal=normal,
+            tangent=np.stack([-normal[:, 1], normal[:, 0]], axis=1),
+            bend=np.full(m, -1.0 / self.radius),
+            slides=np.ones(m, dtype=bool),
+            nodes=none.astype(np.int64),
+            shape=none,
+            slope=none,
+            facet=np.zeros(m, dtype=np.int64),
+            xi=np.zeros(m),
+        )

@@ -1,0 +1,69 @@
+"""From a gmsh model to a dolfinx mesh: the one place that knows what dolfinx renamed between releases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from dolfinx.mesh import GhostMode, Mesh, MeshTags, create_cell_partitioner
+from mpi4py import MPI
+
+try:
+    from dolfinx.io.gmsh import model_to_mesh  # dolfinx >= 0.10
+except ImportError:
+    from dolfinx.io.gmshio import model_to_mesh
+
+
+def gmsh_to_mesh(
+    comm: MPI.Comm,
+    build: Callable,
+    adjust: Callable[[np.ndarray, int], np.ndarray] | None = None,
+    *,
+    order: int = 2,
+    scale: float = 1.0,
+    partitioner=None,
+) -> tuple[Mesh, MeshTags, MeshTags]:
+    """Mesh what ``build(gmsh)`` describes, in triangles of the given ``order``, and distribute it over ``comm``.
+
+    ``adjust(x, tag)`` may move the nodes ``x`` ``(n, 3)`` of the physical curve ``tag``; the mesh is scaled by ``scale``
+    at the end. An error on rank 0 is raised on every rank. Returns mesh, cell tags and facet tags.
+    """
+    model, failure = None, None
+    if comm.rank == 0:
+        import gmsh
+
+        try:
+            gmsh.initialize(["archord", "-noenv"], readConfigFiles=False, interruptible=False)
+            for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
+                gmsh.option.setNumber(f"Mesh.{option}", 0)
+            gmsh.option.setNumber("General.Terminal", 0)
+            gmsh.option.setNumber("Mesh.Algorithm", 6)
+            gmsh.option.setNumber("Mesh.HighOrderOptimize", 0)
+            build(gmsh)
+            gmsh.model.mesh.generate(2)
+            gmsh.model.mesh.setOrder(order)
+            if adjust is not None:
+                _adjust(gmsh, adjust)
+            model = gmsh.model
+        except Exception as error:  # raised on all ranks below
+            failure = f"gmsh could not mesh the joint: {error}"
+    failure = comm.bcast(failure)
+    if failure:
+        raise RuntimeError(failure)
+    if partitioner is None:
+        partitioner = create_cell_partitioner(GhostMode.none)
+    result = model_to_mesh(model, comm, 0, gdim=2, partitioner=partitioner)
+    mesh, cells, facets = tuple(result)[:3]
+    if comm.rank == 0:
+        gmsh.finalize()
+    mesh.geometry.x[:] *= scale
+    return mesh, cells, facets
+
+
+def _adjust(gmsh, adjust: Callable[[np.ndarray, int], np.ndarray]) -> None:
+    for dim, tag in gmsh.model.getPhysicalGroups(1):
+        nodes, x = gmsh.model.mesh.getNodesForPhysicalGroup(dim, tag)
+        x = x.reshape(-1, 3)
+        moved = adjust(x, tag)
+        for i in np.flatnonzero((moved != x).any(axis=1)):
+            gmsh.model.mesh.setNode(nodes[i], moved[i], [])

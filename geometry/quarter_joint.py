@@ -1,0 +1,107 @@
+"""The paper's quarter joint: a quarter pin of radius R in a quarter hole of radius R + dR, touching at the bottom.
+
+The hole's centre is the origin and the symmetry axis is x = 0. The pin's centre is (0, -dR), so pin and hole touch at
+(0, -R - dR). The block reaches to x = W and y = -H; its top edge y = 0 is held, the pin's flat top is the loaded edge.
+gmsh works in units of R whatever the units of the scene, so meshes do not depend on them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from dolfinx.mesh import Mesh, MeshTags
+from mpi4py import MPI
+
+from archord.geometry.fenicsx import gmsh_to_mesh
+
+
+class Cells(IntEnum):
+    """Cell tags: the two bodies."""
+
+    PIN = 1
+    BLOCK = 2
+
+
+class Facets(IntEnum):
+    """Facet tags of the edges that carry a condition; the block's other edges are free."""
+
+    PIN_ARC = 1
+    HOLE_ARC = 2
+    PIN_TOP = 3
+    BLOCK_TOP = 4
+    SYMMETRY = 5
+
+
+@dataclass(frozen=True)
+class JointMesh:
+    """A mesh of the joint with its tags; all bodies live in one mesh."""
+
+    mesh: Mesh
+    cells: MeshTags
+    facets: MeshTags
+
+
+def quarter_joint(
+    comm: MPI.Comm,
+    radius: float,
+    clearance: float,
+    block_size: float,
+    element_size: float,
+    growth: float,
+    *,
+    rigid_pin: bool = False,
+    partitioner=None,
+) -> JointMesh:
+    """Mesh the quarter joint with second-order curved triangles.
+
+    ``element_size`` is the edge length on both arcs; away from them it grows by ``growth`` per unit of distance.
+    Lengths share one unit. A rigid pin is not meshed. ``partitioner`` is a dolfinx cell partitioner (tests use it to
+    cut the mesh in unusual ways). Collective over ``comm``; rank 0 meshes.
+    """
+    hole, width, size = 1.0 + clearance / radius, block_size / radius, element_size / radius
+
+    def build(gmsh) -> None:
+        geo = gmsh.model.geo
+        n_edges = max(2, math.ceil(math.pi / 2 / size))
+        far = (-hole, 0.0, hole)
+        faces, curves = {}, {facet: [] for facet in Facets}
+        if not rigid_pin:
+            centre, bottom, side = (geo.addPoint(x, y - (hole - 1), 0) for x, y in ((0, 0), (0, -1), (1, 0)))
+            arc, top = geo.addCircleArc(bottom, centre, side), geo.addLine(side, centre)
+            axis = geo.addLine(centre, bottom)
+            faces[Cells.PIN] = geo.addPlaneSurface([geo.addCurveLoop([arc, top, axis])])
+            curves[Facets.PIN_ARC], curves[Facets.PIN_TOP] = [arc], [top]
+            curves[Facets.SYMMETRY] += [axis]
+            geo.mesh.setTransfiniteCurve(arc, n_edges + 1)
+        centre = geo.addPoint(0, 0, 0)
+        bottom, side = geo.addPoint(0, far[0], 0), geo.addPoint(far[2], 0, 0)
+        corners = [geo.addPoint(x, y, 0) for x, y in ((width, 0), (width, -width), (0, -width))]
+        arc = geo.addCircleArc(bottom, centre, side)
+        edges = [geo.addLine(a, b) for a, b in zip([side, *corners], [*corners, bottom], strict=True)]
+        faces[Cells.BLOCK] = geo.addPlaneSurface([geo.addCurveLoop([arc, *edges])])
+        curves[Facets.HOLE_ARC], curves[Facets.BLOCK_TOP] = [arc], [edges[0]]
+        curves[Facets.SYMMETRY] += [edges[-1]]
+        geo.mesh.setTransfiniteCurve(arc, n_edges + 1)
+        geo.synchronize()
+        for tag, face in faces.items():
+            gmsh.model.addPhysicalGroup(2, [face], tag)
+        for tag, lines in curves.items():
+            if lines:
+                gmsh.model.addPhysicalGroup(1, lines, tag)
+        field = gmsh.model.mesh.field.add("MathEval")
+        gmsh.model.mesh.field.setString(field, "F", f"{size!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})")
+        gmsh.model.mesh.field.setAsBackgroundMesh(field)
+
+    def on_the_arcs(x: np.ndarray, tag: int) -> np.ndarray:
+        """Exact radius for the nodes of the arcs: the clearance is a small difference of large numbers."""
+        if tag == Facets.PIN_ARC:
+            x = x + [0.0, hole - 1, 0.0]
+            return x / np.linalg.norm(x, axis=1)[:, None] - [0.0, hole - 1, 0.0]
+        if tag == Facets.HOLE_ARC:
+            return x * (hole / np.linalg.norm(x, axis=1))[:, None]
+        return x
+
+    return JointMesh(*gmsh_to_mesh(comm, build, on_the_arcs, scale=radius, partitioner=partitioner))

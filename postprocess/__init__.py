@@ -1,0 +1,1 @@
+"""Reads results and turns them into quantities of the field; never solves."""

@@ -1,0 +1,1 @@
+"""Scene file, bulk and contact terms, nonlinear solve, load stepping, results on disk."""
