@@ -79,26 +79,40 @@ class Curve:
         start = np.concatenate([[0.0], np.cumsum(lengths[:, -1])[:-1]])
         return start[:, None] + lengths[:, :-1]
 
-    def closest_point(self, x: Array, outward: Array, displacement: Array) -> Projection:
+    def nearest_facet(self, x: Array, displacement: Array) -> Index:
+        """Facet ``(m,)`` of the displaced curve whose four sample points come nearest to each of ``x`` ``(m, 2)``."""
+        samples = (np.arange(4) + 0.5) / 4
+        nodes = (self.X + displacement)[self.connectivity]
+        sampled = np.einsum("qa,fai->fqi", self.shapes(samples)[0], nodes).reshape(-1, 2)
+        half_square = 0.5 * (sampled**2).sum(1)
+        nearest = np.empty(len(x), dtype=np.int64)
+        for part in np.array_split(np.arange(len(x)), 1 + len(x) * len(sampled) // 4_000_000):
+            nearest[part] = np.argmin(half_square - x[part] @ sampled.T, axis=1)
+        return nearest // 4
+
+    def closest_point(self, x: Array, outward: Array, displacement: Array, start: Index | None = None) -> Projection:
         """Closest points on the curve displaced by ``displacement`` (as ``X``) of the points ``x`` ``(m, 2)``.
 
-        ``outward`` ``(m, 2)`` is the outward normal of the own body at ``x``; a partner must face it. The start is the
-        nearest of four samples a facet, without a search radius; Newton then runs on that facet and its two
-        neighbours, kept within each, and the nearest result is taken. Raises `ProjectionError` when a point between
-        the ends of the curve gets none.
+        ``outward`` ``(m, 2)`` is the outward normal of the own body at ``x``; a partner must face it. ``start`` holds a
+        facet for each point near its partner (by default `nearest_facet`, a search without a radius). Newton runs on
+        that facet and its two neighbours, kept within each, and the nearest result is taken; a point that leaves them
+        is searched anew. Raises `ProjectionError` when a point between the ends of the curve gets no partner.
         """
-        from scipy.spatial import cKDTree
+        fresh = start is None
+        home = self.nearest_facet(x, displacement) if start is None else start
+        found = self._project(x, outward, displacement, home)
+        if not fresh:
+            step = found.facet - home
+            away = ((step == -1) & (found.xi <= 0)) | ((step == 1) & (found.xi >= 1))
+            if away.any():
+                return self.closest_point(x, outward, displacement)
+        return found
 
-        nodes = self.X + displacement
-        by_facet = nodes[self.connectivity]
+    def _project(self, x: Array, outward: Array, displacement: Array, home: Index) -> Projection:
         m = len(x)
-        samples = (np.arange(4) + 0.5) / 4
-        sampled = np.einsum("qa,fai->fqi", self.shapes(samples)[0], by_facet).reshape(-1, 2)
-        _, nearest = cKDTree(sampled).query(x)
-        home = nearest // 4
+        by_facet = (self.X + displacement)[self.connectivity]
         facet = np.clip(home[:, None] + np.array([-1, 0, 1]), 0, self.n_facets - 1)
-        xi = samples[nearest % 4][:, None] + np.array([0.0, 0.0, 0.0])
-        xi = np.where(facet < home[:, None], 1.0, np.where(facet > home[:, None], 0.0, xi))
+        xi = np.where(facet < home[:, None], 1.0, np.where(facet > home[:, None], 0.0, 0.5))
         low = np.where(facet == 0, -_END_MARGIN, 0.0)
         high = np.where(facet == self.n_facets - 1, 1.0 + _END_MARGIN, 1.0)
         control = by_facet[facet]

@@ -33,7 +33,7 @@ def gmsh_to_mesh(
         import gmsh
 
         try:
-            gmsh.initialize(["archord", "-noenv"], readConfigFiles=False, interruptible=False)
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
             for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
                 gmsh.option.setNumber(f"Mesh.{option}", 0)
             gmsh.option.setNumber("General.Terminal", 0)

@@ -5,6 +5,7 @@ Strains are ``[eps_xx, eps_yy, gamma_xy]`` (engineering shear), stresses ``[s_xx
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -50,3 +51,12 @@ def von_mises(stress: Array) -> Array:
 def mean_stress(stress: Array) -> Array:
     """Mean stress ``(s_xx + s_yy + s_zz) / 3`` ``(n,)`` of ``(n, 4)`` stresses, tension positive."""
     return stress[:, :3].sum(axis=1) / 3
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """Linear elastic solid; ``E`` sets the unit of stress."""
+
+    E: float
+    nu: float
+    plane: Plane

@@ -1,0 +1,72 @@
+"""Lagrange bases and their physical gradients at points of curved triangles, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import basix
+import numpy as np
+import numpy.typing as npt
+from dolfinx.mesh import Mesh
+
+Array = npt.NDArray[np.float64]
+
+BULK_QUADRATURE_DEGREE = 2  # three points a triangle: full rank for P2, and no volumetric locking
+CONTACT_POINTS = 4  # Gauss points a contact facet
+
+
+def lagrange_triangle(degree: int) -> basix.finite_element.FiniteElement:
+    """Lagrange element on the reference triangle, with equispaced nodes as in gmsh's curved meshes."""
+    return basix.create_element(
+        basix.ElementFamily.P, basix.CellType.triangle, degree, basix.LagrangeVariant.equispaced
+    )
+
+
+@dataclass(frozen=True)
+class CellBasis:
+    """A displacement basis at ``q`` points of each of ``n`` cells with ``a`` nodes."""
+
+    shape: Array  # (q, a)
+    gradient: Array  # (n, q, a, 2) in physical coordinates
+    point: Array  # (n, q, 2)
+    jacobian: Array  # (n, q, 2, 2) d x_i / d X_j
+
+    @property
+    def determinant(self) -> Array:
+        """Jacobian determinant ``(n, q)``."""
+        J = self.jacobian
+        return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+
+
+def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) -> CellBasis:
+    """Basis of the given ``degree`` at the reference points ``X`` ``(q, 2)`` of ``cells``."""
+    geometry = lagrange_triangle(mesh.geometry.cmap.degree).tabulate(1, X)[..., 0]
+    table = lagrange_triangle(degree).tabulate(1, X)[..., 0]
+    nodes = mesh.geometry.x[mesh.geometry.dofmap[cells], :2]
+    point = np.einsum("qa,nai->nqi", geometry[0], nodes)
+    J = np.einsum("jqa,nai->nqij", geometry[1:], nodes)
+    det = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+    inverse = np.empty_like(J)  # d X_j / d x_i as [j, i]
+    inverse[..., 0, 0], inverse[..., 1, 1] = J[..., 1, 1] / det, J[..., 0, 0] / det
+    inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1] / det, -J[..., 1, 0] / det
+    gradient = np.einsum("jqa,nqji->nqai", table[1:], inverse)
+    return CellBasis(table[0], gradient, point, J)
+
+
+def bulk_quadrature() -> tuple[Array, Array]:
+    """Points ``(q, 2)`` and weights ``(q,)`` of the bulk rule on the reference triangle."""
+    return basix.make_quadrature(basix.CellType.triangle, BULK_QUADRATURE_DEGREE)
+
+
+def strain_matrix(gradient: Array) -> Array:
+    """``B`` ``(..., 3, 2 a)`` with ``B u = [eps_xx, eps_yy, gamma_xy]`` for nodal ``u = [ux0, uy0, ux1, ...]``."""
+    B = np.zeros((*gradient.shape[:-2], 3, 2 * gradient.shape[-2]))
+    B[..., 0, 0::2] = B[..., 2, 1::2] = gradient[..., 0]
+    B[..., 1, 1::2] = B[..., 2, 0::2] = gradient[..., 1]
+    return B
+
+
+def strain(gradient: Array, u: Array) -> Array:
+    """Strain ``(n, q, 3)`` from gradients ``(n, q, a, 2)`` and nodal displacements ``(n, a, 2)``."""
+    grad = np.einsum("nqaj,nai->nqij", gradient, u, optimize=True)
+    return np.stack([grad[..., 0, 0], grad[..., 1, 1], grad[..., 0, 1] + grad[..., 1, 0]], axis=-1)

@@ -1,0 +1,205 @@
+"""Bulk terms: internal forces and tangents of elastic and elastic-plastic bodies, assembled by dolfinx.
+
+Elastic bodies contribute one constant stiffness matrix. Only cells of plastic bodies carry history, a return map and a
+tangent that changes; a joint without them compiles and stores none of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from dolfinx.mesh import MeshTags
+from petsc4py import PETSc
+
+from archord.geometry.basis import BULK_QUADRATURE_DEGREE, Array, bulk_quadrature, cell_basis, strain
+from archord.materials.elasticity import Elastic, elastic_stress, elastic_tangent, mean_stress, von_mises
+from archord.solver.points import material_points
+
+
+@dataclass(frozen=True)
+class Body:
+    """One body: its cell tag and its material (`Elastic` or `J2Material`)."""
+
+    tag: int
+    material: object
+
+    @property
+    def plastic(self) -> bool:
+        """Whether the body carries plastic history."""
+        return not isinstance(self.material, Elastic)
+
+
+@dataclass(frozen=True)
+class CellFields:
+    """Means over each cell of this rank, ``(n_cells,)`` each."""
+
+    von_mises: Array
+    mean_stress: Array
+    peeq: Array | None
+
+
+def _voigt(u):
+    e = ufl.sym(ufl.grad(u))
+    return ufl.as_vector([e[0, 0], e[1, 1], 2 * e[0, 1]])
+
+
+class _PlasticBody:
+    """Quadrature data of one plastic body: gradients, weights, points with history."""
+
+    def __init__(self, V: fem.FunctionSpace, cells: np.ndarray, material) -> None:
+        X, w = bulk_quadrature()
+        basis = cell_basis(V.mesh, V.element.basix_element.degree, cells, X)
+        self.cells = cells
+        self.dofs = V.dofmap.list[cells]
+        self.gradient = basis.gradient
+        self.weight = basis.determinant * w
+        self.points = material_points(material, self.weight.size)
+        self.stress = np.zeros((self.weight.size, 4))
+
+
+class Bulk:
+    """Internal forces of all bodies in the displacement space ``V`` (blocked, two components)."""
+
+    def __init__(self, V: fem.FunctionSpace, tags: MeshTags, bodies: list[Body]) -> None:
+        self.V = V
+        self.bodies = bodies
+        n_owned = V.mesh.topology.index_map(2).size_local
+        cells = {body.tag: tags.find(body.tag) for body in bodies}
+        self.cells = {tag: c[c < n_owned] for tag, c in cells.items()}
+        u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+        self._elastic_forms, self._plastic_forms, self._force_forms = [], [], []
+        self._plastic: dict[int, _PlasticBody] = {}
+        for body in bodies:
+            domain = [(1, self.cells[body.tag])]
+            if body.plastic:
+                self._plastic[body.tag] = _PlasticBody(V, self.cells[body.tag], body.material)
+                continue
+            m = body.material
+            c11, c12, c33 = (
+                fem.Constant(V.mesh, float(value))
+                for value in elastic_tangent(m.E, m.nu, m.plane)[[0, 0, 2], [0, 1, 2]]
+            )
+            dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": BULK_QUADRATURE_DEGREE})
+            eu, ev = _voigt(u), _voigt(v)
+            sigma = ufl.as_vector([c11 * eu[0] + c12 * eu[1], c12 * eu[0] + c11 * eu[1], c33 * eu[2]])
+            self._elastic_forms.append(fem.form(ufl.inner(sigma, ev) * dx(1)))
+        if self._plastic:
+            cell = V.mesh.basix_cell()
+            metadata = {"quadrature_degree": BULK_QUADRATURE_DEGREE, "quadrature_rule": "default"}
+            element = {
+                shape: basix.ufl.quadrature_element(cell, shape, degree=BULK_QUADRATURE_DEGREE)
+                for shape in ((3,), (3, 3))
+            }
+            self._sigma = fem.Function(fem.functionspace(V.mesh, element[(3,)]))
+            self._tangent = fem.Function(fem.functionspace(V.mesh, element[(3, 3)]))
+            domain = [(1, np.sort(np.concatenate([p.cells for p in self._plastic.values()])))]
+            dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)
+            self._force_forms.append(fem.form(ufl.inner(self._sigma, _voigt(v)) * dx(1)))
+            tangent = ufl.inner(ufl.dot(self._tangent, _voigt(u)), _voigt(v))
+            self._plastic_forms.append(fem.form(tangent * dx(1)))
+        self.stiffness = None
+        if self._elastic_forms:
+            self.stiffness = fem_petsc.create_matrix(self._elastic_forms[0])
+            for form in self._elastic_forms:
+                fem_petsc.assemble_matrix(self.stiffness, form)
+            self.stiffness.assemble()
+
+    @property
+    def plastic(self) -> bool:
+        """Whether any body carries plastic history."""
+        return bool(self._plastic)
+
+    def pattern_forms(self) -> list[fem.Form]:
+        """Bilinear forms that together span the bulk's matrix pattern."""
+        return [*self._elastic_forms, *self._plastic_forms]
+
+    def update(self, u: Array) -> None:
+        """Return-map the plastic bodies at the nodal displacements ``u`` ``(n_nodes, 2)`` of this rank."""
+        for body in self._plastic.values():
+            eps = strain(body.gradient, u[body.dofs]).reshape(-1, 3)
+            body.stress, tangent = body.points.update(eps)
+            n, q = body.weight.shape
+            sigma = self._sigma.x.array.reshape(-1, q, 3)
+            sigma[body.cells] = body.stress[:, [0, 1, 3]].reshape(n, q, 3)
+            stiffness = self._tangent.x.array.reshape(-1, q, 9)
+            stiffness[body.cells] = tangent.reshape(n, q, 9)
+
+    def add_force(self, u: PETSc.Vec, force: PETSc.Vec) -> None:
+        """Add the internal force of the displacement ``u`` (last passed to `update`) to ``force``."""
+        if self.stiffness is not None:
+            self.stiffness.multAdd(u, force, force)
+        for form in self._force_forms:
+            with force.localForm() as local:
+                fem_petsc.assemble_vector(local, form)
+        force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
+    def assemble_elastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
+        """Add the stiffness of the elastic bodies to ``A``."""
+        for form in self._elastic_forms:
+            fem_petsc.assemble_matrix(A, form, bcs)
+
+    def assemble_plastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
+        """Add the consistent tangent of the plastic bodies to ``A``."""
+        for form in self._plastic_forms:
+            fem_petsc.assemble_matrix(A, form, bcs)
+
+    def commit(self) -> None:
+        """Accept the history of the last `update`."""
+        for body in self._plastic.values():
+            body.points.commit()
+
+    def energies(self, u: Array) -> tuple[float, float]:
+        """Elastic energy and plastic dissipation of this rank's cells."""
+        stored = dissipated = 0.0
+        for body in self.bodies:
+            if body.plastic:
+                data = self._plastic[body.tag]
+                w = data.weight.ravel()
+                stored += float(w @ body.material.elastic_energy(data.stress))
+                dissipated += float(w @ body.material.dissipation(data.points.trial.peeq))
+        if self.stiffness is not None:
+            for _, eps, w, sigma in self._elastic_points(u):
+                stored += 0.5 * float(np.einsum("p,pi,pi->", w, eps, sigma[:, [0, 1, 3]]))
+        return stored, dissipated
+
+    def peeq(self) -> tuple[float, float]:
+        """Largest PEEQ at a quadrature point, and the integral of PEEQ over this rank's cells."""
+        largest = integral = 0.0
+        for data in self._plastic.values():
+            peeq = data.points.trial.peeq
+            largest = max(largest, float(peeq.max(initial=0.0)))
+            integral += float(data.weight.ravel() @ peeq)
+        return largest, integral
+
+    def cell_fields(self, u: Array) -> CellFields:
+        """Cell means of stress measures and PEEQ at ``u`` ``(n_nodes, 2)``."""
+        n = self.V.mesh.topology.index_map(2).size_local
+        mises, mean = np.zeros(n), np.zeros(n)
+        peeq = np.zeros(n) if self.plastic else None
+        for data in self._plastic.values():
+            w = data.weight / data.weight.sum(axis=1, keepdims=True)
+            shape = w.shape
+            mises[data.cells] = (w * von_mises(data.stress).reshape(shape)).sum(axis=1)
+            mean[data.cells] = (w * mean_stress(data.stress).reshape(shape)).sum(axis=1)
+            peeq[data.cells] = (w * data.points.trial.peeq.reshape(shape)).sum(axis=1)
+        for cells, _, weight, sigma in self._elastic_points(u):
+            w = weight.reshape(len(cells), -1)
+            w = w / w.sum(axis=1, keepdims=True)
+            mises[cells] = (w * von_mises(sigma).reshape(w.shape)).sum(axis=1)
+            mean[cells] = (w * mean_stress(sigma).reshape(w.shape)).sum(axis=1)
+        return CellFields(mises, mean, peeq)
+
+    def _elastic_points(self, u: Array):
+        X, w = bulk_quadrature()
+        for body in self.bodies:
+            if body.plastic:
+                continue
+            cells, m = self.cells[body.tag], body.material
+            basis = cell_basis(self.V.mesh, self.V.element.basix_element.degree, cells, X)
+            eps = strain(basis.gradient, u[self.V.dofmap.list[cells]]).reshape(-1, 3)
+            yield cells, eps, (basis.determinant * w).ravel(), elastic_stress(eps, m.E, m.nu, m.plane)

@@ -1,0 +1,198 @@
+"""One side of a contact: the facets of a body's contact edge on this rank, and the whole edge as a curve on every rank.
+
+The curve is small (it grows with the square root of the mesh), so every rank holds all of it and exchanges its
+displacement; each rank integrates the facets of the cells it owns. What a facet needs of its own cell stays local.
+"""
+
+from __future__ import annotations
+
+import basix
+import numpy as np
+from dolfinx import fem
+from dolfinx.mesh import MeshTags
+
+from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis, strain, strain_matrix
+from archord.geometry.curve import Curve
+from archord.solver.points import material_points
+
+
+class ContactSide:
+    """Facets tagged ``tag`` of the body with ``material`` in the displacement space ``V``.
+
+    Arrays of this rank's ``n`` facets with ``q`` points: ``weight`` ``(n, q)`` (measure of the curved edge), ``point``
+    and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own cell's basis, ``shape`` ``(n, q, a)``, ``gamma``
+    ``(n,)``. ``facet`` ``(n,)`` numbers them along the curve; ``curve_cell_dofs`` holds the global cell dofs of every
+    facet of the curve, on every rank.
+    """
+
+    def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material) -> None:
+        mesh = V.mesh
+        self.comm = mesh.comm
+        self.V = V
+        self.degree = V.element.basix_element.degree
+        index_map = V.dofmap.index_map
+        cells, local_facets = _owned_facets(mesh, facets.find(tag))
+        closure = [V.dofmap.dof_layout.entity_closure_dofs(1, k) for k in range(3)]
+        # closure order is vertex, vertex, interior; along the facet the interior nodes come between the vertices
+        along = [[c[0], *c[2:], c[1]] for c in closure]
+        trace = np.array([along[k] for k in local_facets], dtype=np.int64).reshape(-1, self.degree + 1)
+
+        w, basis = self._tabulate(cells, local_facets)
+        tangent = basis["tangent"]
+        length = np.linalg.norm(tangent, axis=-1)
+        outward = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
+        flip = (outward * basis["outward"]).sum(-1)[:, 0] < 0 if len(cells) else np.zeros(0, dtype=bool)
+        outward[flip] *= -1
+        trace[flip] = trace[flip, ::-1]
+
+        cell_dofs = V.dofmap.list[cells].astype(np.int64)
+        global_dofs = index_map.local_to_global(cell_dofs.ravel().astype(np.int32)).reshape(cell_dofs.shape)
+        x = V.tabulate_dof_coordinates()[:, :2]
+        trace_dofs = np.take_along_axis(cell_dofs, trace, axis=1)
+        trace_global = np.take_along_axis(global_dofs, trace, axis=1)
+        gathered = self.comm.allgather((trace_global, x[trace_dofs], global_dofs))
+        chain_dofs = np.concatenate([g[0] for g in gathered])
+        chain_x = np.concatenate([g[1] for g in gathered])
+        order = _chain(chain_dofs[:, 0], chain_dofs[:, -1])
+        chain_dofs, chain_x = chain_dofs[order], chain_x[order]
+        self.curve = Curve(_join(chain_x), self.degree)
+        self.curve_dofs = _join(chain_dofs[..., None])[:, 0]
+        self.curve_cell_dofs = np.concatenate([g[2] for g in gathered])[order]
+        position = np.empty(len(order), dtype=np.int64)
+        position[order] = np.arange(len(order))
+        start = sum(len(g[0]) for g in gathered[: self.comm.rank])
+        self.facet = position[start : start + len(cells)]
+
+        sort = np.argsort(self.facet)
+        self.facet = self.facet[sort]
+        self.cells = cells[sort]
+        self.cell_dofs = cell_dofs[sort]
+        self.cell_global = global_dofs[sort]
+        self.trace = trace[sort]
+        self.weight = (length * w)[sort]
+        self.outward = outward[sort]
+        self.point = basis["point"][sort]
+        self.gradient = basis["gradient"][sort]
+        self.shape = basis["shape"][sort]
+        self.flipped = flip[sort]
+        self.reference_points = basis["reference"]
+        self.points = material_points(material, self.weight.size)
+        owned = self.curve_dofs - index_map.local_range[0]
+        self._owned = np.flatnonzero((owned >= 0) & (owned < index_map.size_local))
+        self._owned_local = owned[self._owned]
+        self.gamma = self._trace_inequality()
+
+    def _tabulate(self, cells, local_facets) -> tuple[Array, dict[str, Array]]:
+        X1, w = basix.make_quadrature(basix.CellType.interval, 2 * CONTACT_POINTS - 1)
+        vertices = basix.geometry(basix.CellType.triangle)
+        topology = basix.topology(basix.CellType.triangle)[1]
+        normals = basix.cell.facet_outward_normals(basix.CellType.triangle)
+        n, q, a = len(cells), len(w), (self.degree + 1) * (self.degree + 2) // 2
+        out = {
+            "point": np.zeros((n, q, 2)),
+            "gradient": np.zeros((n, q, a, 2)),
+            "shape": np.zeros((n, q, a)),
+            "tangent": np.zeros((n, q, 2)),
+            "outward": np.zeros((n, q, 2)),
+            "reference": X1[:, 0],
+        }
+        for k in range(3):
+            here = np.flatnonzero(local_facets == k)
+            v0, v1 = vertices[topology[k]]
+            basis = cell_basis(self.V.mesh, self.degree, cells[here], v0 + X1 * (v1 - v0))
+            out["point"][here], out["gradient"][here] = basis.point, basis.gradient
+            out["shape"][here] = basis.shape
+            out["tangent"][here] = basis.jacobian @ (v1 - v0)
+            # covariant transform up to its positive length: n ~ J^-T N
+            J, N = basis.jacobian, normals[k]
+            cofactor = np.stack(
+                [J[..., 1, 1] * N[0] - J[..., 1, 0] * N[1], J[..., 0, 0] * N[1] - J[..., 0, 1] * N[0]], axis=-1
+            )
+            out["outward"][here] = cofactor * np.sign(basis.determinant)[..., None]
+        return w, out
+
+    def _trace_inequality(self) -> Array:
+        """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over the facet <= gamma a(v, v) over its cell`` for all ``v``.
+
+        Warburton and Hesthaven (2003) give the constant for polynomials; here the generalised eigenvalue problem of
+        each contact cell is solved, with its curved geometry and its elastic moduli. Unit: stress / length.
+        """
+        if not len(self.cells):
+            return np.zeros(0)
+        C = self.points.elastic_tangent
+        X, w = bulk_quadrature()
+        basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
+        B = strain_matrix(basis.gradient)
+        energy = np.einsum("nq,nqia,ij,nqjb->nab", basis.determinant * w, B, C, B, optimize=True)
+        n = self.outward
+        traction = np.stack([n[..., 0] ** 2, n[..., 1] ** 2, 2 * n[..., 0] * n[..., 1]], axis=-1) @ C
+        row = np.einsum("nqi,nqia->nqa", traction, strain_matrix(self.gradient))
+        trace = np.einsum("nq,nqa,nqb->nab", self.weight, row, row)
+        value, vector = np.linalg.eigh(energy)
+        scaled = vector[..., 3:] / np.sqrt(value[:, None, 3:])
+        return np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ trace @ scaled)[:, -1]
+
+    def arc_position(self, origin: Array) -> Array:
+        """Arc length ``(n_facets, q)`` of all the curve's points, measured from its end nearest to ``origin`` ``(2,)``."""
+        xi = self.reference_points
+        length = self.curve.arc_length(np.concatenate([xi, [1.0]]))
+        s, total = length[:, :-1], length[-1, -1]
+        ends = np.linalg.norm(self.curve.X[[0, -1]] - origin, axis=1)
+        return total - s if ends[1] < ends[0] else s
+
+    def curve_displacement(self, u: Array) -> Array:
+        """Displacement ``(n_nodes, 2)`` of the whole curve, from this rank's nodal displacements ``u`` ``(n, 2)``."""
+        values = np.zeros((len(self.curve_dofs), 2))
+        values[self._owned] = u[self._owned_local]
+        return self.sum_over_ranks(values)
+
+    def sum_over_ranks(self, values: Array) -> Array:
+        """Sum of an array that every rank holds."""
+        if self.comm.size == 1:
+            return values
+        total = np.empty_like(values)
+        self.comm.Allreduce(values, total)
+        return total
+
+    def add_to_owned(self, curve_force: Array, force: Array) -> None:
+        """Add nodal forces ``(n_nodes, 2)`` of the whole curve to this rank's owned ``force`` ``(n, 2)``."""
+        np.add.at(force, self._owned_local, curve_force[self._owned])
+
+    def deform(self, u: Array) -> tuple[Array, Array, Array]:
+        """Own displacement ``(n, q, 2)``, stress ``(n, q, 4)`` and tangent ``(n, q, 3, 3)`` at the contact points."""
+        nodal = u[self.cell_dofs]
+        displacement = np.einsum("nqa,nai->nqi", self.shape, nodal)
+        n, q = self.weight.shape
+        stress, tangent = self.points.update(strain(self.gradient, nodal).reshape(-1, 3))
+        return displacement, stress.reshape(n, q, 4), tangent.reshape(n, q, 3, 3)
+
+
+def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray]:
+    """Cells that this rank owns behind boundary ``facets``, and the facets' numbers within them."""
+    mesh.topology.create_connectivity(1, 2)
+    mesh.topology.create_connectivity(2, 1)
+    to_cell = mesh.topology.connectivity(1, 2)
+    to_facet = mesh.topology.connectivity(2, 1).array.reshape(-1, 3)
+    n_owned = mesh.topology.index_map(2).size_local
+    cells = np.array([to_cell.links(f)[0] for f in facets], dtype=np.int32).reshape(-1)
+    keep = cells < n_owned
+    cells, facets = cells[keep], np.asarray(facets)[keep]
+    return cells, np.argmax(to_facet[cells] == facets[:, None], axis=1) if len(cells) else cells.astype(np.int64)
+
+
+def _chain(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Order that links facets end to start into one chain."""
+    by_start = {int(s): i for i, s in enumerate(start)}
+    first = sorted(set(by_start) - {int(e) for e in end}) or [min(by_start)]
+    if len(first) != 1:
+        raise ValueError(f"a contact edge must be one connected curve, this one has {len(first)} pieces")
+    order, at = [], by_start.get(first[0])
+    while at is not None and len(order) < len(start):
+        order.append(at)
+        at = by_start.get(int(end[at]))
+    return np.array(order)
+
+
+def _join(facet_nodes: np.ndarray) -> np.ndarray:
+    """Nodes ``(n p + 1, k)`` of a chain from those of its facets ``(n, p + 1, k)``."""
+    return np.concatenate([facet_nodes[:, :-1].reshape(-1, facet_nodes.shape[-1]), facet_nodes[-1, -1:]])

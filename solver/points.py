@@ -1,0 +1,53 @@
+"""Material points and their history: what is committed, and what the current iterate would make of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from archord.materials.elasticity import Array, Elastic, elastic_stress, elastic_tangent
+
+
+class ElasticPoints:
+    """Points of a linear elastic body: no history."""
+
+    has_history = False
+
+    def __init__(self, material: Elastic) -> None:
+        self.material = material
+        self.elastic_tangent = elastic_tangent(material.E, material.nu, material.plane)
+
+    def update(self, strain: Array) -> tuple[Array, Array]:
+        """Stress ``(n, 4)`` and tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``."""
+        m = self.material
+        tangent = np.broadcast_to(self.elastic_tangent, (len(strain), 3, 3))
+        return elastic_stress(strain, m.E, m.nu, m.plane), tangent
+
+    def commit(self) -> None:
+        """Nothing to keep."""
+
+
+class PlasticPoints:
+    """``n`` points of an elastic-plastic body with their history; ``trial`` belongs to the last strain seen."""
+
+    has_history = True
+
+    def __init__(self, material, n: int) -> None:
+        from archord.materials.j2 import PlasticState
+
+        self.material = material
+        self.elastic_tangent = elastic_tangent(material.E, material.nu, material.plane)
+        self.state = self.trial = PlasticState.virgin(n)
+
+    def update(self, strain: Array) -> tuple[Array, Array]:
+        """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the committed history."""
+        stress, tangent, self.trial = self.material.return_map(strain, self.state)
+        return stress, tangent
+
+    def commit(self) -> None:
+        """Make the history of the last strain seen the committed one."""
+        self.state = self.trial
+
+
+def material_points(material, n: int) -> ElasticPoints | PlasticPoints:
+    """``n`` points of ``material``."""
+    return ElasticPoints(material) if isinstance(material, Elastic) else PlasticPoints(material, n)
