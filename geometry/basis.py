@@ -33,9 +33,14 @@ class CellBasis:
 
     @property
     def determinant(self) -> Array:
-        """Jacobian determinant ``(n, q)``."""
+        """Jacobian determinant ``(n, q)``; negative where the cell's vertices run clockwise."""
         J = self.jacobian
         return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+
+    @property
+    def measure(self) -> Array:
+        """Area per reference area ``(n, q)``."""
+        return np.abs(self.determinant)
 
 
 def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) -> CellBasis:

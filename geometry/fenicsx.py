@@ -12,6 +12,12 @@ try:
     from dolfinx.io.gmsh import model_to_mesh  # dolfinx >= 0.10
 except ImportError:
     from dolfinx.io.gmshio import model_to_mesh
+try:
+    from dolfinx.la.petsc import create_vector  # dolfinx >= 0.10
+except ImportError:
+    from dolfinx.la import create_petsc_vector as create_vector
+
+__all__ = ["create_vector", "gmsh_to_mesh"]
 
 
 def gmsh_to_mesh(

@@ -6,6 +6,7 @@ tangent that changes; a joint without them compiles and stores none of it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import basix.ufl
@@ -48,6 +49,49 @@ def _voigt(u):
     return ufl.as_vector([e[0, 0], e[1, 1], 2 * e[0, 1]])
 
 
+def matrix(V: fem.FunctionSpace, forms: list[fem.Form], extra: tuple[np.ndarray, np.ndarray] | None = None) -> PETSc.Mat:
+    """An empty matrix with room for the bilinear ``forms`` of separate bodies and ``extra`` block (rows, columns).
+
+    The extra slots are global block dofs in rows that this rank owns. What is not written before the first assembly is
+    given back by PETSc.
+    """
+    index_map = V.dofmap.index_map
+    n, start = index_map.size_local, index_map.local_range[0]
+    diagonal, off = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    for form in forms:
+        pattern = fem.create_sparsity_pattern(form)
+        pattern.finalize()
+        columns, offsets = pattern.graph
+        remote = np.concatenate([[0], np.cumsum(columns >= n)])
+        total, outside = np.diff(offsets)[:n], np.diff(remote[offsets])[:n]
+        diagonal += total - outside
+        off += outside
+    if extra is not None:
+        rows, columns = extra
+        inside = (columns >= start) & (columns < start + n)
+        diagonal += np.bincount(rows[inside] - start, minlength=n)
+        off += np.bincount(rows[~inside] - start, minlength=n)
+    diagonal, off = np.minimum(diagonal, n), np.minimum(off, index_map.size_global - n)
+    nnz = tuple(np.repeat(2 * c, 2).astype(PETSc.IntType) for c in (diagonal, off))
+    A = PETSc.Mat().createAIJ([[2 * n, None]] * 2, bsize=2, nnz=nnz, comm=V.mesh.comm)
+    nodes = index_map.local_to_global(np.arange(n + index_map.num_ghosts, dtype=np.int32))
+    lgmap = PETSc.LGMap().create(nodes.astype(PETSc.IntType), bsize=2, comm=V.mesh.comm)
+    A.setLGMap(lgmap, lgmap)
+    A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
+    return A
+
+
+def assemble(A: PETSc.Mat, forms: list[fem.Form], bcs: Sequence[fem.DirichletBC] = ()) -> None:
+    """Add bilinear ``forms`` to ``A``, with ones on the diagonal of the rows of ``bcs``.
+
+    dolfinx inserts those ones; without a flush after each form the next one's additions would be dropped silently.
+    """
+    for form in forms:
+        fem_petsc.assemble_matrix(A, form, list(bcs))
+        A.assemblyBegin(PETSc.Mat.AssemblyType.FLUSH)
+        A.assemblyEnd(PETSc.Mat.AssemblyType.FLUSH)
+
+
 class _PlasticBody:
     """Quadrature data of one plastic body: gradients, weights, points with history."""
 
@@ -57,7 +101,7 @@ class _PlasticBody:
         self.cells = cells
         self.dofs = V.dofmap.list[cells]
         self.gradient = basis.gradient
-        self.weight = basis.determinant * w
+        self.weight = basis.measure * w
         self.points = material_points(material, self.weight.size)
         self.stress = np.zeros((self.weight.size, 4))
 
@@ -104,9 +148,8 @@ class Bulk:
             self._plastic_forms.append(fem.form(tangent * dx(1)))
         self.stiffness = None
         if self._elastic_forms:
-            self.stiffness = fem_petsc.create_matrix(self._elastic_forms[0])
-            for form in self._elastic_forms:
-                fem_petsc.assemble_matrix(self.stiffness, form)
+            self.stiffness = matrix(V, self._elastic_forms)
+            assemble(self.stiffness, self._elastic_forms)
             self.stiffness.assemble()
 
     @property
@@ -140,13 +183,11 @@ class Bulk:
 
     def assemble_elastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
         """Add the stiffness of the elastic bodies to ``A``."""
-        for form in self._elastic_forms:
-            fem_petsc.assemble_matrix(A, form, bcs)
+        assemble(A, self._elastic_forms, bcs)
 
     def assemble_plastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
         """Add the consistent tangent of the plastic bodies to ``A``."""
-        for form in self._plastic_forms:
-            fem_petsc.assemble_matrix(A, form, bcs)
+        assemble(A, self._plastic_forms, bcs)
 
     def commit(self) -> None:
         """Accept the history of the last `update`."""
@@ -202,4 +243,4 @@ class Bulk:
             cells, m = self.cells[body.tag], body.material
             basis = cell_basis(self.V.mesh, self.V.element.basix_element.degree, cells, X)
             eps = strain(basis.gradient, u[self.V.dofmap.list[cells]]).reshape(-1, 3)
-            yield cells, eps, (basis.determinant * w).ravel(), elastic_stress(eps, m.E, m.nu, m.plane)
+            yield cells, eps, (basis.measure * w).ravel(), elastic_stress(eps, m.E, m.nu, m.plane)

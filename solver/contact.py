@@ -5,8 +5,8 @@ At a point ``x`` of a side, with closest point ``y`` on the opposite curve, ``n`
 own body, and the virtual work of the contact forces is ``sum over sides of share * integral of p n . (v(x) - v(y))``. The
 unbiased form gives each side one half; the one-sided form integrates one side only. ``gamma`` is ``gamma_factor`` times
 the trace constant of each contact cell. Under current kinematics the closest points belong to the deformed curves and
-the linearisation includes the moving ``n`` and ``y``; under reference kinematics pairs and normals are those of the
-undeformed curves. A tied contact carries the full vector ``t - gamma ([[u]])`` whatever its sign.
+the linearisation includes the moving ``n`` and ``y``; under reference kinematics pairs are those of the undeformed
+curves, with the normal of the first side (the pin) for both, and the gap is linear in the displacement. A tied contact carries the full vector ``t - gamma ([[u]])`` whatever its sign.
 
 Opposite curves may lie on other ranks: their displacement is exchanged, forces on them are summed over the ranks, and
 their rows of the matrix travel with PETSc's assembly.
@@ -84,26 +84,30 @@ class Contact:
             _Pairing(sides[i], opposites[i], 1.0 / len(chosen), np.repeat(gamma_factor * sides[i].gamma, sides[i].weight.shape[1]))
             for i in chosen
         ]
-        zero = self._motions(np.zeros((max((int(s.cell_dofs.max(initial=-1)) for s in sides), default=-1) + 1, 2)), at_rest=True)
+        rest = self._motions(None)
         for pair in self.pairings:
             side = pair.side
-            start = pair.curve.closest_point(side.point.reshape(-1, 2), side.outward.reshape(-1, 2), zero[id(pair.opposite)])
+            start = pair.curve.closest_point(side.point.reshape(-1, 2), side.outward.reshape(-1, 2), rest[id(pair.opposite)])
             pair.projection = start
             if kinematics != "current":
-                pair.fixed = start if kinematics == "reference" else replace(start, slides=np.zeros_like(start.slides))
+                pair.fixed = start
+                if side is sides[0] and rigid is None:
+                    pair.fixed = replace(start, normal=-side.outward.reshape(-1, 2))
                 pair.separation = side.point.reshape(-1, 2) - start.point
         self._extend_pattern([p.projection.facet for p in self.pairings])
 
     # ------------------------------------------------------------------ evaluation
 
-    def _motions(self, u: Array, at_rest: bool = False) -> dict[int, Array]:
+    def _motions(self, u: Array | None) -> dict[int, Array]:
+        """Displacement of each opposite: of its curve's nodes, or of the rigid disc; at rest without ``u``."""
         motion = {}
         for pair in self.pairings:
-            if isinstance(pair.opposite, ContactSide):
-                n = len(pair.opposite.curve_dofs)
-                motion[id(pair.opposite)] = np.zeros((n, 2)) if at_rest else pair.opposite.curve_displacement(u)
+            if not isinstance(pair.opposite, ContactSide):
+                motion[id(pair.opposite)] = np.zeros(2) if u is None else self.rigid_motion
+            elif u is None:
+                motion[id(pair.opposite)] = np.zeros((len(pair.opposite.curve_dofs), 2))
             else:
-                motion[id(pair.opposite)] = np.zeros(2) if at_rest else self.rigid_motion
+                motion[id(pair.opposite)] = pair.opposite.curve_displacement(u)
         return motion
 
     def search(self) -> None:

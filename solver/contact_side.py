@@ -123,7 +123,7 @@ class ContactSide:
         X, w = bulk_quadrature()
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
         B = strain_matrix(basis.gradient)
-        energy = np.einsum("nq,nqia,ij,nqjb->nab", basis.determinant * w, B, C, B, optimize=True)
+        energy = np.einsum("nq,nqia,ij,nqjb->nab", basis.measure * w, B, C, B, optimize=True)
         n = self.outward
         traction = np.stack([n[..., 0] ** 2, n[..., 1] ** 2, 2 * n[..., 0] * n[..., 1]], axis=-1) @ C
         row = np.einsum("nqi,nqia->nqa", traction, strain_matrix(self.gradient))

@@ -1,0 +1,304 @@
+"""Static equilibrium at a given load: residual and tangent of bulk and contact, solved by PETSc's SNES with MUMPS.
+
+The residual is internal minus contact forces; rows of prescribed displacements are left out of it, and out of the
+matrix with their columns, the contact's included. It is measured against the reaction of the supports, so that the
+tolerance has no unit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from archord.geometry.basis import Array
+from archord.geometry.fenicsx import create_vector
+from archord.solver.bulk import Bulk, assemble, matrix
+from archord.solver.contact import Contact
+
+
+@dataclass(frozen=True)
+class Support:
+    """A prescribed displacement: component ``axis`` of the nodes ``dofs`` (block dofs of this rank) is ``rate * load``.
+
+    ``rate`` is a number or one per node; ``name`` addresses its reaction.
+    """
+
+    name: str
+    axis: int
+    dofs: np.ndarray
+    rate: float | Array = 0.0
+
+
+@dataclass
+class Newton:
+    """What a nonlinear solve did: whether it converged and why not, its iterations and residuals relative to reaction."""
+
+    converged: bool
+    reason: str
+    iterations: int
+    residuals: list[float]
+
+
+@dataclass
+class Timer:
+    """Seconds spent per phase, and how often."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def add(self, name: str, start: float) -> None:
+        """Book the time since ``start`` (a ``perf_counter``) under ``name``."""
+        self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+        self.counts[name] = self.counts.get(name, 0) + 1
+
+
+class Equilibrium:
+    """Equilibrium of ``bulk`` and, if given, ``contact`` under ``supports``; ``rigid_rate`` moves a rigid pin with the load."""
+
+    def __init__(
+        self,
+        V: fem.FunctionSpace,
+        bulk: Bulk,
+        supports: list[Support],
+        contact: Contact | None = None,
+        rigid_rate: Array | None = None,
+        *,
+        tolerance: float = 1e-10,
+        max_iterations: int = 25,
+        timer: Timer | None = None,
+    ) -> None:
+        self.V, self.bulk, self.contact = V, bulk, contact
+        self.comm = V.mesh.comm
+        self.supports = supports
+        self.rigid_rate = rigid_rate
+        self.tolerance, self.max_iterations = tolerance, max_iterations
+        self.timer = timer or Timer()
+        self.u = fem.Function(V, name="displacement")
+        self.load = 0.0
+        index_map = V.dofmap.index_map
+        self.n_owned = index_map.size_local
+        self.n_local = index_map.size_local + index_map.num_ghosts
+        self._fixed = np.zeros((self.n_local, 2), dtype=bool)
+        self._rate = np.zeros((self.n_local, 2))
+        for s in supports:
+            self._fixed[s.dofs, s.axis] = True
+            self._rate[s.dofs, s.axis] = s.rate
+        self._bcs = _scalar_bcs(V, self._fixed)
+        self._free_owned = ~self._fixed[: self.n_owned].ravel()
+        self._force = create_vector(index_map, 2)
+        self._reaction = np.zeros((self.n_owned, 2))
+        self._reaction_norm = 0.0
+        self._make_matrix()
+        self._snes = self._make_snes()
+        self._failure = ""
+
+    # ------------------------------------------------------------------ matrix
+
+    def _make_matrix(self) -> None:
+        """Allocate the matrix with every slot that bulk and contact may fill, and assemble the constant part."""
+        n, start = self.n_owned, self.V.dofmap.index_map.local_range[0]
+        slots = None
+        if self.contact is not None:
+            rows, columns = self.contact.pattern()
+            mine = (rows >= start) & (rows < start + n)
+            slots = rows[mine], columns[mine]
+        A = matrix(self.V, self.bulk.pattern_forms(), slots)
+        # zeros into every slot first: what is not written before the first assembly is given back
+        assemble(A, self.bulk.pattern_forms(), self._bcs)
+        if slots is not None:
+            I, J = _csr(slots[0] - start, slots[1], n)
+            rowmap = np.arange(start, start + n, dtype=PETSc.IntType)
+            A.setValuesBlockedIJV(I, J, np.zeros(4 * len(J)), PETSc.InsertMode.ADD, rowmap)
+        A.assemble()
+        A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
+        A.zeroEntries()
+        self.bulk.assemble_elastic(A, self._bcs)
+        A.assemble()
+        self._A = A
+        self._elastic = A.copy()
+        self._global_fixed = self._global_fixed_mask()
+
+    def _global_fixed_mask(self) -> np.ndarray:
+        """Fixed scalar dofs among the contact's nodes, over all ranks (sorted)."""
+        if self.contact is None:
+            return np.zeros(0, dtype=np.int64)
+        start = 2 * self.V.dofmap.index_map.local_range[0]
+        mine = np.flatnonzero(self._fixed[: self.n_owned].ravel()) + start
+        near = np.unique(np.concatenate([s.curve_cell_dofs.ravel() for s in self.contact.sides]))
+        mine = mine[np.isin(mine // 2, near)]
+        return np.sort(np.concatenate(self.comm.allgather(mine)))
+
+    def _jacobian(self, snes, x, A, P) -> None:
+        clock = perf_counter()
+        A = self._A
+        self._elastic.copy(A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self.bulk.assemble_plastic(A, self._bcs)
+        self.timer.add("assemble bulk", clock)
+        clock = perf_counter()
+        if self.contact is not None:
+            rows, columns, values = self.contact.tangent()
+            keep = ~(np.isin(rows, self._global_fixed) | np.isin(columns, self._global_fixed))
+            rows, columns, values = rows[keep], columns[keep], values[keep]
+            size = 2 * self.V.dofmap.index_map.size_global
+            key, slot = np.unique(rows * size + columns, return_inverse=True)
+            summed = np.bincount(slot, weights=values, minlength=len(key))
+            row, start = np.unique(key // size, return_index=True)
+            I = np.append(start, len(key)).astype(PETSc.IntType)
+            A.setValuesIJV(I, (key % size).astype(PETSc.IntType), summed, PETSc.InsertMode.ADD, row.astype(PETSc.IntType))
+        A.assemble()
+        self.timer.add("assemble contact", clock)
+
+    # ------------------------------------------------------------------ residual
+
+    def _residual(self, snes, x, f) -> None:
+        self._set_displacement(x)
+        self.evaluate()
+        if self._pattern_grew:
+            self._A.destroy()
+            self._elastic.destroy()
+            self._make_matrix()
+            snes.setJacobian(self._jacobian, self._A)
+        f.array[:] = np.where(self._free_owned, self._force.array_r, 0.0)
+
+    def evaluate(self) -> None:
+        """Residual, reactions and trial history at the current displacement and load."""
+        clock = perf_counter()
+        u = self.u.x.array.reshape(-1, 2)
+        self.bulk.update(u)
+        self.timer.add("return mapping", clock)
+        clock = perf_counter()
+        with self._force.localForm() as local:
+            local.set(0.0)
+        self.bulk.add_force(self.u.x.petsc_vec, self._force)
+        self.timer.add("assemble force", clock)
+        clock = perf_counter()
+        self._pattern_grew = False
+        if self.contact is not None:
+            if self.rigid_rate is not None:
+                self.contact.rigid_motion = self.load * self.rigid_rate
+            self._pattern_grew = self.contact.evaluate(u)
+            force = self._force.array.reshape(-1, 2)
+            self.contact.add_force(force)
+        self._reaction = np.where(self._free_owned, 0.0, self._force.array_r).reshape(-1, 2)
+        square = float((self._reaction**2).sum())
+        self._reaction_norm = np.sqrt(self.comm.allreduce(square))
+        self.timer.add("contact", clock)
+
+    def _set_displacement(self, x: PETSc.Vec) -> None:
+        self.u.x.array[: 2 * self.n_owned] = x.array_r
+        self.u.x.scatter_forward()
+
+    def reaction(self, name: str) -> Array:
+        """Force ``(2,)`` of the support ``name`` on the joint at the last evaluation, over all ranks."""
+        total = np.zeros(2)
+        for s in self.supports:
+            if s.name == name:
+                total[s.axis] += self._reaction[s.dofs[s.dofs < self.n_owned], s.axis].sum()
+        return self.comm.allreduce(total)
+
+    # ------------------------------------------------------------------ solve
+
+    def _make_snes(self) -> PETSc.SNES:
+        snes = PETSc.SNES().create(self.comm)
+        snes.setOptionsPrefix("archord_")
+        snes.setType("newtonls")
+        x = create_vector(self.V.dofmap.index_map, 2)
+        self._x = x
+        snes.setFunction(self._residual, x.duplicate())
+        snes.setJacobian(self._jacobian, self._A)
+        snes.setTolerances(max_it=self.max_iterations)
+        snes.setConvergenceTest(self._test)
+        ksp = snes.getKSP()
+        ksp.setType("preonly")
+        ksp.setOperators(self._A)
+        pc = ksp.getPC()
+        pc.setType("lu")
+        pc.setFactorSolverType("mumps")
+        pc.setFactorSetUpSolverType()
+        pc.getFactorMatrix().setMumpsIcntl(14, 60)
+        options = PETSc.Options("archord_")
+        options["snes_linesearch_type"] = "bt"
+        options["snes_linesearch_max_it"] = 8
+        snes.setFromOptions()
+        return snes
+
+    def _floor(self) -> float:
+        """Round-off of the residual: forces that a rigid motion of the size of the load leaves."""
+        stiffness = max(body.material.E for body in self.bulk.bodies)
+        rate = max(float(np.max(np.abs(s.rate), initial=0.0)) for s in self.supports)
+        rigid = 0.0 if self.rigid_rate is None else float(np.abs(self.rigid_rate).max())
+        return 1e-13 * stiffness * abs(self.load) * self.comm.allreduce(max(rate, rigid), op=MPI.MAX)
+
+    def _test(self, snes, iteration, norms):
+        norm = norms[2]
+        scale = max(self._reaction_norm, self._noise / self.tolerance)
+        relative = norm / scale if scale > 0 else norm
+        self._residuals.append(relative)
+        if not np.isfinite(norm):
+            return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
+        if norm <= self.tolerance * scale:
+            return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
+        if iteration >= self.max_iterations:
+            return PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT
+        return PETSc.SNES.ConvergedReason.ITERATING
+
+    def solve(self, load: float, guess: Array) -> Newton:
+        """Solve at ``load`` from the nodal displacements ``guess`` ``(n_local, 2)``, whose prescribed values are replaced."""
+        clock = perf_counter()
+        self.load = load
+        self._noise = self._floor()
+        self._residuals: list[float] = []
+        x = guess.copy()
+        x[self._fixed] = load * self._rate[self._fixed]
+        self._x.array[:] = x[: self.n_owned].ravel()
+        if self.contact is not None:
+            self.contact.search()
+        self._snes.solve(None, self._x)
+        self.timer.add("solve", clock)
+        reason = self._snes.getConvergedReason()
+        return Newton(reason > 0, _REASONS.get(reason, f"SNES reason {reason}"), self._snes.getIterationNumber(), self._residuals)
+
+    def displacement(self) -> Array:
+        """A copy of the nodal displacements ``(n_local, 2)``."""
+        return self.u.x.array.reshape(-1, 2).copy()
+
+    def restore(self, load: float, u: Array) -> None:
+        """Go back to an accepted state; the history was never touched."""
+        self.load = load
+        self.u.x.array[:] = u.ravel()
+
+    def commit(self) -> None:
+        """Accept the last solve: bulk and contact keep their trial history."""
+        self.bulk.commit()
+        if self.contact is not None:
+            self.contact.commit()
+
+
+def _scalar_bcs(V: fem.FunctionSpace, fixed: np.ndarray) -> list[fem.DirichletBC]:
+    bcs = []
+    for axis in range(2):
+        dofs = np.flatnonzero(fixed[:, axis]).astype(np.int32)
+        bcs.append(fem.dirichletbc(0.0, 2 * dofs + axis, V.sub(axis)))
+    return bcs
+
+
+def _csr(rows: np.ndarray, columns: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    order = np.lexsort((columns, rows))
+    I = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
+    return I.astype(PETSc.IntType), columns[order].astype(PETSc.IntType)
+
+
+_R = PETSc.SNES.ConvergedReason
+_REASONS = {
+    _R.CONVERGED_FNORM_RELATIVE: "converged",
+    _R.DIVERGED_MAX_IT: "no convergence within the allowed iterations",
+    _R.DIVERGED_LINE_SEARCH: "the line search found no smaller residual",
+    _R.DIVERGED_LINEAR_SOLVE: "the linear system could not be factorised",
+    _R.DIVERGED_FNORM_NAN: "the residual is not a number",
+    _R.DIVERGED_FUNCTION_DOMAIN: "the residual could not be evaluated",
+}
