@@ -4,7 +4,9 @@ At a point ``x`` of a side, with closest point ``y`` on the opposite curve, ``n`
 ``g = (x - y) . n`` the gap, the contact pressure is ``p = [t . n - gamma g]_+`` with ``t = sigma(u) N`` the traction of the
 own body, and the virtual work of the contact forces is ``sum over sides of share * integral of p n . (v(x) - v(y))``. The
 unbiased form gives each side one half; the one-sided form integrates one side only. ``gamma`` is ``gamma_factor`` times
-the trace constant of each contact cell. Under current kinematics the closest points belong to the deformed curves and
+the share times the trace constant ``c`` of each contact cell, ``|sigma_n(v)|^2 <= c a(v, v)``. The form is coercive where
+``gamma > share c / 4``: Cauchy-Schwarz and ``c`` bound ``share * integral of sigma_n v_n`` by
+``sqrt(a(v, v)) * share sqrt(c) |v_n|``, which ``a(v, v) + share gamma |v_n|^2`` exceeds. Under current kinematics the closest points belong to the deformed curves and
 the linearisation includes the moving ``n`` and ``y``; under reference kinematics pairs are those of the undeformed
 curves, with the normal of the first side (the pin) for both, and the gap is linear in the displacement. A tied contact carries the full vector ``t - gamma ([[u]])`` whatever its sign.
 
@@ -23,6 +25,7 @@ from archord.geometry.curve import Array, Curve, Projection, RigidCircle
 from archord.solver.contact_side import ContactSide
 
 Kinematics = Literal["current", "reference", "tied"]
+GAMMA_FACTOR = 0.5  # twice the bound of coercivity; larger values stiffen the edge of the contact and cost iterations
 _PATTERN_MARGIN = 2  # opposite facets kept in the matrix pattern on either side of those expected
 
 
@@ -71,7 +74,7 @@ class Contact:
         *,
         rigid: RigidCircle | None = None,
         kinematics: Kinematics = "current",
-        gamma_factor: float = 1.0,
+        gamma_factor: float = GAMMA_FACTOR,
         one_sided: int | None = None,
     ) -> None:
         self.sides = sides
@@ -80,8 +83,9 @@ class Contact:
         self.comm = sides[0].comm
         opposites = [rigid] if rigid is not None else [sides[1], sides[0]]
         chosen = range(len(sides)) if one_sided is None else [one_sided]
+        share = 1.0 / len(chosen)
         self.pairings = [
-            _Pairing(sides[i], opposites[i], 1.0 / len(chosen), np.repeat(gamma_factor * sides[i].gamma, sides[i].weight.shape[1]))
+            _Pairing(sides[i], opposites[i], share, np.repeat(gamma_factor * share * sides[i].gamma, sides[i].weight.shape[1]))
             for i in chosen
         ]
         rest = self._motions(None)
