@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import BULK_QUADRATURE_DEGREE, Array, bulk_quadrature, cell_basis, strain
 from archord.materials.elasticity import Elastic, elastic_stress, elastic_tangent, mean_stress, von_mises
-from archord.solver.points import material_points
+from archord.solver.points import PlasticPoints, material_points
 
 
 @dataclass(frozen=True)
@@ -156,6 +156,10 @@ class Bulk:
     def plastic(self) -> bool:
         """Whether any body carries plastic history."""
         return bool(self._plastic)
+
+    def plastic_points(self) -> list[PlasticPoints]:
+        """The points with history of all plastic bodies."""
+        return [body.points for body in self._plastic.values()]
 
     def pattern_forms(self) -> list[fem.Form]:
         """Bilinear forms that together span the bulk's matrix pattern."""

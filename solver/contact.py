@@ -21,8 +21,9 @@ from typing import Literal
 
 import numpy as np
 
-from archord.geometry.curve import Array, Curve, Projection, RigidCircle
+from archord.geometry.curve import Array, Curve, Projection, ProjectionError, RigidCircle
 from archord.solver.contact_side import ContactSide
+from archord.solver.points import PlasticPoints
 
 Kinematics = Literal["current", "reference", "tied"]
 GAMMA_FACTOR = 0.5  # twice the bound of coercivity; larger values stiffen the edge of the contact and cost iterations
@@ -123,9 +124,11 @@ class Contact:
     def evaluate(self, u: Array) -> bool:
         """Gaps, pressures and trial history at the nodal displacements ``u`` ``(n, 2)`` of this rank.
 
-        Returns whether the matrix pattern had to grow (the pairs slid out of it); collective.
+        Returns whether the matrix pattern had to grow (the pairs slid out of it). Collective; raises `ProjectionError` on
+        every rank if a point on any of them finds no partner.
         """
         motion = self._motions(u)
+        failure = None
         for pair in self.pairings:
             side = pair.side
             displacement, stress, tangent = side.deform(u)
@@ -135,11 +138,15 @@ class Contact:
             if pair.fixed is None:
                 x = side.point.reshape(-1, 2) + displacement
                 start = None if pair.projection is None else pair.projection.facet
-                pair.projection = (
-                    pair.curve.closest_point(x, outward, shift, start)
-                    if isinstance(pair.curve, Curve)
-                    else pair.curve.closest_point(x, outward, shift)
-                )
+                try:
+                    pair.projection = (
+                        pair.curve.closest_point(x, outward, shift, start)
+                        if isinstance(pair.curve, Curve)
+                        else pair.curve.closest_point(x, outward, shift)
+                    )
+                except ProjectionError as error:
+                    failure = str(error)
+                    break
                 pair.separation = x - pair.projection.point
                 pair.gap = (pair.separation * pair.projection.normal).sum(1)
                 relative = None
@@ -158,6 +165,10 @@ class Contact:
             else:
                 trial = (pair.traction * pair.projection.normal).sum(1) - pair.gamma * pair.gap
                 pair.pressure = np.where(pair.projection.found & (trial > 0), trial, 0.0)
+        failures = [f for f in self.comm.allgather(failure) if f]
+        if failures:
+            self.search()
+            raise ProjectionError(failures[0])
         return self._extend_pattern([p.projection.facet for p in self.pairings])
 
     @staticmethod
@@ -194,6 +205,10 @@ class Contact:
         for pair in self.pairings:
             total += self._forces(pair).sum(0) * (1 if pair.side is self.sides[-1] else -1)
         return self.sides[0].sum_over_ranks(total)
+
+    def plastic_points(self) -> list[PlasticPoints]:
+        """The points with history of all integrated sides."""
+        return [pair.side.points for pair in self.pairings if pair.side.points.has_history]
 
     def commit(self) -> None:
         """Accept the history of the contact points at the last evaluation."""

@@ -7,8 +7,7 @@ tolerance has no unit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from time import perf_counter
+from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
@@ -16,9 +15,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.geometry.curve import ProjectionError
 from archord.geometry.fenicsx import create_vector
 from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact import Contact
+from archord.solver.timer import Timer
 
 
 @dataclass(frozen=True)
@@ -36,25 +37,16 @@ class Support:
 
 @dataclass
 class Newton:
-    """What a nonlinear solve did: whether it converged and why not, its iterations and residuals relative to reaction."""
+    """What a nonlinear solve did: whether it converged and why not, its iterations and residuals relative to reaction.
+
+    ``worst`` is the place ``(2,)`` of the largest residual of a solve that did not converge.
+    """
 
     converged: bool
     reason: str
     iterations: int
     residuals: list[float]
-
-
-@dataclass
-class Timer:
-    """Seconds spent per phase, and how often."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
-
-    def add(self, name: str, start: float) -> None:
-        """Book the time since ``start`` (a ``perf_counter``) under ``name``."""
-        self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
-        self.counts[name] = self.counts.get(name, 0) + 1
+    worst: tuple[float, float] | None = None
 
 
 class Equilibrium:
@@ -134,30 +126,36 @@ class Equilibrium:
         return np.sort(np.concatenate(self.comm.allgather(mine)))
 
     def _jacobian(self, snes, x, A, P) -> None:
-        clock = perf_counter()
         A = self._A
-        self._elastic.copy(A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self.bulk.assemble_plastic(A, self._bcs)
-        self.timer.add("assemble bulk", clock)
-        clock = perf_counter()
-        if self.contact is not None:
-            rows, columns, values = self.contact.tangent()
-            keep = ~(np.isin(rows, self._global_fixed) | np.isin(columns, self._global_fixed))
-            rows, columns, values = rows[keep], columns[keep], values[keep]
-            size = 2 * self.V.dofmap.index_map.size_global
-            key, slot = np.unique(rows * size + columns, return_inverse=True)
-            summed = np.bincount(slot, weights=values, minlength=len(key))
-            row, start = np.unique(key // size, return_index=True)
-            I = np.append(start, len(key)).astype(PETSc.IntType)
-            A.setValuesIJV(I, (key % size).astype(PETSc.IntType), summed, PETSc.InsertMode.ADD, row.astype(PETSc.IntType))
-        A.assemble()
-        self.timer.add("assemble contact", clock)
+        with self.timer("assemble bulk"):
+            self._elastic.copy(A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            self.bulk.assemble_plastic(A, self._bcs)
+        with self.timer("assemble contact"):
+            if self.contact is not None:
+                self._add_contact(A)
+            A.assemble()
+
+    def _add_contact(self, A: PETSc.Mat) -> None:
+        rows, columns, values = self.contact.tangent()
+        keep = ~(np.isin(rows, self._global_fixed) | np.isin(columns, self._global_fixed))
+        rows, columns, values = rows[keep], columns[keep], values[keep]
+        size = 2 * self.V.dofmap.index_map.size_global
+        key, slot = np.unique(rows * size + columns, return_inverse=True)
+        summed = np.bincount(slot, weights=values, minlength=len(key))
+        row, start = np.unique(key // size, return_index=True)
+        I, J = np.append(start, len(key)), key % size
+        A.setValuesIJV(*(v.astype(PETSc.IntType) for v in (I, J)), summed, PETSc.InsertMode.ADD, row.astype(PETSc.IntType))
 
     # ------------------------------------------------------------------ residual
 
     def _residual(self, snes, x, f) -> None:
         self._set_displacement(x)
-        self.evaluate()
+        try:
+            self.evaluate()
+        except ProjectionError as error:
+            self._failure = str(error)
+            f.set(np.nan)
+            return
         if self._pattern_grew:
             self._A.destroy()
             self._elastic.destroy()
@@ -167,27 +165,23 @@ class Equilibrium:
 
     def evaluate(self) -> None:
         """Residual, reactions and trial history at the current displacement and load."""
-        clock = perf_counter()
         u = self.u.x.array.reshape(-1, 2)
-        self.bulk.update(u)
-        self.timer.add("return mapping", clock)
-        clock = perf_counter()
-        with self._force.localForm() as local:
-            local.set(0.0)
-        self.bulk.add_force(self.u.x.petsc_vec, self._force)
-        self.timer.add("assemble force", clock)
-        clock = perf_counter()
+        with self.timer("return mapping"):
+            self.bulk.update(u)
+        with self.timer("assemble force"):
+            with self._force.localForm() as local:
+                local.set(0.0)
+            self.bulk.add_force(self.u.x.petsc_vec, self._force)
         self._pattern_grew = False
-        if self.contact is not None:
-            if self.rigid_rate is not None:
-                self.contact.rigid_motion = self.load * self.rigid_rate
-            self._pattern_grew = self.contact.evaluate(u)
-            force = self._force.array.reshape(-1, 2)
-            self.contact.add_force(force)
+        with self.timer("contact"):
+            if self.contact is not None:
+                if self.rigid_rate is not None:
+                    self.contact.rigid_motion = self.load * self.rigid_rate
+                self._pattern_grew = self.contact.evaluate(u)
+                self.contact.add_force(self._force.array.reshape(-1, 2))
         self._reaction = np.where(self._free_owned, 0.0, self._force.array_r).reshape(-1, 2)
         square = float((self._reaction**2).sum())
         self._reaction_norm = np.sqrt(self.comm.allreduce(square))
-        self.timer.add("contact", clock)
 
     def _set_displacement(self, x: PETSc.Vec) -> None:
         self.u.x.array[: 2 * self.n_owned] = x.array_r
@@ -247,21 +241,52 @@ class Equilibrium:
             return PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT
         return PETSc.SNES.ConvergedReason.ITERATING
 
-    def solve(self, load: float, guess: Array) -> Newton:
-        """Solve at ``load`` from the nodal displacements ``guess`` ``(n_local, 2)``, whose prescribed values are replaced."""
-        clock = perf_counter()
+    def solve(self, load: float, guess: Array, *, elastic_first: bool = False) -> Newton:
+        """Solve at ``load`` from the nodal displacements ``guess`` ``(n_local, 2)``, whose prescribed values are replaced.
+
+        ``elastic_first`` finds the equilibrium of points that cannot yield (further) before the one asked for; if that
+        fails, the solve starts from the guess.
+        """
         self.load = load
         self._noise = self._floor()
+        points = self.bulk.plastic_points() + (self.contact.plastic_points() if self.contact is not None else [])
+        yielding = self.comm.allreduce(len(points)) > 0
+        before = 0
+        if elastic_first and yielding:
+            for p in points:
+                p.elastic_only = True
+            result = self._run(guess)
+            for p in points:
+                p.elastic_only = False
+            before = result.iterations
+            if result.converged:
+                guess = self.displacement()
+        result = self._run(guess)
+        return replace(result, iterations=before + result.iterations)
+
+    def _run(self, guess: Array) -> Newton:
         self._residuals: list[float] = []
+        self._failure = ""
         x = guess.copy()
-        x[self._fixed] = load * self._rate[self._fixed]
+        x[self._fixed] = self.load * self._rate[self._fixed]
         self._x.array[:] = x[: self.n_owned].ravel()
         if self.contact is not None:
             self.contact.search()
-        self._snes.solve(None, self._x)
-        self.timer.add("solve", clock)
-        reason = self._snes.getConvergedReason()
-        return Newton(reason > 0, _REASONS.get(reason, f"SNES reason {reason}"), self._snes.getIterationNumber(), self._residuals)
+        with self.timer("solve"):
+            self._snes.solve(None, self._x)
+        code, iterations = self._snes.getConvergedReason(), self._snes.getIterationNumber()
+        if code > 0:
+            return Newton(True, "converged", iterations, self._residuals)
+        reason = self._failure or _REASONS.get(code, f"SNES reason {code}")
+        return Newton(False, reason, iterations, self._residuals, self._worst_place())
+
+    def _worst_place(self) -> tuple[float, float] | None:
+        """Where the residual is largest, over all ranks."""
+        size = np.linalg.norm(self._snes.getFunction()[0].array_r.reshape(-1, 2), axis=1)
+        at = int(np.argmax(size)) if len(size) else 0
+        x = self.V.tabulate_dof_coordinates()[at, :2] if len(size) else np.zeros(2)
+        found = [(s, p) for s, p in self.comm.allgather((size[at] if len(size) else -1.0, tuple(x))) if np.isfinite(s)]
+        return max(found)[1] if found else None
 
     def displacement(self) -> Array:
         """A copy of the nodal displacements ``(n_local, 2)``."""
@@ -295,7 +320,6 @@ def _csr(rows: np.ndarray, columns: np.ndarray, n: int) -> tuple[np.ndarray, np.
 
 _R = PETSc.SNES.ConvergedReason
 _REASONS = {
-    _R.CONVERGED_FNORM_RELATIVE: "converged",
     _R.DIVERGED_MAX_IT: "no convergence within the allowed iterations",
     _R.DIVERGED_LINE_SEARCH: "the line search found no smaller residual",
     _R.DIVERGED_LINEAR_SOLVE: "the linear system could not be factorised",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from archord.materials.elasticity import Array, Elastic, elastic_stress, elastic_tangent
@@ -27,7 +29,10 @@ class ElasticPoints:
 
 
 class PlasticPoints:
-    """``n`` points of an elastic-plastic body with their history; ``trial`` belongs to the last strain seen."""
+    """``n`` points of an elastic-plastic body with their history; ``trial`` belongs to the last strain seen.
+
+    With ``elastic_only`` set, `update` answers as if the points could not yield (further).
+    """
 
     has_history = True
 
@@ -37,10 +42,13 @@ class PlasticPoints:
         self.material = material
         self.elastic_tangent = elastic_tangent(material.E, material.nu, material.plane)
         self.state = self.trial = PlasticState.virgin(n)
+        self._unyielding = replace(material, yield_stress=np.inf)
+        self.elastic_only = False
 
     def update(self, strain: Array) -> tuple[Array, Array]:
         """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the committed history."""
-        stress, tangent, self.trial = self.material.return_map(strain, self.state)
+        material = self._unyielding if self.elastic_only else self.material
+        stress, tangent, self.trial = material.return_map(strain, self.state)
         return stress, tangent
 
     def commit(self) -> None:

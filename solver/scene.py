@@ -345,7 +345,8 @@ def example() -> str:
     for section, info in Scene.model_fields.items():
         model: Any = info.annotation
         lines += [f"[{section}]  # {info.description}"]
-        for name, field in model.model_fields.items():
+        for name in sorted(model.model_fields, key=lambda name: name not in ("E", "nu")):
+            field = model.model_fields[name]
             unit = (field.json_schema_extra or {}).get("unit")
             shown = (field.examples or [None])[0]
             optional = "" if shown is not None else "# "
