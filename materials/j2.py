@@ -119,6 +119,7 @@ def _projected_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[
     compliance = np.array([m.E / (3 * (1 - m.nu)), 2 * mu, 2 * mu])  # products of the eigenvalues of C and P
     a, k = parts[p], strength[p]
     zeta = np.zeros(len(p))
+    close = 1e-10 / compliance.min()  # Newton is quadratic: a step this small leaves nothing but round-off
     for _ in range(60):
         shrink = 1 + zeta[:, None] * compliance
         q = np.sqrt((a / shrink) ** 2 @ weights)
@@ -126,7 +127,7 @@ def _projected_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[
         slope = ((a**2 / shrink**3) @ (weights * compliance)) / q**3 + 2 / 3 * m.hardening / k
         step = residual / slope
         zeta -= step
-        if np.all(np.abs(step) <= 1e-15 * zeta):
+        if np.all(np.abs(step) <= 1e-10 * zeta + close):
             break
     shrink = 1 + zeta[:, None] * compliance
     b = a / shrink

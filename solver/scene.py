@@ -251,16 +251,12 @@ def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, s
 
 
 def _override(data: dict[str, Any], override: str) -> str:
-    """Set one ``a.b=value`` in ``data``, where value is TOML or else a string; returns the dotted key."""
+    """Set one ``a.b=value`` in ``data`` (value: TOML, a number, else text; nothing: drop it); returns the dotted key."""
     key, sign, text = override.partition("=")
     key = key.strip()
     section, dot, name = key.partition(".")
     if not (sign and dot and section and name and "." not in name):
         raise SceneError(f"--set {override}: must read section.key=value, like joint.clearance=0.01.")
-    try:
-        value = tomllib.loads(f"value = {text.strip()}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
     table = data.setdefault(section, {})
     if not isinstance(table, dict):
         raise SceneError(f"--set {override}: {section} is not a section of the scene.")
@@ -268,10 +264,25 @@ def _override(data: dict[str, Any], override: str) -> str:
         if name in pair:
             for other in pair:
                 table.pop(other, None)
+    if not text.strip():
+        table.pop(name, None)
+        return key
+    value = _value(text.strip())
     if key == "pin.rigid" and value is True:
         table.clear()
     table[name] = value
     return key
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        pass
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _sentence(error: Any, data: dict[str, Any], source: str, origin: dict[str, str]) -> str:

@@ -34,13 +34,14 @@ def march(
     max_cutbacks: int,
     substep_done: Callable[[float], None],
     target_done: Callable[[Step], None],
+    attempted: Callable[[float, int], None] = lambda load, iterations: None,
 ) -> None:
     """Solve at the increasing loads ``targets`` and, where a step fails, at loads between them.
 
     The guess for a step extrapolates the last increment; the first step starts from ``first_guess(load)``, and from the
     elastic solution there if any point would yield. A step that fails is halved, at most ``max_cutbacks`` times below an
     output step; two accepted steps in a row double it again. ``substep_done(load)`` follows every accepted step with
-    its history still to be committed, ``target_done`` every output target. Raises `StepFailure`.
+    its history still to be committed, ``target_done`` every output target, ``attempted(load, iterations)`` every solve. Raises `StepFailure`.
     """
     load, u = 0.0, equilibrium.displacement()
     increment, length = None, 0.0
@@ -59,6 +60,7 @@ def march(
             result = equilibrium.solve(new_load, guess, elastic_first=increment is None)
             record.iterations += result.iterations
             record.residuals.append(result.residuals)
+            attempted(new_load, result.iterations)
             if not result.converged:
                 equilibrium.restore(load, u)
                 record.cutbacks += 1

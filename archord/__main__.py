@@ -1,0 +1,18 @@
+"""``python -m archord``, and the ``archord`` command."""
+
+from __future__ import annotations
+
+import sys
+from time import perf_counter
+
+
+def main() -> None:
+    """Run the command line. Exit codes: 0 done, 2 bad input, 3 a solve that could not go on, 1 anything else."""
+    begun = perf_counter()
+    from archord.cli import run
+
+    sys.exit(run(sys.argv[1:], begun))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+"""The command line: ``archord solve`` and ``archord scene``.
+
+Heavy packages are imported by the commands that need them. Bad input ends with exit code 2 and one sentence from rank 0.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated
+
+import click
+import typer
+
+app = typer.Typer(
+    name="archord",
+    help="Conformal contact of pins in holes: P(delta), pressure and plastic zone, by finite elements.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+_begun = perf_counter()
+
+
+def launcher_rank() -> int:
+    """Rank of this process as its MPI launcher says, without importing MPI."""
+    for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"):
+        if name in os.environ:
+            return int(os.environ[name])
+    return 0
+
+
+def run(arguments: list[str], begun: float | None = None) -> int:
+    """Run the command line ``arguments``; returns the exit code. Only rank 0 prints."""
+    global _begun
+    _begun = perf_counter() if begun is None else begun
+    if launcher_rank() != 0:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+    try:
+        code = app(arguments, prog_name="archord", standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except click.ClickException as error:
+        if launcher_rank() == 0:
+            error.show()
+        return error.exit_code
+    except click.exceptions.Abort:
+        return 130
+    except KeyboardInterrupt:
+        say("archord: interrupted.")
+        return 130
+    except Exception as error:
+        from archord.solver.scene import SceneError
+
+        if isinstance(error, SceneError):
+            for sentence in str(error).splitlines():
+                say(sentence)
+            return 2
+        return _fail(error)
+
+
+def say(text: str) -> None:
+    """Print to stderr on rank 0."""
+    if launcher_rank() == 0:
+        print(text, file=sys.stderr, flush=True)
+
+
+def _fail(error: Exception) -> int:
+    """Report an unexpected error with its traceback from the rank that has it, and end all ranks."""
+    import traceback
+
+    traceback.print_exception(error)
+    mpi = sys.modules.get("mpi4py.MPI")
+    if mpi is not None and mpi.Is_initialized() and mpi.COMM_WORLD.size > 1:
+        print(f"archord: rank {mpi.COMM_WORLD.rank} failed: {error}", file=sys.stderr, flush=True)
+        mpi.COMM_WORLD.Abort(1)
+    return 1
+
+
+@app.command()
+def solve(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)")],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="override a key of the scene; may be repeated"),
+    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="run folder [runs/<scene name>]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite the results in the run folder")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but errors")] = False,
+) -> int:
+    """Solve a scene into a run folder. Under mpirun, all ranks work on it."""
+    from archord.solver.scene import load_scene
+
+    checked = load_scene(scene, overrides or [])
+    folder = output or Path("runs") / scene.stem
+    from archord.progress import solve_with_progress
+
+    return solve_with_progress(checked, folder, force=force, quiet=quiet, begun=_begun)
+
+
+@app.command("scene")
+def scene_format(
+    schema: Annotated[bool, typer.Option("--schema", help="print the JSON schema of scene files")] = False,
+    example: Annotated[bool, typer.Option("--example", help="print a commented example")] = False,
+) -> int:
+    """Print what a scene file may hold."""
+    if schema == example:
+        raise click.UsageError("choose one of --schema and --example")
+    from archord.solver.scene import Scene
+    from archord.solver.scene import example as commented_example
+
+    if schema:
+        import json
+
+        print(json.dumps(Scene.model_json_schema(), indent=2))
+    else:
+        print(commented_example())
+    return 0

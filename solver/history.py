@@ -1,0 +1,71 @@
+"""history.csv: one row per accepted output step, in the scene's units with the dimensionless forms beside them."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from archord.solver.measures import Measures
+from archord.solver.scene import Scene
+
+
+@dataclass(frozen=True)
+class _Column:
+    heading: str
+    value: Callable[[Measures], float | int]
+
+
+def _columns(scene: Scene) -> list[_Column]:
+    units, R, dR, E = scene.units, scene.joint.radius, scene.joint.dR, scene.E_star
+    table: list[tuple[str, str, str, float]] = [
+        # name, unit, dimensionless form, its divisor
+        ("delta", units.length, "delta/dR", dR),
+        ("P", units.force, "P/(E* R)", E * R),
+        ("p0", units.stress, "p0/E*", E),
+        ("eps", "rad", "", 1.0),
+        ("contact_area", units.length, "contact_area/R", R),
+        ("peeq_max", "", "", 1.0),
+        ("peeq_integral", f"{units.length}2", "peeq_integral/R2", R * R),
+        ("elastic_energy", units.energy, "elastic_energy/(E* R2)", E * R * R),
+        ("plastic_dissipation", units.energy, "plastic_dissipation/(E* R2)", E * R * R),
+        ("work", units.energy, "work/(E* R2)", E * R * R),
+        ("force_balance", "", "", 1.0),
+        ("iterations", "", "", 1.0),
+        ("cutbacks", "", "", 1.0),
+        ("seconds", "s", "", 1.0),
+    ]
+    columns = [_Column("step", lambda m: m.step)]
+    for name, unit, dimensionless, divisor in table:
+        columns.append(_Column(f"{name} [{unit}]" if unit else name, lambda m, n=name: getattr(m, n)))
+        if dimensionless:
+            columns.append(_Column(dimensionless, lambda m, n=name, d=divisor: getattr(m, n) / d))
+    return columns
+
+
+class History:
+    """Writes history.csv row by row; each row is on disk when `add` returns."""
+
+    def __init__(self, path: Path, scene: Scene) -> None:
+        self.path = path
+        self._columns = _columns(scene)
+        with path.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerow([c.heading for c in self._columns])
+
+    def add(self, m: Measures) -> None:
+        """Append one step."""
+        with self.path.open("a", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerow([_digits(c.value(m)) for c in self._columns])
+
+
+def _digits(value: float | int) -> str:
+    return str(value) if isinstance(value, int) else f"{value:.12g}"
+
+
+def read_history(path: str | Path) -> dict[str, list[float]]:
+    """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E* R)"]``, ..."""
+    with Path(path).open(newline="", encoding="utf-8") as file:
+        heading, *rows = list(csv.reader(file))
+    names = [h.split(" [")[0] for h in heading]
+    return {name: [float(row[i]) for row in rows] for i, name in enumerate(names)}

@@ -1,0 +1,21 @@
+"""What every test needs, on one rank or several."""
+
+from __future__ import annotations
+
+import gc
+
+import pytest
+from mpi4py import MPI
+
+
+@pytest.fixture(autouse=True)
+def _destroy_together():
+    """Destructors of PETSc and dolfinx objects are collective: run them on all ranks at the same place."""
+    yield
+    gc.collect()
+    MPI.COMM_WORLD.barrier()
+
+
+@pytest.fixture
+def comm() -> MPI.Comm:
+    return MPI.COMM_WORLD

@@ -1,0 +1,74 @@
+"""Linear elasticity in the plane."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from archord.materials.elasticity import contact_modulus, elastic_stress, elastic_tangent, lame, mean_stress, von_mises
+
+E, NU = 210e3, 0.3
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(1)
+
+
+def hooke(stress):
+    """Strains [xx, yy, zz, gamma_xy] from Hooke's law in three dimensions."""
+    xx, yy, zz, xy = stress.T
+    return np.stack(
+        [xx - NU * (yy + zz), yy - NU * (xx + zz), zz - NU * (xx + yy), 2 * (1 + NU) * xy], axis=1
+    ) / E
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_stress_obeys_hookes_law_in_three_dimensions(plane, rng):
+    """The strain of the stress is the strain put in, and the out-of-plane strain or stress is zero."""
+    strain = rng.normal(size=(100, 3))
+    stress = elastic_stress(strain, E, NU, plane)
+    back = hooke(stress)
+    np.testing.assert_allclose(back[:, [0, 1, 3]], strain, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(back[:, 2] if plane == "strain" else stress[:, 2], 0, atol=1e-14)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_tangent_is_symmetric_and_positive(plane):
+    """Elasticity has an energy, and it is positive."""
+    C = elastic_tangent(E, NU, plane)
+    np.testing.assert_array_equal(C, C.T)
+    assert np.linalg.eigvalsh(C)[0] > 0
+
+
+def test_lame_constants_give_back_youngs_modulus():
+    """E = mu (3 lambda + 2 mu) / (lambda + mu), nu = lambda / (2 (lambda + mu))."""
+    lam, mu = lame(E, NU)
+    assert mu * (3 * lam + 2 * mu) / (lam + mu) == pytest.approx(E, rel=1e-14)
+    assert lam / (2 * (lam + mu)) == pytest.approx(NU, rel=1e-14)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_contact_modulus_is_that_of_a_uniaxial_stress_in_the_plane(plane):
+    """E / (1 - nu^2) or E: the stiffness of a strip that may contract within the plane."""
+    assert contact_modulus(E, NU, plane) == pytest.approx(1 / np.linalg.inv(elastic_tangent(E, NU, plane))[0, 0], rel=1e-14)
+
+
+def test_von_mises_of_uniaxial_shear_and_hydrostatic_stress():
+    """s, sqrt(3) s and 0."""
+    stress = np.array([[2.0, 0, 0, 0], [0, 0, -2.0, 0], [0, 0, 0, 2.0], [2.0, 2.0, 2.0, 0]])
+    np.testing.assert_allclose(von_mises(stress), [2, 2, 2 * np.sqrt(3), 0], rtol=1e-15)
+    np.testing.assert_allclose(mean_stress(stress), [2 / 3, -2 / 3, 0, 2], rtol=1e-15)
+
+
+def test_invariants_do_not_change_with_the_axes(rng):
+    """Von Mises and mean stress of a rotated stress are the same."""
+    stress = rng.normal(size=(100, 4))
+    c, s = np.cos(0.7), np.sin(0.7)
+    xx, yy, zz, xy = stress.T
+    rotated = np.stack(
+        [c * c * xx + s * s * yy + 2 * c * s * xy, s * s * xx + c * c * yy - 2 * c * s * xy, zz, (c * c - s * s) * xy - c * s * (xx - yy)],
+        axis=1,
+    )
+    np.testing.assert_allclose(von_mises(rotated), von_mises(stress), rtol=1e-13)
+    np.testing.assert_allclose(mean_stress(rotated), mean_stress(stress), rtol=0, atol=1e-14)

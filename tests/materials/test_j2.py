@@ -1,0 +1,345 @@
+"""J2 plasticity: laws that hold at every point of every path."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from archord.materials.elasticity import elastic_stress, elastic_tangent, von_mises
+from archord.materials.j2 import J2Material, PlasticState
+
+E, NU, SIGY = 200e3, 0.3, 250.0
+YIELD_STRAIN = SIGY / E
+ROUND_OFF = np.finfo(float).eps
+N = 2000
+
+MATERIALS = [
+    pytest.param(J2Material(E, NU, SIGY, hardening, plane), id=f"plane {plane}, H = {hardening / E:g} E")
+    for plane in ("strain", "stress")
+    for hardening in (0.0, 0.02 * E, E)
+]
+every_material = pytest.mark.parametrize("m", MATERIALS)
+in_plane_stress = pytest.mark.parametrize("m", MATERIALS[3:])
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(2)
+
+
+def walk(m: J2Material, rng, n: int = N, steps: int = 4, size: float = 1.0) -> tuple[np.ndarray, PlasticState]:
+    """Strains and histories after ``steps`` random increments of ``size`` yield strains: some points never yielded."""
+    strain, state = np.zeros((n, 3)), PlasticState.virgin(n)
+    for _ in range(steps):
+        strain = strain + size * YIELD_STRAIN * rng.normal(size=(n, 3))
+        _, _, state = m.return_map(strain, state)
+    return strain, state
+
+
+def on_the_surface(m: J2Material, rng, n: int = N) -> tuple[np.ndarray, PlasticState, np.ndarray]:
+    """States on the yield surface, and strain increments (unit length) that load them plastically."""
+    strain, state = np.zeros((n, 3)), PlasticState.virgin(n)
+    for _ in range(3):
+        strain = strain + 20 * YIELD_STRAIN * rng.normal(size=(n, 3))
+        stress, _, state = m.return_map(strain, state)
+    at_yield = np.abs(von_mises(stress) / strength(m, state) - 1) < 1e-13
+    assert at_yield.mean() > 0.5
+    normal = yield_gradient(m, stress)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    outward = rng.normal(size=(n, 3))
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    outward *= np.sign((outward * normal).sum(1))[:, None]
+    outward = outward + 0.2 * normal  # not just along the surface
+    pick = np.flatnonzero(at_yield)
+    return strain[pick], PlasticState(state.plastic_strain[pick], state.peeq[pick]), outward[pick]
+
+
+def yield_gradient(m, stress):
+    """Derivative of the trial von Mises stress with respect to strain, up to a factor, at yield."""
+    deviator = stress[:, [0, 1, 3]] - stress[:, :3].mean(axis=1)[:, None] * np.array([1.0, 1.0, 0.0])
+    if m.plane == "strain":
+        return deviator
+    return (deviator * np.array([1.0, 1.0, 2.0])) @ elastic_tangent(m.E, m.nu, "stress")
+
+
+def strength(m, state):
+    return m.yield_stress + m.hardening * state.peeq
+
+
+def differences(m, strain, old, h):
+    """Central difference quotients ``(n, 3, 3)`` of the stress with steps ``h`` ``(n,)``; which points kept to one branch."""
+    D = np.zeros((len(strain), 3, 3))
+    one_branch = np.ones(len(strain), dtype=bool)
+    flows = m.return_map(strain, old)[2].peeq > old.peeq
+    for j in range(3):
+        step = h[:, None] * np.eye(3)[j]
+        plus, _, state_plus = m.return_map(strain + step, old)
+        minus, _, state_minus = m.return_map(strain - step, old)
+        D[:, :, j] = (plus - minus)[:, [0, 1, 3]] / (2 * h[:, None])
+        one_branch &= (flows == (state_plus.peeq > old.peeq)) & (flows == (state_minus.peeq > old.peeq))
+    return D, one_branch, flows
+
+
+def assert_tangent_is_derivative(m, strain, old, h, *, flowing):
+    """The consistent tangent is the derivative of the stress, to 1e-6 of the elastic moduli."""
+    _, tangent, _ = m.return_map(strain, old)
+    D, one_branch, flows = differences(m, strain, old, np.broadcast_to(h, len(strain)))
+    assert one_branch.mean() > 0.99
+    assert flows.mean() >= flowing
+    error = np.abs(tangent - D).max(axis=(1, 2)) / np.abs(tangent).max(axis=(1, 2))
+    assert error[one_branch].max() < 1e-6
+    np.testing.assert_allclose(tangent, np.swapaxes(tangent, 1, 2), rtol=0, atol=1e-13 * E)
+
+
+@every_material
+@pytest.mark.parametrize("size", [0.3, 3.0])
+def test_tangent_is_the_derivative_of_the_stress(m, size, rng):
+    """Any history, any increment."""
+    strain, old = walk(m, rng)
+    strain = strain + size * YIELD_STRAIN * rng.normal(size=strain.shape)
+    assert_tangent_is_derivative(m, strain, old, 1e-5 * YIELD_STRAIN, flowing=0.1)
+
+
+@every_material
+@pytest.mark.parametrize("size", [1e-3, 1.0])
+def test_tangent_when_loading_from_the_yield_surface(m, size, rng):
+    """Points that sit on the yield surface and are pushed outward, by little or by much."""
+    strain, old, outward = on_the_surface(m, rng)
+    strain = strain + size * YIELD_STRAIN * outward
+    assert_tangent_is_derivative(m, strain, old, 1e-5 * YIELD_STRAIN, flowing=1.0)
+
+
+@every_material
+def test_tangent_at_a_hundred_times_the_yield_strain(m, rng):
+    """Steps far beyond what a solver takes."""
+    strain, old = walk(m, rng)
+    strain = strain + 100 * YIELD_STRAIN * rng.normal(size=strain.shape)
+    assert_tangent_is_derivative(m, strain, old, 1e-3 * YIELD_STRAIN, flowing=0.99)
+
+
+@in_plane_stress
+def test_tangent_of_equibiaxial_tension_in_plane_stress(m):
+    """Neither shear nor difference: two of the three parts of the stress are zero."""
+    e = YIELD_STRAIN * np.linspace(-5, 5, 100)
+    strain = np.stack([e, e, 0 * e], axis=1)
+    assert_tangent_is_derivative(m, strain, PlasticState.virgin(len(e)), 1e-5 * YIELD_STRAIN, flowing=0.8)
+
+
+@every_material
+def test_pressure_alone_never_yields(m):
+    """At zero deviator, however large the pressure, the response is elastic and finite."""
+    if m.plane == "stress":
+        strain, old = np.zeros((1, 3)), PlasticState.virgin(1)
+    else:
+        e = YIELD_STRAIN * np.array([-1e3, -1.0, 0.0, 1.0, 1e3])
+        strain = np.stack([1.5 * e, 1.5 * e, 0 * e], axis=1)  # elastic strain e in all three directions
+        old = PlasticState(np.stack([e / 2, e / 2, -e, 0 * e], axis=1), np.abs(e))
+    stress, tangent, new = m.return_map(strain, old)
+    np.testing.assert_allclose(von_mises(stress), 0, atol=1e-12 * np.abs(stress).max(initial=1))
+    np.testing.assert_array_equal(new.peeq, old.peeq)
+    np.testing.assert_array_equal(tangent, np.broadcast_to(elastic_tangent(E, NU, m.plane), tangent.shape))
+    if m.plane == "strain":
+        np.testing.assert_allclose(stress[:, 0], E / (1 - 2 * NU) * e, rtol=1e-12)
+
+
+@every_material
+@pytest.mark.parametrize("size", [1.0, 100.0])
+def test_stress_returns_to_the_yield_surface(m, size, rng):
+    """Flowing points have exactly the current yield stress, the others less."""
+    strain, old = walk(m, rng)
+    strain = strain + size * YIELD_STRAIN * rng.normal(size=strain.shape)
+    stress, _, new = m.return_map(strain, old)
+    flows = new.peeq > old.peeq
+    assert 0.05 < flows.mean()
+    excess = von_mises(stress) - strength(m, new)
+    round_off = 8 * ROUND_OFF * (E * np.abs(strain).max(axis=1) + strength(m, new))
+    assert np.all(excess <= round_off)
+    assert np.all(np.abs(excess[flows]) <= round_off[flows])
+
+
+@every_material
+def test_flow_is_incompressible_and_peeq_is_its_length(m, rng):
+    """trace(eps_p) = 0; PEEQ never decreases and grows by sqrt(2/3) of the length of the plastic increment."""
+    strain, old = walk(m, rng)
+    _, _, new = m.return_map(strain + YIELD_STRAIN * rng.normal(size=strain.shape), old)
+    scale = np.abs(new.plastic_strain).max()
+    assert np.abs(new.plastic_strain[:, :3].sum(axis=1)).max() < 8 * ROUND_OFF * scale
+    flow, grown = new.plastic_strain - old.plastic_strain, new.peeq - old.peeq
+    assert grown.min() >= 0
+    length = np.sqrt(2 / 3 * ((flow[:, :3] ** 2).sum(axis=1) + 2 * flow[:, 3] ** 2))
+    np.testing.assert_allclose(grown, length, rtol=0, atol=32 * ROUND_OFF * scale)
+
+
+@every_material
+def test_stress_is_the_elastic_stress_of_the_elastic_strain(m, rng):
+    """Stress and new plastic strain belong together, by Hooke's law; s_zz = 0 in plane stress, eps_zz = 0 in plane strain."""
+    strain, old = walk(m, rng)
+    stress, _, new = m.return_map(strain, old)
+    xx, yy, zz, xy = stress.T
+    eps = np.stack([xx - NU * (yy + zz), yy - NU * (xx + zz), zz - NU * (xx + yy), (1 + NU) * xy], axis=1) / E
+    total = eps + new.plastic_strain
+    np.testing.assert_allclose(total[:, [0, 1, 3]] * [1, 1, 2], strain, rtol=0, atol=1e-13 * np.abs(strain).max())
+    if m.plane == "strain":
+        assert np.abs(total[:, 2]).max() < 1e-13 * np.abs(strain).max()
+    else:
+        np.testing.assert_array_equal(zz, 0.0)
+
+
+@every_material
+def test_unloading_is_elastic(m, rng):
+    """A small step back from the yield surface moves the stress by the elastic moduli and leaves the history alone."""
+    strain, old, outward = on_the_surface(m, rng)
+    before, _, _ = m.return_map(strain - 1e-9 * YIELD_STRAIN * outward, old)
+    step = -0.05 * YIELD_STRAIN * outward
+    stress, tangent, new = m.return_map(strain - 1e-9 * YIELD_STRAIN * outward + step, old)
+    np.testing.assert_allclose(stress - before, elastic_stress(step, E, NU, m.plane), rtol=0, atol=1e-9 * SIGY)
+    np.testing.assert_array_equal(new.peeq, old.peeq)
+    np.testing.assert_array_equal(new.plastic_strain, old.plastic_strain)
+    np.testing.assert_array_equal(tangent, np.broadcast_to(elastic_tangent(E, NU, m.plane), tangent.shape))
+
+
+@every_material
+def test_below_yield_the_material_is_elastic(m, rng):
+    """The same stress as the elastic solid, to the last bits."""
+    strain = 0.2 * YIELD_STRAIN * rng.uniform(-1, 1, size=(N, 3))
+    stress, _, new = m.return_map(strain, PlasticState.virgin(N))
+    np.testing.assert_allclose(stress, elastic_stress(strain, E, NU, m.plane), rtol=0, atol=1e-13 * SIGY)
+    assert not new.peeq.any()
+
+
+@every_material
+def test_return_map_is_a_pure_function(m, rng):
+    """Neither strain nor old state change, and the same input gives the same output."""
+    strain, old = walk(m, rng)
+    strain = strain + YIELD_STRAIN * rng.normal(size=strain.shape)
+    kept = strain.copy(), old.plastic_strain.copy(), old.peeq.copy()
+    first = m.return_map(strain, old)
+    second = m.return_map(strain, old)
+    for now, then in zip((strain, old.plastic_strain, old.peeq), kept, strict=True):
+        np.testing.assert_array_equal(now, then)
+    np.testing.assert_array_equal(first[0], second[0])
+    np.testing.assert_array_equal(first[1], second[1])
+    np.testing.assert_array_equal(first[2].plastic_strain, second[2].plastic_strain)
+
+
+@every_material
+def test_points_do_not_know_of_each_other(m, rng):
+    """A point alone gives what it gives among others."""
+    strain, old = walk(m, rng, n=200, size=5.0)
+    together = m.return_map(strain, old)[0]
+    alone = np.concatenate(
+        [m.return_map(strain[[i]], PlasticState(old.plastic_strain[[i]], old.peeq[[i]]))[0] for i in range(len(strain))]
+    )
+    np.testing.assert_allclose(together, alone, rtol=0, atol=1e-13 * np.abs(together).max())
+
+
+@every_material
+def test_units_do_not_matter(m, rng):
+    """E, yield stress and hardening in Pa instead of MPa: the same strains, stresses times 1e6."""
+    strain, old = walk(m, rng)
+    strain = strain + YIELD_STRAIN * rng.normal(size=strain.shape)
+    in_pascal = replace(m, E=1e6 * m.E, yield_stress=1e6 * m.yield_stress, hardening=1e6 * m.hardening)
+    stress, tangent, new = m.return_map(strain, old)
+    stress_pa, tangent_pa, new_pa = in_pascal.return_map(strain, old)
+    np.testing.assert_allclose(new_pa.peeq, new.peeq, rtol=0, atol=1e-14 * new.peeq.max())
+    np.testing.assert_allclose(stress_pa, 1e6 * stress, rtol=0, atol=1e-13 * np.abs(stress_pa).max())
+    np.testing.assert_allclose(tangent_pa, 1e6 * tangent, rtol=0, atol=1e-9 * np.abs(tangent_pa).max())
+
+
+@every_material
+def test_axes_do_not_matter(m, rng):
+    """The material is isotropic: a rotated strain gives the rotated stress."""
+    strain = 3 * YIELD_STRAIN * rng.normal(size=(N, 3))
+    c, s = np.cos(0.7), np.sin(0.7)
+    Q = np.array([[c, s], [-s, c]])
+
+    def rotate(xx, yy, xy):
+        t = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2)
+        t = Q @ t @ Q.T
+        return t[:, 0, 0], t[:, 1, 1], t[:, 0, 1]
+
+    xx, yy, xy = rotate(strain[:, 0], strain[:, 1], strain[:, 2] / 2)
+    stress, _, _ = m.return_map(strain, PlasticState.virgin(N))
+    turned, _, _ = m.return_map(np.stack([xx, yy, 2 * xy], axis=1), PlasticState.virgin(N))
+    expected = np.stack(rotate(stress[:, 0], stress[:, 1], stress[:, 3]), axis=1)
+    np.testing.assert_allclose(turned[:, [0, 1, 3]], expected, rtol=0, atol=1e-12 * np.abs(stress).max())
+
+
+def follow(m, strains):
+    """Stresses and PEEQ ``(n, 4)``, ``(n,)`` of one point along a path of strains ``(n, 3)``."""
+    state = PlasticState.virgin(1)
+    stresses, peeqs = [], []
+    for strain in strains:
+        stress, _, state = m.return_map(strain[None], state)
+        stresses.append(stress[0])
+        peeqs.append(state.peeq[0])
+    return np.array(stresses), np.array(peeqs)
+
+
+@in_plane_stress
+@pytest.mark.parametrize("sign", [1, -1])
+def test_uniaxial_stress_is_exact(m, sign):
+    """sigma = sigY + H peeq when the strain is sigma / E + peeq along and -nu sigma / E - peeq / 2 across."""
+    peeq = YIELD_STRAIN * np.linspace(0, 20, 12) ** 1.3
+    sigma = SIGY + m.hardening * peeq
+    path = sign * np.stack([sigma / E + peeq, -NU * sigma / E - peeq / 2, 0 * peeq], axis=1)
+    stress, found = follow(m, path)
+    np.testing.assert_allclose(found, peeq, rtol=0, atol=1e-13 * peeq.max())
+    np.testing.assert_allclose(stress[:, 0], sign * sigma, rtol=1e-12)
+    np.testing.assert_allclose(stress[:, 1:], 0, atol=1e-12 * sigma.max())
+
+
+@in_plane_stress
+@pytest.mark.parametrize("sign", [1, -1])
+def test_equibiaxial_stress_is_exact(m, sign):
+    """sigma = sigY + H peeq in both directions when the strain is (1 - nu) sigma / E + peeq / 2."""
+    peeq = YIELD_STRAIN * np.linspace(0, 20, 12) ** 1.3
+    sigma = SIGY + m.hardening * peeq
+    strain = sign * ((1 - NU) * sigma / E + peeq / 2)
+    stress, found = follow(m, np.stack([strain, strain, 0 * strain], axis=1))
+    np.testing.assert_allclose(found, peeq, rtol=0, atol=1e-13 * peeq.max())
+    np.testing.assert_allclose(stress[:, :2], sign * np.stack([sigma, sigma], axis=1), rtol=1e-12)
+    np.testing.assert_allclose(stress[:, 2:], 0, atol=1e-12 * sigma.max())
+
+
+@every_material
+@pytest.mark.parametrize("sign", [1, -1])
+def test_pure_shear_is_exact(m, sign):
+    """sqrt(3) tau = sigY + H peeq when gamma = tau / mu + sqrt(3) peeq, in both planes."""
+    peeq = YIELD_STRAIN * np.linspace(0, 20, 12) ** 1.3
+    tau = (SIGY + m.hardening * peeq) / np.sqrt(3)
+    gamma = tau * 2 * (1 + NU) / E + np.sqrt(3) * peeq
+    stress, found = follow(m, sign * np.stack([0 * gamma, 0 * gamma, gamma], axis=1))
+    np.testing.assert_allclose(found, peeq, rtol=0, atol=1e-13 * peeq.max())
+    np.testing.assert_allclose(stress[:, 3], sign * tau, rtol=1e-12)
+    np.testing.assert_allclose(stress[:, :3], 0, atol=1e-12 * tau.max())
+
+
+@every_material
+def test_energy_balance(m, rng):
+    """Work of the stress = elastic energy + plastic work; what the time steps miss of it shrinks with them."""
+    end = 5 * YIELD_STRAIN * rng.normal(size=(50, 3))
+
+    def missing(steps):
+        work, before, state = np.zeros(len(end)), np.zeros((len(end), 4)), PlasticState.virgin(len(end))
+        for k in range(1, steps + 1):
+            stress, _, state = m.return_map(end * (k / steps), state)
+            work += ((stress + before)[:, [0, 1, 3]] / 2 * end / steps).sum(axis=1)
+            before = stress
+        energy = m.elastic_energy(stress) + m.dissipation(state.peeq)
+        return np.abs(work - energy).sum() / work.sum()
+
+    errors = np.array([missing(n) for n in (20, 80, 320)])
+    assert errors[-1] < 1e-4
+    assert np.all(errors[1:] < errors[:-1] / 3)
+
+
+@every_material
+def test_elastic_energy_is_half_stress_times_elastic_strain(m, rng):
+    """Of the whole stress, in three dimensions."""
+    stress = SIGY * rng.normal(size=(N, 4))
+    xx, yy, zz, xy = stress.T
+    eps = np.stack([xx - NU * (yy + zz), yy - NU * (xx + zz), zz - NU * (xx + yy), 2 * (1 + NU) * xy], axis=1) / E
+    np.testing.assert_allclose(m.elastic_energy(stress), 0.5 * (stress * eps).sum(axis=1), rtol=1e-12)
