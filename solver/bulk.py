@@ -233,7 +233,7 @@ class Bulk:
             mean[data.cells] = (w * mean_stress(data.stress).reshape(shape)).sum(axis=1)
             peeq[data.cells] = (w * data.points.trial.peeq.reshape(shape)).sum(axis=1)
         for cells, _, weight, sigma in self._elastic_points(u):
-            w = weight.reshape(len(cells), -1)
+            w = weight.reshape(len(cells), len(weight) // max(len(cells), 1))
             w = w / w.sum(axis=1, keepdims=True)
             mises[cells] = (w * von_mises(sigma).reshape(w.shape)).sum(axis=1)
             mean[cells] = (w * mean_stress(sigma).reshape(w.shape)).sum(axis=1)

@@ -374,9 +374,9 @@ def _stress_rows(C: Array, gradient: Array, N: Array) -> Array:
     gx, gy = gradient[..., 0], gradient[..., 1]
     x = PC[:, :, 0, None] * gx[:, None] + PC[:, :, 2, None] * gy[:, None]
     y = PC[:, :, 1, None] * gy[:, None] + PC[:, :, 2, None] * gx[:, None]
-    return np.stack([x, y], axis=-1).reshape(len(N), 2, -1)
+    return np.stack([x, y], axis=-1).reshape(len(N), 2, 2 * gradient.shape[1])
 
 
 def _scalar(blocks: np.ndarray) -> np.ndarray:
     """Scalar dofs ``(m, 2 k)`` of block dofs ``(m, k)``."""
-    return (2 * blocks[:, :, None] + np.arange(2)).reshape(len(blocks), -1)
+    return (2 * blocks[:, :, None] + np.arange(2)).reshape(len(blocks), 2 * blocks.shape[1])

@@ -104,7 +104,7 @@ class FieldWriter:
     def _write_xdmf(self) -> None:
         grids = [self._grid(k, load) for k, load in enumerate(self._loads, start=1)]
         text = (
-            '<?xml version="1.0"?>\n<Xdmf Version="2.0">\n<Domain>\n'
+            '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
             '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
             + "".join(grids)
             + "</Grid>\n</Domain>\n</Xdmf>\n"

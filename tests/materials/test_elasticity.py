@@ -18,9 +18,7 @@ def rng():
 def hooke(stress):
     """Strains [xx, yy, zz, gamma_xy] from Hooke's law in three dimensions."""
     xx, yy, zz, xy = stress.T
-    return np.stack(
-        [xx - NU * (yy + zz), yy - NU * (xx + zz), zz - NU * (xx + yy), 2 * (1 + NU) * xy], axis=1
-    ) / E
+    return np.stack([xx - NU * (yy + zz), yy - NU * (xx + zz), zz - NU * (xx + yy), 2 * (1 + NU) * xy], axis=1) / E
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
@@ -51,7 +49,9 @@ def test_lame_constants_give_back_youngs_modulus():
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_contact_modulus_is_that_of_a_uniaxial_stress_in_the_plane(plane):
     """E / (1 - nu^2) or E: the stiffness of a strip that may contract within the plane."""
-    assert contact_modulus(E, NU, plane) == pytest.approx(1 / np.linalg.inv(elastic_tangent(E, NU, plane))[0, 0], rel=1e-14)
+    assert contact_modulus(E, NU, plane) == pytest.approx(
+        1 / np.linalg.inv(elastic_tangent(E, NU, plane))[0, 0], rel=1e-14
+    )
 
 
 def test_von_mises_of_uniaxial_shear_and_hydrostatic_stress():
@@ -67,7 +67,12 @@ def test_invariants_do_not_change_with_the_axes(rng):
     c, s = np.cos(0.7), np.sin(0.7)
     xx, yy, zz, xy = stress.T
     rotated = np.stack(
-        [c * c * xx + s * s * yy + 2 * c * s * xy, s * s * xx + c * c * yy - 2 * c * s * xy, zz, (c * c - s * s) * xy - c * s * (xx - yy)],
+        [
+            c * c * xx + s * s * yy + 2 * c * s * xy,
+            s * s * xx + c * c * yy - 2 * c * s * xy,
+            zz,
+            (c * c - s * s) * xy - c * s * (xx - yy),
+        ],
         axis=1,
     )
     np.testing.assert_allclose(von_mises(rotated), von_mises(stress), rtol=1e-13)
