@@ -35,10 +35,10 @@ def solve_with_progress(scene: Scene, folder: Path, *, force: bool, quiet: bool,
         )
     if comm.rank == 0 and outcome.status != "done":
         print(f"archord: {outcome.message}.", file=sys.stderr)
-        print(f"archord: stopped; {len(outcome.steps)} accepted steps are in {folder}.", file=sys.stderr)
+        print(f"archord: {outcome.status}; {len(outcome.steps)} accepted steps are in {folder}.", file=sys.stderr)
     elif comm.rank == 0 and not quiet:
         print(f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s, results in {folder}")
-    return 0 if outcome.status == "done" else 3
+    return {"done": 0, "stopped": 3, "interrupted": 130}[outcome.status]
 
 
 def _claim(comm, folder: Path, force: bool) -> None:

@@ -7,6 +7,7 @@ tolerance has no unit.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -160,7 +161,7 @@ class Equilibrium:
             self._A.destroy()
             self._elastic.destroy()
             self._make_matrix()
-            snes.setJacobian(self._jacobian, self._A)
+            snes.setJacobian(self._guarded(self._jacobian), self._A)
         f.array[:] = np.where(self._free_owned, self._force.array_r, 0.0)
 
     def evaluate(self) -> None:
@@ -203,8 +204,8 @@ class Equilibrium:
         snes.setType("newtonls")
         x = create_vector(self.V.dofmap.index_map, 2)
         self._x = x
-        snes.setFunction(self._residual, x.duplicate())
-        snes.setJacobian(self._jacobian, self._A)
+        snes.setFunction(self._guarded(self._residual), x.duplicate())
+        snes.setJacobian(self._guarded(self._jacobian), self._A)
         snes.setTolerances(max_it=self.max_iterations)
         snes.setConvergenceTest(self._test)
         ksp = snes.getKSP()
@@ -220,6 +221,18 @@ class Equilibrium:
         options["snes_linesearch_max_it"] = 8
         snes.setFromOptions()
         return snes
+
+    def _guarded(self, callback: Callable) -> Callable:
+        """Keep what ``callback`` raises, which PETSc would turn into an error number."""
+
+        def call(*arguments) -> None:
+            try:
+                callback(*arguments)
+            except BaseException as error:
+                self._raised = error
+                raise
+
+        return call
 
     def _floor(self) -> float:
         """Round-off of the residual: forces that a rigid motion of the size of the load leaves."""
@@ -272,8 +285,14 @@ class Equilibrium:
         self._x.array[:] = x[: self.n_owned].ravel()
         if self.contact is not None:
             self.contact.search()
+        self._raised: BaseException | None = None
         with self.timer("solve"):
-            self._snes.solve(None, self._x)
+            try:
+                self._snes.solve(None, self._x)
+            except PETSc.Error:
+                if self._raised is not None:
+                    raise self._raised from None
+                raise
         code, iterations = self._snes.getConvergedReason(), self._snes.getIterationNumber()
         if code > 0:
             return Newton(True, "converged", iterations, self._residuals)

@@ -31,7 +31,7 @@ _EDGE_WARNING = 0.99  # share of the arc's end facet in contact from which the m
 
 @dataclass
 class Outcome:
-    """How a run ended: ``status`` is "done" or "stopped" (with the reason in ``message``), and its accepted steps."""
+    """How a run ended: ``status`` is "done" or "stopped" or "interrupted" (``message`` says why), and its steps."""
 
     folder: Path
     status: str
@@ -71,11 +71,11 @@ def solve_scene(
     on_step: Callable[[Measures], None] = lambda measures: None,
     on_attempt: Callable[[float, int], None] = lambda load, iterations: None,
 ) -> Outcome:
-    """Solve ``scene`` and write everything to ``folder`` (see `run_folder.claim_folder`). Collective.
+    """Solve ``scene`` and write everything to the existing ``folder`` (see `run_folder.claim_folder`). Collective.
 
     ``on_start``, ``on_step`` and ``on_attempt(load, Newton iterations)`` report progress on every rank. ``begun`` is the
-    ``perf_counter`` from which the seconds count. A step that cannot be solved ends the run with status "stopped"; what was
-    accepted before stays.
+    ``perf_counter`` from which the seconds count. A step that cannot be solved ends the run with status "stopped", Ctrl-C with
+    "interrupted"; what was accepted before stays.
     """
     begun = perf_counter() if begun is None else begun
     timer = timer or Timer()
@@ -86,7 +86,6 @@ def solve_scene(
     report, history, contact_file = _report(joint, command or sys.argv), None, None
     with timer("output"):
         if root:
-            folder.mkdir(parents=True, exist_ok=True)
             for name in FILES:
                 (folder / name).unlink(missing_ok=True)
             (folder / "scene.toml").write_text(resolved(scene), encoding="utf-8")
@@ -131,10 +130,7 @@ def solve_scene(
     except StepFailure as failure:
         status, message = "stopped", str(failure)
     except KeyboardInterrupt:
-        if root:
-            report.status, report.message = "interrupted", f"interrupted after {len(steps)} steps"
-            _write_report(folder, report, timer, begun, steps)
-        raise
+        status, message = "interrupted", f"interrupted after {len(steps)} steps"
     if root:
         report.status, report.message = status, message
         _write_report(folder, report, timer, begun, steps)

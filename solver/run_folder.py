@@ -11,17 +11,14 @@ FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", 
 
 
 def claim_folder(folder: Path, force: bool) -> None:
-    """Check that a run may be written to ``folder``. Raises `SceneError` if it holds something already, without ``force``."""
+    """Make ``folder`` ready for a run. Raises `SceneError` if it cannot be, or holds something already without ``force``."""
     try:
-        occupied = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+        if folder.exists() and not folder.is_dir():
+            raise SceneError(f"{folder}: is a file, not a run folder.")
+        if folder.exists() and any(folder.iterdir()) and not force:
+            raise SceneError(f"{folder}: already holds results; choose another folder with -o, or overwrite with --force.")
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise SceneError(f"{folder}: cannot be used as run folder: Permission denied.")
     except OSError as error:
         raise SceneError(f"{folder}: cannot be used as run folder: {error.strerror}.") from None
-    if occupied and not folder.is_dir():
-        raise SceneError(f"{folder}: is a file, not a run folder.")
-    if occupied and not force:
-        raise SceneError(f"{folder}: already holds results; choose another folder with -o, or overwrite with --force.")
-    parent = folder
-    while not parent.exists():
-        parent = parent.parent
-    if not os.access(parent, os.W_OK):
-        raise SceneError(f"{folder}: cannot be written: no permission for {parent}.")
