@@ -3,7 +3,9 @@
 At a point ``x`` of a side, with closest point ``y`` on the opposite curve, ``n`` the opposite's outward normal there and
 ``g = (x - y) . n`` the gap, the contact pressure is ``p = [t . n - gamma g]_+`` with ``t = sigma(u) N`` the traction of the
 own body, and the virtual work of the contact forces is ``sum over sides of share * integral of p n . (v(x) - v(y))``. The
-unbiased form gives each side one half; the one-sided form integrates one side only. ``gamma`` is ``gamma_factor`` times
+unbiased form gives like bodies one half each; of unlike bodies the softer takes more, in proportion to the compliances
+(Annavarapu, Hautefeuille and Dolbow 2012), or a stiff pin's ``gamma`` would swamp the other's. The one-sided form
+integrates one side only. ``gamma`` is ``gamma_factor`` times
 the share times the trace constant ``c`` of each contact cell, ``|sigma_n(v)|^2 <= c a(v, v)``. The form is coercive where
 ``gamma > share c / 4``: Cauchy-Schwarz and ``c`` bound ``share * integral of sigma_n v_n`` by
 ``sqrt(a(v, v)) * share sqrt(c) |v_n|``, which ``a(v, v) + share gamma |v_n|^2`` exceeds. Under current kinematics the closest points belong to the deformed curves and
@@ -84,11 +86,11 @@ class Contact:
         self.comm = sides[0].comm
         opposites = [rigid] if rigid is not None else [sides[1], sides[0]]
         chosen = range(len(sides)) if one_sided is None else [one_sided]
-        share = 1.0 / len(chosen)
-        self.pairings = [
-            _Pairing(sides[i], opposites[i], share, np.repeat(gamma_factor * share * sides[i].gamma, sides[i].weight.shape[1]))
-            for i in chosen
-        ]
+        compliance = np.array([1 / sides[i].points.elastic_tangent[0, 0] for i in chosen])
+        self.pairings = []
+        for i, share in zip(chosen, compliance / compliance.sum(), strict=True):
+            gamma = np.repeat(gamma_factor * share * sides[i].gamma, sides[i].weight.shape[1])
+            self.pairings.append(_Pairing(sides[i], opposites[i], float(share), gamma))
         rest = self._motions(None)
         for pair in self.pairings:
             side = pair.side

@@ -1,0 +1,187 @@
+"""The joint against independent solvers, closed forms, and the laws that hold on any mesh."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from tests.solver.solving import E, scene, solve
+
+REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "quarter_joint.json").read_text())
+FRACTIONS = ("0.5", "1.0", "1.5", "2.0")
+
+
+def reference_forces(table: str, start: str) -> list[float]:
+    rows = REFERENCE[table]
+    return [next(v for k, v in rows.items() if k.startswith(start))[f] for f in FRACTIONS]
+
+
+@pytest.mark.parametrize("kinematics", ["current", "reference"])
+def test_elastic_force_agrees_with_independent_solvers(kinematics):
+    """P(delta) of GetFEM (current) and NGSolve (reference) within 0.05 % on at most 6 000 dofs, up to 2 dR."""
+    solution = solve(scene(analysis={"kinematics": kinematics}))
+    assert solution.joint.n_dofs <= 6000
+    P = [m.P for m in solution.steps]
+    assert P == pytest.approx(reference_forces("elastic_P", kinematics), rel=5e-4)
+
+
+def test_elastic_contact_angle_and_peak_pressure():
+    """eps and p0 at 2 dR within 0.5 % of the concentric joint (NGSolve p4), which differs from ours by O(dR/R)."""
+    profile = REFERENCE["elastic_profile_concentric_delta_2"]
+    last = solve(scene(steps=1)).steps[-1]
+    assert last.eps == pytest.approx(profile["eps_rad"], rel=5e-3)
+    assert last.p0 == pytest.approx(profile["p0_over_Estar"], rel=5e-3)
+
+
+@pytest.mark.parametrize("element_size", [0.04, 0.02])
+def test_plastic_force_agrees_with_independent_solvers(element_size):
+    """P(2 dR) within 0.2 % of GetFEM's and NGSolve's 0.006692, in at most 7 iterations a step and without cutback."""
+    solution = solve(scene(element_size, steps=20, sigma_y=0.002))
+    assert solution.steps[-1].P == pytest.approx(0.006692, rel=2e-3)
+    assert sum(m.iterations for m in solution.steps) <= 7 * 20
+    assert sum(m.cutbacks for m in solution.steps) == 0
+
+
+def test_the_finest_plastic_mesh_completes():
+    """0.5 %R elements, perfect plasticity with shear bands: the same force."""
+    solution = solve(scene(0.005, steps=20, sigma_y=0.002))
+    assert len(solution.steps) == 20
+    assert solution.steps[-1].P == pytest.approx(0.006692, rel=2e-3)
+
+
+VARIANTS = {
+    "elastic": {},
+    "plastic": {"sigma_y": 0.002},
+    "plane stress": {"sigma_y": 0.004, "analysis": {"plane": "stress"}},
+    "reference": {"sigma_y": 0.002, "analysis": {"kinematics": "reference"}},
+    "one-sided": {"analysis": {"integration": "block"}},
+    "rigid pin": {"sigma_y": 0.002, "pin": {"rigid": True}},
+    "stiff pin": {"sigma_y": 0.002, "pin": {"E": 100 * E}},
+    "hardening": {"block": {"yield_stress": 0.001, "hardening": 0.05}},
+}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_forces_balance(variant):
+    """Pin reaction, block reaction and the integral of the contact pressure agree to 1e-8 of P in each step."""
+    solution = solve(scene(0.08, **VARIANTS[variant]))
+    for m, profiles in zip(solution.steps, solution.profiles, strict=True):
+        assert m.P > 0
+        assert m.force_balance < 1e-8
+        for p in profiles.values():
+            assert (p.pressure * p.weight).sum() == pytest.approx((p.raw_pressure * p.weight).sum(), rel=1e-12)
+
+
+def test_a_projected_pressure_has_no_more_than_its_force():
+    """The vertical integral of both sides' pressure is P: within O(dR/R), as the arcs' normals are the undeformed ones."""
+    solution = solve(scene())
+    for p in solution.profiles[-1].values():
+        assert 2 * (p.pressure * p.weight * np.cos(p.angle)).sum() == pytest.approx(solution.steps[-1].P, rel=1e-2)
+
+
+def test_one_sided_integration_converges_to_the_same_force():
+    """Pin's, block's and both sides' integrals differ by the discretisation error only."""
+    forces = [solve(scene(steps=1, analysis={"integration": i})).steps[-1].P for i in ("both", "pin", "block")]
+    assert forces == pytest.approx([forces[0]] * 3, rel=2e-4)
+
+
+def test_gamma_does_not_matter():
+    """Nitsche is consistent: gamma over a range of 20 moves P within the discretisation error."""
+    forces = [solve(scene(steps=1, analysis={"gamma_factor": g})).steps[-1].P for g in (0.5, 2.0, 10.0)]
+    assert forces == pytest.approx([forces[0]] * 3, rel=1e-4)
+
+
+def test_energy_is_kept_within_the_step_error():
+    """Work = stored + dissipated; what is missing falls at least with the step, to below 0.1 %."""
+    missing = []
+    for steps in (5, 10, 20):
+        m = solve(scene(0.08, steps, sigma_y=0.002)).steps[-1]
+        missing.append(abs(m.work - m.elastic_energy - m.plastic_dissipation) / m.work)
+    assert missing[1] < 0.6 * missing[0]
+    assert missing[2] < 0.6 * missing[1]
+    assert missing[2] < 1e-3
+
+
+def test_a_very_stiff_pin_is_a_rigid_pin():
+    """The force on a pin 1e6 times stiffer than the block is that on a rigid circle."""
+    stiff = solve(scene(steps=1, pin={"E": 1e6 * E})).steps[-1].P
+    rigid = solve(scene(steps=1, pin={"rigid": True}))
+    assert rigid.joint.bulk.cells.keys() == {2}
+    assert rigid.steps[-1].P == pytest.approx(stiff, rel=1e-4)
+
+
+def test_like_bodies_share_pin_and_hole_swapped():
+    """An elastic body with a yield stress out of reach is elastic."""
+    elastic = solve(scene(0.08, 2)).steps[-1]
+    plastic = solve(scene(0.08, 2, sigma_y=1e3)).steps[-1]
+    assert plastic.P == pytest.approx(elastic.P, rel=1e-9)
+    assert plastic.elastic_energy == pytest.approx(elastic.elastic_energy, rel=1e-9)
+    assert plastic.peeq_max == 0
+
+
+def test_hertz_is_the_limit_of_small_contacts():
+    """Half-width and peak pressure of Hertz's line contact within 1 % where the contact is small (a/R = 0.05).
+
+    Johnson (1985), eqs. 4.43 and 4.45, conforming: 1/R' = 1/R - 1/(R + dR).
+    """
+    small = {"clearance": 0.5, "element_size": 0.006, "growth": 0.5, "block_size": 6.0}
+    m = solve(scene(steps=1, joint=small, load={"displacement": 0.006})).steps[-1]
+    radius = 1 / (1 - 1 / 1.5)
+    half_width, peak = np.sqrt(4 * m.P * radius / np.pi), np.sqrt(m.P / (np.pi * radius))
+    assert 0.03 < half_width < 0.08
+    assert m.p0 == pytest.approx(peak, rel=1e-2)
+    assert m.contact_area / 2 == pytest.approx(half_width, rel=1e-2)
+
+
+@pytest.mark.parametrize("sigma_y", [None, 0.002])
+def test_results_do_not_depend_on_the_units(sigma_y):
+    """The same joint in mm and MPa and in m and Pa: dimensionless results to 1e-9."""
+    rows = []
+    for length, stress in ((10.0, 115384.0), (0.01, 115384.0e6)):
+        solid = {"E": E * stress, "nu": 0.3} | ({"yield_stress": sigma_y * stress} if sigma_y else {})
+        sized = {"radius": length, "clearance": 0.005 * length, "element_size": 0.08 * length}
+        solution = solve(scene(steps=4, joint=sized, pin=solid, block=solid))
+        m, force = solution.steps[-1], stress * length
+        energies = (m.elastic_energy, m.plastic_dissipation, m.work)
+        rows.append(
+            [m.P / force, m.p0 / stress, m.eps, m.peeq_max, m.contact_area / length, m.peeq_integral / length**2]
+            + [e / force / length for e in energies]
+            + [s.iterations for s in solution.steps]
+        )
+    assert rows[0] == pytest.approx(rows[1], rel=1e-9)
+
+
+def _deal(owner):
+    """A cell partitioner that gives cell ``i`` of ``n`` to the rank ``owner(i, n, size)``."""
+    from dolfinx.graph import adjacencylist
+
+    def partition(comm, n_parts, cell_types, cells):
+        n = len(np.asarray(cells[0])) // 3
+        total = comm.allreduce(n)
+        first = comm.exscan(n) or 0
+        parts = owner(np.arange(first, first + n), total, n_parts) % n_parts
+        return adjacencylist(parts.astype(np.int32), np.arange(n + 1, dtype=np.int32))
+
+    return partition
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("cut", ["graph", "dealt round", "halved by number"])
+@pytest.mark.parametrize("variant", ["plastic", "rigid pin"])
+def test_results_do_not_depend_on_the_ranks(cut, variant):
+    """P, p0, PEEQ, energies to 1e-9 and iteration counts, whichever way the mesh is cut, against one rank."""
+    partitioner = {
+        "graph": None,
+        "dealt round": _deal(lambda i, n, size: i),
+        "halved by number": _deal(lambda i, n, size: i * size // n),
+    }[cut]
+    problem = scene(0.1, 4, **VARIANTS[variant])
+    together = solve(problem, MPI.COMM_WORLD, partitioner)
+    alone = solve(problem)
+    assert together.joint.n_dofs == alone.joint.n_dofs
+    for a, b in zip(together.steps, alone.steps, strict=True):
+        assert (a.iterations, a.cutbacks) == (b.iterations, b.cutbacks)
+        for name in ("P", "p0", "eps", "contact_area", "peeq_max", "peeq_integral", "elastic_energy", "plastic_dissipation"):
+            assert getattr(a, name) == pytest.approx(getattr(b, name), rel=1e-9), name

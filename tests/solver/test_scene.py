@@ -1,0 +1,119 @@
+"""Scene files: what is accepted, what is refused, and in which words."""
+
+import tomllib
+
+import pytest
+
+from archord.solver.scene import Scene, SceneError, example, load_scene, parse_scene, resolved
+
+
+def basic() -> dict:
+    return {
+        "joint": {"radius": 10.0, "relative_clearance": 0.005},
+        "pin": {"E": 210000.0, "nu": 0.3},
+        "block": {"E": 210000.0, "nu": 0.3},
+        "load": {"displacement": 2.0},
+    }
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "said"),
+    [
+        ("joint", "radius", -1.0, "scene: joint.radius = -1.0 must be greater than 0."),
+        ("joint", "radius", "ten", 'scene: joint.radius = "ten" must be a number.'),
+        ("joint", "radius", True, "scene: joint.radius = true must be a number."),
+        ("joint", "radius", float("nan"), "scene: joint.radius = NaN must be a finite number."),
+        ("joint", "radius", float("inf"), "scene: joint.radius = Infinity must be a finite number."),
+        ("joint", "relative_clearance", 0.0, "scene: joint.relative_clearance = 0.0 must be greater than 0."),
+        ("joint", "relative_clearance", 0.9, "must be a clearance: between 1e-6 and 0.5 times the radius."),
+        ("joint", "clearance", 0.05, "must be given, or else relative_clearance, and not both."),
+        ("joint", "element_size", 20.0, "must be between 1e-4 and 0.5 times the radius."),
+        ("joint", "block_size", 15.0, "must be at least twice the radius of the hole."),
+        ("joint", "raduis", 1.0, "did you mean radius?"),
+        ("block", "nu", 0.5, "scene: block.nu = 0.5 must be less than 0.5."),
+        ("block", "rigid", True, "is not a known key"),
+        ("block", "hardening", 1.0, "needs a yield_stress."),
+        ("block", "yield_stress", 0.0, "must be greater than 0."),
+        ("pin", "rigid", True, "is not for a rigid pin."),
+        ("load", "steps", 2.5, "must be a whole number."),
+        ("load", "steps", 0, "must be at least 1."),
+        ("load", "displacement", -2.0, "must be greater than 0."),
+        ("load", "displacement", 200.0, "must not exceed half the radius (5)."),
+    ],
+)
+def test_a_bad_value_is_refused_in_one_sentence(section, key, value, said):
+    """File, key, value and what is allowed."""
+    data = basic()
+    data[section][key] = value
+    with pytest.raises(SceneError) as caught:
+        parse_scene(data)
+    sentence = str(caught.value)
+    assert said in sentence
+    assert f"scene: {section}." in sentence
+    assert "\n" not in sentence
+
+
+@pytest.mark.parametrize("section", ["joint", "pin", "block", "load"])
+def test_a_missing_section_is_named(section):
+    """Sections without defaults are required."""
+    data = basic()
+    del data[section]
+    with pytest.raises(SceneError, match=f"{section} is missing"):
+        parse_scene(data)
+
+
+def test_files_that_are_no_scenes(tmp_path):
+    """Unreadable, not TOML, not text: one sentence each that names the file."""
+    bad = tmp_path / "bad.toml"
+    bad.write_text("[joint\n")
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    for path, said in ((bad, "is not valid TOML"), (binary, "UTF-8"), (tmp_path, "cannot be read"), ("nope", "cannot be read")):
+        with pytest.raises(SceneError, match=said) as caught:
+            load_scene(path)
+        assert str(caught.value).startswith(str(path))
+
+
+def test_overrides_replace_values_and_alternatives(tmp_path):
+    """--set wins over the file, drops the alternative key, and is named when it is at fault."""
+    path = tmp_path / "scene.toml"
+    path.write_text(resolved(parse_scene(basic())))
+    scene = load_scene(path, ["joint.clearance=.01", "load.steps=3", "analysis.plane=stress", "block.yield_stress=300"])
+    assert scene.joint.dR == 0.01
+    assert (scene.load.steps, scene.analysis.plane, scene.plastic) == (3, "stress", True)
+    assert not load_scene(path, ["block.yield_stress=300", "block.yield_stress="]).plastic
+    assert load_scene(path, ["pin.rigid=true"]).pin.solid is None
+    with pytest.raises(SceneError, match=r"^--set joint\.radius=-1: joint\.radius must be greater than 0\.$"):
+        load_scene(path, ["joint.radius=-1"])
+    for malformed in ("radius=3", "joint.radius", "joint=3", "a.b.c=1"):
+        with pytest.raises(SceneError, match=r"must read section\.key=value"):
+            load_scene(path, [malformed])
+
+
+def test_the_resolved_scene_is_the_same_scene():
+    """What a run folder keeps solves to the same numbers."""
+    for change in ({}, {"pin": {"rigid": True}}, {"block": {"E": 1.0, "nu": 0.2, "yield_stress": 0.01, "hardening": 0.1}}):
+        scene = parse_scene(basic() | change)
+        again = parse_scene(tomllib.loads(resolved(scene)))
+        for a, b in ((scene, again),):
+            assert (a.joint.dR, a.joint.h, a.joint.W, a.delta, a.E_star) == (b.joint.dR, b.joint.h, b.joint.W, b.delta, b.E_star)
+            assert (a.pin.solid, a.block, a.analysis, a.load) == (b.pin.solid, b.block, b.analysis, b.load)
+
+
+def test_the_example_shows_every_key_and_loads():
+    """Each key of the model stands in the example, with its description."""
+    text = example()
+    parse_scene(tomllib.loads(text))
+    for section, info in Scene.model_fields.items():
+        assert f"[{section}]" in text
+        for key, field in info.annotation.model_fields.items():
+            assert f"{key} = " in text
+            assert field.description in text
+
+
+def test_contact_modulus_of_plane_strain_and_stress():
+    """1/E* = sum (1 - nu^2)/E in plane strain, sum 1/E in plane stress; a rigid pin adds nothing."""
+    data = basic()
+    assert parse_scene(data).E_star == pytest.approx(105000 / 0.91, rel=1e-14)
+    assert parse_scene(data | {"analysis": {"plane": "stress"}}).E_star == pytest.approx(105000, rel=1e-14)
+    assert parse_scene(data | {"pin": {"rigid": True}}).E_star == pytest.approx(210000 / 0.91, rel=1e-14)
