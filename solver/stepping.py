@@ -67,7 +67,7 @@ def march(
                 in_a_row = 0
                 halvings += 1
                 if halvings > max_cutbacks:
-                    raise StepFailure(_why(result, new_load, step, max_cutbacks))
+                    raise StepFailure(_why(result, new_load, record.cutbacks - 1, step))
                 continue
             record.substeps += 1
             new = equilibrium.displacement()
@@ -82,10 +82,11 @@ def march(
         start = target
 
 
-def _why(result: Newton, load: float, step: float, max_cutbacks: int) -> str:
+def _why(result: Newton, load: float, cutbacks: int, step: float) -> str:
     where = "" if result.worst is None else f", the largest residual at ({result.worst[0]:.4g}, {result.worst[1]:.4g})"
     last = f"{result.residuals[-1]:.1e}" if result.residuals else "none"
+    tried = f"the step was cut {cutbacks} times, to {step:.3g}" if cutbacks else "no smaller step is allowed"
     return (
         f"no equilibrium at delta = {load:.6g}: {result.reason}; after {result.iterations} iterations the residual over "
-        f"reaction was {last}{where}; the step was cut {max_cutbacks} times, to {step:.3g}"
+        f"reaction was {last}{where}; {tried}"
     )

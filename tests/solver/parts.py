@@ -1,0 +1,190 @@
+"""Small meshes, bodies and contacts, put together by hand for tests of the solver's terms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from dolfinx import fem
+from dolfinx.mesh import Mesh, MeshTags
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from archord.geometry.curve import RigidCircle
+from archord.geometry.fenicsx import create_vector, gmsh_to_mesh
+from archord.geometry.quarter_joint import Cells, Facets, quarter_joint
+from archord.materials.elasticity import Elastic
+from archord.materials.j2 import J2Material
+from archord.solver.bulk import Body, Bulk
+from archord.solver.contact import Contact
+from archord.solver.contact_side import ContactSide
+from archord.solver.equilibrium import Equilibrium, Support
+
+E, NU = 1.82, 0.3
+YIELD_STRESS = 0.004
+ELASTIC = Elastic(E, NU, "strain")
+PERFECT = J2Material(E, NU, YIELD_STRESS, 0.0, "strain")
+HARDENING = J2Material(E, NU, YIELD_STRESS, 0.1 * E, "strain")
+PLANE_STRESS = J2Material(E, NU, YIELD_STRESS, 0.02 * E, "stress")
+R, DR = 1.0, 0.005
+
+
+def space(mesh: Mesh) -> fem.FunctionSpace:
+    return fem.functionspace(mesh, ("Lagrange", 2, (2,)))
+
+
+def n_nodes(V) -> int:
+    """Nodes of this rank, ghosts included."""
+    return V.dofmap.index_map.size_local + V.dofmap.index_map.num_ghosts
+
+
+def coordinates(V) -> np.ndarray:
+    return V.tabulate_dof_coordinates()[:, :2]
+
+
+def nodes_of(V, cells: MeshTags, tag: int) -> np.ndarray:
+    return np.unique(V.dofmap.list[cells.find(tag)])
+
+
+def edge_nodes(V, facets: MeshTags, tag: int) -> np.ndarray:
+    V.mesh.topology.create_connectivity(1, 2)
+    return fem.locate_dofs_topological(V, 1, facets.find(tag))
+
+
+def scipy_matrix(A: PETSc.Mat) -> sp.csr_matrix:
+    I, J, values = A.getValuesCSR()
+    return sp.csr_matrix((values, J, I), shape=A.getSize())
+
+
+def internal_force(bulk: Bulk, u: np.ndarray) -> np.ndarray:
+    """Internal force ``(n_owned, 2)`` of the bulk at the nodal displacements ``u`` ``(n, 2)``."""
+    function = fem.Function(bulk.V)
+    function.x.array[:] = u.ravel()
+    force = create_vector(bulk.V.dofmap.index_map, 2)
+    with force.localForm() as local:
+        local.set(0.0)
+    bulk.update(u)
+    bulk.add_force(function.x.petsc_vec, force)
+    return force.array_r.reshape(-1, 2).copy()
+
+
+def contact_force(contact: Contact, u: np.ndarray) -> np.ndarray:
+    """What the contact adds to the residual ``(n_owned, 2)`` at ``u``."""
+    contact.evaluate(u)
+    force = np.zeros((contact.sides[0].V.dofmap.index_map.size_local, 2))
+    contact.add_force(force)
+    return force
+
+
+@dataclass
+class Parts:
+    """A joint in pieces; ``sides`` are pin and hole, or the hole alone."""
+
+    V: fem.FunctionSpace
+    cells: MeshTags
+    facets: MeshTags
+    bulk: Bulk
+    sides: list[ContactSide]
+    contact: Contact
+
+    def pressed(self, depth: float, noise: float = 0.0, seed: int = 0) -> np.ndarray:
+        """Pin moved down by ``depth``, both bodies bent smoothly, and ``noise`` at every node (serial only)."""
+        x = coordinates(self.V)
+        u = 0.2 * depth * np.stack([np.sin(2 * x[:, 0] + x[:, 1]), np.cos(3 * x[:, 0] - 2 * x[:, 1])], axis=1)
+        if self.cells.find(Cells.PIN).size:
+            u[nodes_of(self.V, self.cells, Cells.PIN), 1] -= depth
+        if noise:
+            u += noise * np.random.default_rng(seed).normal(size=u.shape)
+        return u
+
+
+def joint_parts(
+    comm: MPI.Comm = MPI.COMM_SELF,
+    pin=ELASTIC,
+    block=ELASTIC,
+    *,
+    size: float = 0.2,
+    partitioner=None,
+    **contact_options,
+) -> Parts:
+    """A small quarter joint; without a ``pin`` material the pin is a rigid disc."""
+    joint = quarter_joint(comm, R, DR, 4.0, size, 0.4, rigid_pin=pin is None, partitioner=partitioner)
+    V = space(joint.mesh)
+    bodies = [Body(Cells.BLOCK, block)]
+    sides = [ContactSide(V, joint.facets, Facets.HOLE_ARC, block)]
+    if pin is None:
+        contact_options["rigid"] = RigidCircle(np.array([0.0, -DR]), R)
+    else:
+        bodies.insert(0, Body(Cells.PIN, pin))
+        sides.insert(0, ContactSide(V, joint.facets, Facets.PIN_ARC, pin))
+    bulk = Bulk(V, joint.cells, bodies)
+    return Parts(V, joint.cells, joint.facets, bulk, sides, Contact(sides, **contact_options))
+
+
+LOWER, UPPER = 1, 2  # cell tags of two blocks
+LOWER_TOP, UPPER_BOTTOM, BASE, LID, LEFT, RIGHT = range(1, 7)  # their facet tags
+
+
+def two_blocks(comm: MPI.Comm, n_lower: int, n_upper: int, shift: float = 0.0) -> tuple[Mesh, MeshTags, MeshTags]:
+    """Unit squares on top of each other, with ``n_lower`` and ``n_upper`` edges on their common line y = 0.
+
+    The vertices on the line are those of equal edges, moved by ``shift`` of an edge except at the ends.
+    """
+
+    def build(gmsh) -> None:
+        geo = gmsh.model.geo
+        lines: dict[int, list[int]] = {tag: [] for tag in range(1, 7)}
+        for tag, y0, y1, n in ((LOWER, -1, 0, n_lower), (UPPER, 0, 1, n_upper)):
+            corners = [geo.addPoint(x, y, 0) for x, y in ((0, y0), (1, y0), (1, y1), (0, y1))]
+            edges = [geo.addLine(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
+            face = geo.addPlaneSurface([geo.addCurveLoop(edges)])
+            for edge in edges:
+                geo.mesh.setTransfiniteCurve(edge, n + 1)
+            lines[RIGHT].append(edges[1])
+            lines[LEFT].append(edges[3])
+            lines[BASE if tag == LOWER else UPPER_BOTTOM].append(edges[0])
+            lines[LOWER_TOP if tag == LOWER else LID].append(edges[2])
+            geo.synchronize()
+            gmsh.model.addPhysicalGroup(2, [face], tag)
+        for tag, group in lines.items():
+            gmsh.model.addPhysicalGroup(1, group, tag)
+
+    return gmsh_to_mesh(comm, build)
+
+
+INNER, OUTER, ON_X, ON_Y = range(1, 5)
+
+
+def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> tuple[Mesh, MeshTags, MeshTags]:
+    """A quarter of a ring between the radii ``a`` and ``b``, with curved edges on both."""
+
+    def build(gmsh) -> None:
+        geo = gmsh.model.geo
+        centre = geo.addPoint(0, 0, 0)
+        p = [geo.addPoint(x, y, 0) for x, y in ((a, 0), (b, 0), (0, b), (0, a))]
+        edges = [
+            geo.addLine(p[0], p[1]),
+            geo.addCircleArc(p[1], centre, p[2]),
+            geo.addLine(p[2], p[3]),
+            geo.addCircleArc(p[3], centre, p[0]),
+        ]
+        face = geo.addPlaneSurface([geo.addCurveLoop(edges)])
+        geo.synchronize()
+        gmsh.model.addPhysicalGroup(2, [face], 1)
+        for tag, edge in ((ON_X, edges[0]), (OUTER, edges[1]), (ON_Y, edges[2]), (INNER, edges[3])):
+            gmsh.model.addPhysicalGroup(1, [edge], tag)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+
+    return gmsh_to_mesh(comm, build)
+
+
+def solve(V, bulk: Bulk, supports: list[Support], contact: Contact | None, loads) -> Equilibrium:
+    """Step through ``loads`` from rest and return the equilibrium at the last; every step must converge."""
+    problem = Equilibrium(V, bulk, supports, contact)
+    for load in loads:
+        result = problem.solve(load, problem.displacement())
+        assert result.converged, result.reason
+        problem.commit()
+    return problem

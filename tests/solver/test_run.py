@@ -1,0 +1,165 @@
+"""What a run leaves on disk."""
+
+import json
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.solver.history import read_history
+from archord.solver.run import solve_scene
+from archord.solver.run_folder import FILES, claim_folder
+from archord.solver.scene import SceneError, load_scene
+from tests.solver.solving import scene
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    outcome = solve_scene(scene(0.08, 4, sigma_y=0.002), folder, MPI.COMM_SELF)
+    return outcome
+
+
+def test_all_files_are_there_and_say_done(run):
+    """The run folder of a finished run."""
+    assert sorted(p.name for p in run.folder.iterdir()) == sorted(FILES)
+    report = json.loads((run.folder / "run.json").read_text())
+    assert report["status"] == "done"
+    assert report["totals"]["accepted_steps"] == 4
+    assert report["totals"]["newton_iterations"] == sum(m.iterations for m in run.steps)
+    assert report["error_estimates"]["force_balance"] < 1e-8
+    assert {"archord", "dolfinx", "petsc", "mpi", "numpy", "python"} <= report["versions"].keys()
+    assert sum(s for name, s in report["seconds"].items() if name != "total") <= report["seconds"]["total"] * 1.001
+
+
+def test_history_holds_units_and_dimensionless_forms(run):
+    """One row a step; P [N/mm] next to P/(E* R), equal as E* R = 1 here."""
+    heading = (run.folder / "history.csv").read_text().splitlines()[0].split(",")
+    assert heading[:8] == ["step", "delta [mm]", "delta/dR", "P [N/mm]", "P/(E* R)", "p0 [MPa]", "p0/E*", "eps [rad]"]
+    history = read_history(run.folder / "history.csv")
+    assert history["delta/dR"] == pytest.approx([0.5, 1.0, 1.5, 2.0], rel=1e-11)
+    assert history["P"] == pytest.approx(history["P/(E* R)"], rel=1e-11)
+    assert history["P"] == pytest.approx([m.P for m in run.steps], rel=1e-11)
+    assert history["cutbacks"] == [0, 0, 0, 0]
+
+
+def test_fields_open_with_their_steps_in_order(run):
+    """Second-order triangles, nodal displacement and cell fields at the four loads; symmetry axis at rest in x."""
+    with meshio.xdmf.TimeSeriesReader(run.folder / "fields.xdmf") as reader:
+        points, cells = reader.read_points_cells()
+        assert [c.type for c in cells] == ["triangle6"]
+        data = [reader.read_data(k) for k in range(reader.num_steps)]
+    loads = [d[0] for d in data]
+    assert loads == pytest.approx([m.delta for m in run.steps], rel=1e-12)
+    u = data[-1][1]["displacement"]
+    axis = points[:, 0] == 0
+    assert axis.sum() > 5
+    assert np.abs(u[axis, 0]).max() == 0
+    last = {name: values[0] for name, values in data[-1][2].items()}
+    assert set(last) == {"von_mises", "peeq", "mean_stress", "contact_state", "contact_pressure", "body"}
+    assert last["von_mises"].max() <= 0.002 * (1 + 1e-9)
+    assert 0 < last["peeq"].max() <= run.steps[-1].peeq_max
+    assert set(np.unique(last["body"])) == {1, 2}
+    first = {name: values[0] for name, values in data[0][2].items()}
+    assert 0 < (first["contact_state"] > 0).sum() < (last["contact_state"] > 0).sum()
+    corner, middle = cells[0].data[:, :3], cells[0].data[:, 3:]
+    chord = (points[corner] + points[np.roll(corner, -1, axis=1)]) / 2
+    sides = np.linalg.norm(points[corner] - points[np.roll(corner, -1, axis=1)], axis=-1)
+    assert (np.linalg.norm(points[middle] - chord, axis=-1) < 0.1 * sides).all()
+
+
+def test_fields_open_in_pyvista(run):
+    """The arrays make a grid that pyvista can handle, with the area of block and pin."""
+    pyvista = pytest.importorskip("pyvista")
+    with h5py.File(run.folder / "fields.h5") as file:
+        points, cells = file["mesh/coordinates"][()], file["mesh/cells"][()]
+    kind = np.full(len(cells), pyvista.CellType.QUADRATIC_TRIANGLE)
+    grid = pyvista.UnstructuredGrid(np.insert(cells, 0, 6, axis=1).ravel(), kind, points)
+    assert grid.compute_cell_sizes()["Area"].sum() == pytest.approx(1e4 - np.pi / 4 * (1.005**2 - 1), rel=1e-4)
+
+
+def test_contact_file_integrates_to_the_force(run):
+    """The projected pressure of each side carries the raw pressure's force; gaps are closed where it acts."""
+    with h5py.File(run.folder / "contact.h5") as file:
+        assert file["accepted"][()] == 4
+        assert file["load"][()] == pytest.approx([m.delta for m in run.steps])
+        for k in range(1, 5):
+            for side in ("pin", "hole"):
+                s, w = file[f"{side}/s"][()], file[f"{side}/weight"][()]
+                p, raw, gap = (file[f"{side}/{name}/{k:04d}"][()] for name in ("pressure", "raw_pressure", "gap"))
+                assert (np.diff(s.ravel()) > 0).all()
+                assert (w * p).sum() == pytest.approx((w * raw).sum(), rel=1e-12)
+                assert file[f"{side}/coordinates/{k:04d}"].shape == (*s.shape, 2)
+                assert np.abs(gap[raw > 0]).max() < 0.05 * 0.005
+                assert gap[-1, -1] > 0
+
+
+def test_the_resolved_scene_gives_the_same_numbers(run, tmp_path):
+    """Solving runs/x/scene.toml again reproduces every row but the seconds."""
+    solve_scene(load_scene(run.folder / "scene.toml"), tmp_path, MPI.COMM_SELF)
+    a, b = (read_history(f / "history.csv") for f in (run.folder, tmp_path))
+    del a["seconds"], b["seconds"]
+    assert a == b
+
+
+def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
+    """Four of ten steps, then no convergence: all four readable, and run.json says why."""
+    problem = scene(0.08, 10, sigma_y=0.002, analysis={"max_iterations": 5}, load={"max_cutbacks": 0})
+    outcome = solve_scene(problem, tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "stopped"
+    assert len(read_history(tmp_path / "history.csv")["P"]) == 4
+    report = json.loads((tmp_path / "run.json").read_text())
+    assert report["status"] == "stopped"
+    assert "no equilibrium at delta = 0.005" in report["message"]
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "fields.xdmf") as reader:
+        assert reader.num_steps == 4
+    with h5py.File(tmp_path / "contact.h5") as file:
+        assert file["accepted"][()] == 4
+
+
+@pytest.mark.mpi
+def test_ranks_write_the_same_files(tmp_path_factory):
+    """fields.h5 and contact.h5 of all ranks together equal those of one rank, in the same order."""
+    comm = MPI.COMM_WORLD
+    folder = comm.bcast(tmp_path_factory.mktemp("ranks") if comm.rank == 0 else None)
+    problem = scene(0.1, 2, sigma_y=0.002)
+    if comm.rank == 0:
+        (folder / "one").mkdir()
+        (folder / "all").mkdir()
+        solve_scene(problem, folder / "one", MPI.COMM_SELF)
+    comm.barrier()
+    solve_scene(problem, folder / "all", comm)
+    if comm.rank == 0:
+        for name in ("fields.h5", "contact.h5"):
+            with h5py.File(folder / "one" / name) as one, h5py.File(folder / "all" / name) as together:
+                names: list[str] = []
+                one.visit(names.append)
+                for key in names:
+                    if isinstance(one[key], h5py.Dataset) and not key.startswith("mesh/cells"):
+                        a, b = one[key][()], together[key][()]
+                        assert a == pytest.approx(b, rel=1e-7, abs=1e-7 * np.abs(a).max()), key
+
+
+def test_an_elastic_run_carries_no_plastic_fields(tmp_path):
+    """No PEEQ on disk, no PEEQ field, zero dissipation; a rigid pin has no pin side."""
+    solve_scene(scene(0.1, 1, pin={"rigid": True}), tmp_path, MPI.COMM_SELF)
+    with h5py.File(tmp_path / "fields.h5") as file:
+        assert "peeq" not in file
+        assert set(np.unique(file["mesh/body"][()])) == {2}
+    with h5py.File(tmp_path / "contact.h5") as file:
+        assert set(file) == {"accepted", "load", "hole"}
+    assert read_history(tmp_path / "history.csv")["plastic_dissipation"] == [0]
+
+
+def test_results_are_not_overwritten_by_accident(tmp_path):
+    """An occupied folder needs force; a file is no folder."""
+    claim_folder(tmp_path / "new", False)
+    (tmp_path / "new" / "history.csv").write_text("kept")
+    with pytest.raises(SceneError, match="--force"):
+        claim_folder(tmp_path / "new", False)
+    claim_folder(tmp_path / "new", True)
+    assert (tmp_path / "new" / "history.csv").read_text() == "kept"
+    with pytest.raises(SceneError, match="is a file"):
+        claim_folder(tmp_path / "new" / "history.csv", True)

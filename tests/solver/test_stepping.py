@@ -1,0 +1,61 @@
+"""Load stepping: cutbacks, rollback, and what a failure leaves."""
+
+import numpy as np
+import pytest
+
+from archord.solver.stepping import StepFailure, march
+from tests.solver.solving import scene, solve
+
+
+def test_cutbacks_change_the_path_but_not_the_targets():
+    """With too few iterations allowed, steps are cut, all targets are hit, and P agrees within the step error."""
+    free = solve(scene(0.08, 4, sigma_y=0.002))
+    bound = solve(scene(0.08, 4, sigma_y=0.002, analysis={"max_iterations": 5}))
+    assert sum(m.cutbacks for m in free.steps) == 0
+    assert sum(m.cutbacks for m in bound.steps) > 0
+    assert [m.delta for m in bound.steps] == [m.delta for m in free.steps]
+    assert bound.steps[-1].P == pytest.approx(free.steps[-1].P, rel=2e-3)
+
+
+def test_a_failed_step_leaves_no_trace():
+    """Displacement and all history are what they were at the last accepted load."""
+    joint = solve(scene(0.1, 2, sigma_y=0.002)).joint
+    equilibrium = joint.equilibrium
+    points = joint.bulk.plastic_points() + joint.contact.plastic_points()
+    states = [p.state for p in points]
+    before = [s.peeq.copy() for s in states]
+    load, u = equilibrium.load, equilibrium.displacement()
+    forces = joint.forces()
+    equilibrium.max_iterations = 1
+    result = equilibrium.solve(1.2 * load, u)
+    assert not result.converged
+    equilibrium.restore(load, u)
+    assert all(p.state is s for p, s in zip(points, states, strict=True))
+    assert all(np.array_equal(p.state.peeq, b) for p, b in zip(points, before, strict=True))
+    equilibrium.evaluate()
+    assert joint.forces() == pytest.approx(forces, rel=1e-9)
+
+
+def test_a_solve_that_cannot_go_on_says_where_and_why():
+    """The message holds delta, the reason, the residual and its place; accepted steps were reported before."""
+    problem = scene(0.08, 10, sigma_y=0.002, analysis={"max_iterations": 5})
+    from archord.solver.joint import Joint
+    from tests.solver.solving import MPI
+
+    joint, accepted = Joint(problem, MPI.COMM_SELF), []
+    targets = [problem.delta * k / 10 for k in range(1, 11)]
+    with pytest.raises(StepFailure, match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller"):
+        march(
+            joint.equilibrium,
+            targets,
+            joint.rigid_translation,
+            max_cutbacks=0,
+            substep_done=lambda load: None,
+            target_done=lambda step: accepted.append(step.load),
+        )
+    assert accepted == targets[:4]
+
+
+def test_one_large_step_finds_the_plastic_state():
+    """Elastic first touch, then the plastic state at 2 dR at once: the force of 20 steps within 0.5 %."""
+    assert solve(scene(0.08, 1, sigma_y=0.002)).steps[-1].P == pytest.approx(0.00669, rel=5e-3)

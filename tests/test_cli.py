@@ -1,0 +1,135 @@
+"""The command as a user runs it: exit codes, sentences, what is written and what is imported."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import meshio
+import pytest
+
+from archord.solver.history import read_history
+
+SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")
+COARSE = ["--set", "joint.relative_element_size=0.1", "--set", "load.steps=4"]
+# a launcher inside a launcher: processes started by a test must not inherit the rank of the test
+ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_", "PRTE_"))}
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
+
+
+def archord(*arguments: str, cwd: Path, ranks: int = 0) -> subprocess.CompletedProcess:
+    launcher = ["mpirun", "-n", str(ranks)] if ranks else []
+    command = [*launcher, sys.executable, "-m", "archord", *arguments]
+    return subprocess.run(command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
+
+
+def test_solve_prints_steps_and_writes_the_run(tmp_path):
+    """Plain lines off a terminal, results in runs/<scene name>, refused the second time without --force."""
+    first = archord("solve", SCENE, *COARSE, cwd=tmp_path)
+    assert first.returncode == 0, first.stderr
+    assert first.stderr == ""
+    assert [line.split()[0] for line in first.stdout.splitlines()[2:6]] == ["1", "2", "3", "4"]
+    history = (tmp_path / "runs" / "steel_pin" / "history.csv").read_text()
+    second = archord("solve", SCENE, *COARSE, cwd=tmp_path)
+    assert second.returncode == 2
+    assert second.stderr == (
+        "runs/steel_pin: already holds results; choose another folder with -o, or overwrite with --force.\n"
+    )
+    assert (tmp_path / "runs" / "steel_pin" / "history.csv").read_text() == history
+    quiet = archord("solve", SCENE, *COARSE, "--force", "--quiet", cwd=tmp_path)
+    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
+
+
+def test_ranks_print_once_and_give_the_same_history(tmp_path):
+    """mpirun -n 3: one report, and every number as on one rank."""
+    one = archord("solve", SCENE, *COARSE, "-o", "one", cwd=tmp_path)
+    three = archord("solve", SCENE, *COARSE, "-o", "three", cwd=tmp_path, ranks=3)
+    assert three.returncode == 0, three.stderr
+    assert three.stderr == ""
+    assert len(three.stdout.splitlines()) == len(one.stdout.splitlines())
+    a, b = (read_history(tmp_path / name / "history.csv") for name in ("one", "three"))
+    for name in set(a) - {"seconds", "force_balance"}:
+        assert a[name] == pytest.approx(b[name], rel=1e-9), name
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, ranks):
+    """Exit code 2, once, whatever the number of ranks."""
+    bad = tmp_path / "bad.toml"
+    bad.write_text(Path(SCENE).read_text().replace("radius = 10.0", "radius = -10.0"))
+    result = archord("solve", "bad.toml", cwd=tmp_path, ranks=ranks)
+    assert result.returncode == 2
+    assert result.stderr.count("bad.toml: joint.radius = -10.0 must be greater than 0.") == 1
+    assert "Traceback" not in result.stderr
+    assert os.listdir(tmp_path) == ["bad.toml"]
+
+
+def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
+    """The reason on stderr, accepted steps on disk."""
+    limits = ["--set", "analysis.max_iterations=5", "--set", "load.max_cutbacks=0", "--set", "load.steps=10"]
+    result = archord("solve", SCENE, "--set", "joint.relative_element_size=0.08", *limits, cwd=tmp_path)
+    assert result.returncode == 3
+    assert "no equilibrium at delta" in result.stderr
+    assert "4 accepted steps are in runs/steel_pin" in result.stderr
+    assert len(read_history(tmp_path / "runs" / "steel_pin" / "history.csv")["P"]) == 4
+
+
+@pytest.mark.parametrize(("kill", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
+def test_a_killed_run_leaves_its_steps_readable(tmp_path, kill, code):
+    """Whatever step is on disk when the process dies can be read; Ctrl-C says so in one line."""
+    command = [sys.executable, "-m", "archord", "solve", SCENE, "--set", "joint.relative_element_size=0.02", "-o", "run"]
+    history = tmp_path / "run" / "history.csv"
+    with subprocess.Popen(command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline and not (history.exists() and len(history.read_text().splitlines()) > 3):
+            time.sleep(0.02)
+        process.send_signal(kill)
+        _, errors = process.communicate(timeout=60)
+        assert process.returncode == code
+    rows = len(read_history(history)["P"])
+    assert 3 <= rows < 20
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "run" / "fields.xdmf") as reader:
+        assert reader.num_steps >= rows
+        loads = [reader.read_data(k)[0] for k in range(reader.num_steps)]
+    assert loads == sorted(loads)
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["totals"]["accepted_steps"] >= rows - 1
+    if kill == signal.SIGINT:
+        assert b"interrupted" in errors
+        assert b"Traceback" not in errors
+
+
+def test_scene_prints_schema_and_example(tmp_path):
+    """The schema is JSON and names every section; the example solves."""
+    schema = json.loads(archord("scene", "--schema", cwd=tmp_path).stdout)
+    assert set(schema["properties"]) == {"units", "joint", "pin", "block", "analysis", "load"}
+    example = archord("scene", "--example", cwd=tmp_path)
+    (tmp_path / "example.toml").write_text(example.stdout)
+    result = archord("solve", "example.toml", *COARSE, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert archord("scene", cwd=tmp_path).returncode == 2
+
+
+def test_a_scene_loads_only_what_it_needs(tmp_path):
+    """No plotting library, no scipy; an elastic scene leaves the return map alone; --help imports no solver."""
+    code = (
+        "import sys; from archord.cli import run\n"
+        "code = run(sys.argv[1:]); print(code, *sorted(m for m in sys.modules), file=sys.stderr)"
+    )
+
+    def modules(*arguments: str) -> set[str]:
+        command = [sys.executable, "-c", code, *arguments]
+        result = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
+        loaded = result.stderr.split()
+        assert loaded[0] == "0", result.stderr
+        return set(loaded)
+
+    elastic = ["--set", "pin.yield_stress=", "--set", "block.yield_stress="]
+    solving = modules("solve", SCENE, *COARSE, *elastic, "-q")
+    assert "dolfinx" in solving
+    assert solving.isdisjoint({"matplotlib", "pyvista", "scipy", "vtk", "archord.materials.j2"})
+    helping = modules("--help")
+    assert helping.isdisjoint({"numpy", "dolfinx", "pydantic", "mpi4py", "gmsh"})
