@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -56,6 +57,18 @@ def _claim(comm, folder: Path, force: bool) -> None:
         raise SceneError(fault)
 
 
+def _on_terminal() -> bool:
+    """Whether somebody watches: Open MPI gives its ranks a terminal of their own even where it writes to a file itself."""
+    if not sys.stdout.isatty():
+        return False
+    if "PMIX_RANK" not in os.environ and "OMPI_COMM_WORLD_RANK" not in os.environ:
+        return True
+    try:
+        return os.readlink(f"/proc/{os.getppid()}/fd/1").startswith(("/dev/pts/", "/dev/tty", "/dev/console"))
+    except OSError:
+        return False
+
+
 class _Progress:
     """Reports steps as they are accepted."""
 
@@ -63,7 +76,7 @@ class _Progress:
         self.scene, self.silent = scene, silent
         self._bar: AbstractContextManager = nullcontext()
         self._task = None
-        if not silent and sys.stdout.isatty():
+        if not silent and _on_terminal():
             from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
             self._bar = Progress(
