@@ -1,4 +1,4 @@
-"""The command line: ``archord solve`` and ``archord scene``.
+"""The command line: ``archord solve``, ``archord picture`` and ``archord scene``.
 
 Heavy packages are imported by the commands that need them. Bad input ends with exit code 2 and one sentence from rank 0.
 """
@@ -98,6 +98,18 @@ def solve(
     from archord.progress import solve_with_progress
 
     return solve_with_progress(checked, folder, force=force, quiet=quiet, begun=_begun)
+
+
+@app.command()
+def picture(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="run folder")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="file to draw [RUN/picture.png]")] = None,
+) -> int:
+    """Draw a run: plastic zone, contact pressure, P(delta)."""
+    from archord.postprocess.picture import draw
+
+    print(draw(folder, output))
+    return 0
 
 
 @app.command("scene")

@@ -57,9 +57,10 @@ def arc_profile(contact: Contact, side: ContactSide, radius: float, axis_point: 
     n, q = side.curve.n_facets, side.weight.shape[1]
     local = np.zeros((n, q, 5))
     displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
-    local[side.facet] = np.concatenate(
+    values = np.concatenate(
         [side.weight[..., None], displaced, state.pressure[..., None], state.gap[..., None]], axis=-1
     )
+    local[side.facet] = np.where(side.flipped[:, None, None], values[:, ::-1], values)  # points along the curve
     whole = side.sum_over_ranks(local)
     s = side.arc_position(axis_point)
     if s[0, 0] > s[-1, 0]:

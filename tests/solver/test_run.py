@@ -94,6 +94,9 @@ def test_contact_file_integrates_to_the_force(run):
                 assert file[f"{side}/coordinates/{k:04d}"].shape == (*s.shape, 2)
                 assert np.abs(gap[raw > 0]).max() < 0.05 * 0.005
                 assert gap[-1, -1] > 0
+            at = file["hole/coordinates/0001"][()]
+            angle = np.arctan2(at[..., 0], -at[..., 1])
+            assert angle == pytest.approx(file["hole/angle"][()], abs=0.003)
 
 
 def test_the_resolved_scene_gives_the_same_numbers(run, tmp_path):
