@@ -116,17 +116,17 @@ def picture(
 def scene_format(
     schema: Annotated[bool, typer.Option("--schema", help="print the JSON schema of scene files")] = False,
     example: Annotated[bool, typer.Option("--example", help="print a commented example")] = False,
+    reference: Annotated[bool, typer.Option("--reference", help="print all keys as Markdown tables")] = False,
 ) -> int:
     """Print what a scene file may hold."""
-    if schema == example:
-        raise click.UsageError("choose one of --schema and --example")
-    from archord.solver.scene import Scene
-    from archord.solver.scene import example as commented_example
+    if schema + example + reference != 1:
+        raise click.UsageError("choose one of --schema, --example and --reference")
+    from archord.solver import scene
 
     if schema:
         import json
 
-        print(json.dumps(Scene.model_json_schema(), indent=2))
+        print(json.dumps(scene.Scene.model_json_schema(), indent=2))
     else:
-        print(commented_example())
+        print(scene.example() if example else scene.reference(), end="")
     return 0

@@ -92,15 +92,22 @@ class Contact:
             gamma = np.repeat(gamma_factor * share * sides[i].gamma, sides[i].weight.shape[1])
             self.pairings.append(_Pairing(sides[i], opposites[i], float(share), gamma))
         rest = self._motions(None)
+        failure = None
         for pair in self.pairings:
             side = pair.side
-            start = pair.curve.closest_point(side.point.reshape(-1, 2), side.outward.reshape(-1, 2), rest[id(pair.opposite)])
+            x, outward = side.point.reshape(-1, 2), side.outward.reshape(-1, 2)
+            try:
+                start = pair.curve.closest_point(x, outward, rest[id(pair.opposite)])
+            except ProjectionError as error:
+                failure = str(error)
+                break
             pair.projection = start
             if kinematics != "current":
                 pair.fixed = start
                 if side is sides[0] and rigid is None:
                     pair.fixed = replace(start, normal=-side.outward.reshape(-1, 2))
                 pair.separation = side.point.reshape(-1, 2) - start.point
+        self._raise_together(failure)
         self._extend_pattern([p.projection.facet for p in self.pairings])
 
     # ------------------------------------------------------------------ evaluation
@@ -167,11 +174,15 @@ class Contact:
             else:
                 trial = (pair.traction * pair.projection.normal).sum(1) - pair.gamma * pair.gap
                 pair.pressure = np.where(pair.projection.found & (trial > 0), trial, 0.0)
+        self._raise_together(failure)
+        return self._extend_pattern([p.projection.facet for p in self.pairings])
+
+    def _raise_together(self, failure: str | None) -> None:
+        """Raise `ProjectionError` on every rank if any rank reports a ``failure``, and forget the pairs."""
         failures = [f for f in self.comm.allgather(failure) if f]
         if failures:
             self.search()
             raise ProjectionError(failures[0])
-        return self._extend_pattern([p.projection.facet for p in self.pairings])
 
     @staticmethod
     def _opposite_displacement(pair: _Pairing, motion: Array) -> Array:

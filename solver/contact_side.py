@@ -133,7 +133,10 @@ class ContactSide:
         return np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ trace @ scaled)[:, -1]
 
     def arc_position(self, origin: Array) -> Array:
-        """Arc length ``(n_facets, q)`` of all the curve's points, measured from its end nearest to ``origin`` ``(2,)``."""
+        """Arc length ``(n_facets, q)`` of all the curve's points, measured from its end nearest to ``origin`` ``(2,)``.
+
+        Points are in the curve's order: that of this rank's arrays, but for ``flipped`` facets, which have it reversed.
+        """
         xi = self.reference_points
         length = self.curve.arc_length(np.concatenate([xi, [1.0]]))
         s, total = length[:, :-1], length[-1, -1]
@@ -190,6 +193,8 @@ def _chain(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     while at is not None and len(order) < len(start):
         order.append(at)
         at = by_start.get(int(end[at]))
+    if len(set(order)) != len(start):
+        raise ValueError(f"a contact edge must be one curve, {len(start) - len(set(order))} facets are not part of it")
     return np.array(order)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -350,24 +351,57 @@ def resolved(scene: Scene) -> str:
     return tomli_w.dumps(data)
 
 
+def _sections() -> Iterator[tuple[str, Any, list[tuple[str, Any]]]]:
+    """Name, field and documented keys of every section."""
+    for section, info in Scene.model_fields.items():
+        model: Any = info.annotation
+        names = sorted(model.model_fields, key=lambda name: name not in ("E", "nu"))
+        yield section, info, [(name, model.model_fields[name]) for name in names]
+
+
+def _unit(key: Any) -> str:
+    return (key.json_schema_extra or {}).get("unit", "")
+
+
+_SHOWN = {"block_size": 1000.0, "clearance": 0.05, "element_size": 0.4, "displacement_absolute": 0.1}
+
+
 def example() -> str:
     """A commented scene that shows every key; alternatives and absent defaults are commented out."""
     lines = ["# An archord scene: archord solve scene.toml", ""]
-    for section, info in Scene.model_fields.items():
-        model: Any = info.annotation
+    for section, info, keys in _sections():
         lines += [f"[{section}]  # {info.description}"]
-        for name in sorted(model.model_fields, key=lambda name: name not in ("E", "nu")):
-            field = model.model_fields[name]
-            unit = (field.json_schema_extra or {}).get("unit")
-            shown = (field.examples or [None])[0]
-            optional = "" if shown is not None else "# "
-            shown = {"block_size": 1000.0, "clearance": 0.05, "element_size": 0.4, "displacement_absolute": 0.1}.get(
-                name, shown
-            )
-            if name == "rigid":
-                optional = "# "
-            default = "" if field.is_required() or field.default is None else f", default {_toml(field.default)}"
-            comment = f"{field.description}{f' [{unit}]' if unit else ''}{default}"
-            lines.append(f"{optional}{name} = {_toml(shown)}  # {comment}")
+        for name, key in keys:
+            shown = (key.examples or [None])[0]
+            hidden = "# " if shown is None or name == "rigid" else ""
+            default = "" if key.is_required() or key.default is None else f", default {_toml(key.default)}"
+            unit = f" [{_unit(key)}]" if _unit(key) else ""
+            lines.append(f"{hidden}{name} = {_toml(_SHOWN.get(name, shown))}  # {key.description}{unit}{default}")
         lines.append("")
     return "\n".join(lines)
+
+
+def reference() -> str:
+    """All sections and keys as Markdown tables."""
+    lines = ["# Scene reference", "", "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.", ""]
+    for section, info, keys in _sections():
+        lines += [f"## [{section}]", "", f"{info.description[0].upper()}{info.description[1:]}.", ""]
+        lines += ["| key | unit | default | allowed | what |", "|---|---|---|---|---|"]
+        schema = info.annotation.model_json_schema()["properties"]
+        for name, key in keys:
+            default = "required" if key.is_required() else "" if key.default is None else f"`{_toml(key.default)}`"
+            what = key.description.replace("|", "\\|")
+            lines.append(f"| `{name}` | {_unit(key)} | {default} | {_allowed(schema[name])} | {what} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _allowed(schema: dict[str, Any]) -> str:
+    """Type and limits of a key from its JSON schema, in words."""
+    schema = next((s for s in schema.get("anyOf", []) if s.get("type") != "null"), schema)
+    if "enum" in schema:
+        return ", ".join(f"`{_toml(value)}`" for value in schema["enum"])
+    signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
+    limits = [f"{sign} {schema[name]:g}" for name, sign in signs.items() if name in schema]
+    kind = {"number": "number", "integer": "whole number", "boolean": "true, false", "string": "text"}[schema["type"]]
+    return " ".join([kind, ", ".join(limits)]).strip()

@@ -1,10 +1,11 @@
 """Scene files: what is accepted, what is refused, and in which words."""
 
 import tomllib
+from pathlib import Path
 
 import pytest
 
-from archord.solver.scene import Scene, SceneError, example, load_scene, parse_scene, resolved
+from archord.solver.scene import Scene, SceneError, example, load_scene, parse_scene, reference, resolved
 
 
 def basic() -> dict:
@@ -109,6 +110,11 @@ def test_the_example_shows_every_key_and_loads():
         for key, field in info.annotation.model_fields.items():
             assert f"{key} = " in text
             assert field.description in text
+
+
+def test_the_reference_page_is_that_of_the_model():
+    """docs/scene.md is what `archord scene --reference` prints."""
+    assert (Path(__file__).parents[2] / "docs" / "scene.md").read_text() == reference()
 
 
 def test_contact_modulus_of_plane_strain_and_stress():
