@@ -98,14 +98,14 @@ class Curve:
         that facet and its two neighbours, kept within each, and the nearest result is taken; a point that leaves them
         is searched anew. Raises `ProjectionError` when a point between the ends of the curve gets no partner.
         """
-        fresh = start is None
         home = self.nearest_facet(x, displacement) if start is None else start
         found = self._project(x, outward, displacement, home)
-        if not fresh:
-            step = found.facet - home
-            away = ((step == -1) & (found.xi <= 0)) | ((step == 1) & (found.xi >= 1))
-            if away.any():
-                return self.closest_point(x, outward, displacement)
+        step = found.facet - home
+        away = ((step == -1) & (found.xi <= 0)) | ((step == 1) & (found.xi >= 1))
+        if away.any():
+            if start is None:
+                raise ProjectionError(f"{away.sum()} contact points have closest points beyond the facets searched")
+            return self.closest_point(x, outward, displacement)
         return found
 
     def _project(self, x: Array, outward: Array, displacement: Array, home: Index) -> Projection:
@@ -145,7 +145,8 @@ class Curve:
         lost = ~clamped & (np.abs(along) > 1e-9 * (1 + np.linalg.norm(d, axis=1) / speed))
         if lost.any():
             at = x[lost][0]
-            raise ProjectionError(f"{lost.sum()} contact points found no closest point, the first at ({at[0]:g}, {at[1]:g})")
+            message = f"{lost.sum()} contact points found no closest point, the first at ({at[0]:g}, {at[1]:g})"
+            raise ProjectionError(message)
         facing = (normal * outward).sum(1) < 0
         return Projection(
             found=~beyond & facing,

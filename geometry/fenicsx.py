@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from dolfinx.mesh import GhostMode, Mesh, MeshTags, create_cell_partitioner
@@ -31,14 +32,14 @@ def gmsh_to_mesh(
 ) -> tuple[Mesh, MeshTags, MeshTags]:
     """Mesh what ``build(gmsh)`` describes, in triangles of the given ``order``, and distribute it over ``comm``.
 
-    ``adjust(x, tag)`` may move the nodes ``x`` ``(n, 3)`` of the physical curve ``tag``; the mesh is scaled by ``scale``
-    at the end. An error on rank 0 is raised on every rank. Returns mesh, cell tags and facet tags.
+    ``adjust(x, tag)`` may move the nodes ``x`` ``(n, 3)`` of the physical curve ``tag``; the mesh is scaled by
+    ``scale`` at the end. An error on rank 0 is raised on every rank. Returns mesh, cell tags and facet tags.
     """
     model, failure = None, None
     if comm.rank == 0:
-        import gmsh
-
         try:
+            import gmsh
+
             gmsh.initialize(readConfigFiles=False, interruptible=False)
             for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
                 gmsh.option.setNumber(f"Mesh.{option}", 0)
@@ -53,6 +54,8 @@ def gmsh_to_mesh(
             model = gmsh.model
         except Exception as error:  # raised on all ranks below
             failure = f"gmsh could not mesh the joint: {error}"
+            with suppress(Exception):
+                gmsh.finalize()  # or the next mesh would start from what is left of this one
     failure = comm.bcast(failure)
     if failure:
         raise RuntimeError(failure)

@@ -98,8 +98,9 @@ def quarter_joint(
     def on_the_arcs(x: np.ndarray, tag: int) -> np.ndarray:
         """Exact radius for the nodes of the arcs: the clearance is a small difference of large numbers."""
         if tag == Facets.PIN_ARC:
-            x = x + [0.0, hole - 1, 0.0]
-            return x / np.linalg.norm(x, axis=1)[:, None] - [0.0, hole - 1, 0.0]
+            centre = np.array([0.0, 1 - hole, 0.0])
+            ray = x - centre
+            return ray / np.linalg.norm(ray, axis=1)[:, None] + centre
         if tag == Facets.HOLE_ARC:
             return x * (hole / np.linalg.norm(x, axis=1))[:, None]
         return x

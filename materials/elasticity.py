@@ -26,7 +26,7 @@ def contact_modulus(E: float, nu: float, plane: Plane) -> float:
 
 
 def elastic_tangent(E: float, nu: float, plane: Plane) -> Array:
-    """Elastic tangent ``(3, 3)`` from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx, s_yy, s_xy]``, in the units of ``E``."""
+    """Elastic tangent ``(3, 3)`` from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx, s_yy, s_xy]``, in units of ``E``."""
     lam, mu = lame(E, nu)
     if plane == "stress":
         lam = E * nu / (1 - nu**2)

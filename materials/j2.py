@@ -30,9 +30,9 @@ class PlasticState:
 
 @dataclass(frozen=True)
 class J2Material:
-    """Elastic-plastic solid; ``yield_stress`` and the ``hardening`` modulus (d yield stress / d PEEQ) are in units of ``E``.
+    """Elastic-plastic solid; ``yield_stress`` and the modulus ``hardening`` are in units of ``E``.
 
-    ``hardening`` = 0 is perfect plasticity.
+    ``hardening`` is the derivative of the yield stress with respect to PEEQ; ``hardening`` = 0 is perfect plasticity.
     """
 
     E: float
@@ -42,7 +42,7 @@ class J2Material:
     plane: Plane
 
     def return_map(self, strain: Array, old: PlasticState) -> tuple[Array, Array, PlasticState]:
-        """Stress ``(n, 4)``, consistent tangent ``(n, 3, 3)`` and new state at total ``strain`` ``(n, 3)`` from ``old``.
+        """Stress ``(n, 4)``, consistent tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from ``old``.
 
         The tangent maps ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx, s_yy, s_xy]`` and is symmetric.
         """
@@ -64,7 +64,7 @@ class J2Material:
 
 
 def _radial_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Array, Array, PlasticState]:
-    """Plane strain: with trial deviator ``s``, ``d_peeq = (q - sigma_y) / (3 mu + H)``, ``s_new = s (1 - 3 mu d_peeq / q)``."""
+    """Plane strain: ``d_peeq = (q - sigma_y) / (3 mu + H)`` scales the trial deviator by ``1 - 3 mu d_peeq / q``."""
     lam, mu = lame(m.E, m.nu)
     elastic = -old.plastic_strain
     elastic[:, 0] += strain[:, 0]
@@ -99,8 +99,9 @@ def _radial_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Arr
 def _projected_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Array, Array, PlasticState]:
     """Plane stress: ``sigma = (C^-1 + zeta P)^-1 C^-1 sigma_trial`` with ``zeta = 1.5 d_peeq / q``.
 
-    ``C`` and ``P`` share their eigenvectors, so the stress splits into sum, difference and shear, each scaled alone. The
-    scalar equation ``1/q(zeta) = (1 - 2/3 H zeta) / sigma_y`` is increasing and concave: Newton from 0 cannot overshoot.
+    ``C`` and ``P`` share their eigenvectors, so the stress splits into sum, difference and shear, each scaled alone.
+    The scalar equation ``1/q(zeta) = (1 - 2/3 H zeta) / sigma_y`` is increasing and concave: Newton from 0 cannot
+    overshoot.
     """
     _, mu = lame(m.E, m.nu)
     C = elastic_tangent(m.E, m.nu, "stress")

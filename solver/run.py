@@ -9,7 +9,7 @@ import platform
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -172,7 +172,7 @@ def _report(joint: Joint, command: list[str]) -> _Report:
     return _Report(
         status="running",
         message="",
-        started=datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
         command=command,
         versions=versions,
         ranks=joint.comm.size,

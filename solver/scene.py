@@ -77,7 +77,7 @@ class JointGeometry(_Section):
         if not 1e-4 <= self.h / self.radius <= 0.5:
             name = "element_size" if self.element_size is not None else "relative_element_size"
             raise ValueError(f"{name}|must be between 1e-4 and 0.5 times the radius")
-        if self.W < 2 * (self.radius + self.dR):
+        if 2 * (self.radius + self.dR) > self.W:
             raise ValueError("block_size|must be at least twice the radius of the hole")
         return self
 

@@ -22,7 +22,7 @@ from archord.solver.contact_side import ContactSide
 from archord.solver.equilibrium import Equilibrium, Support
 
 E, NU = 1.82, 0.3
-YIELD_STRESS = 0.004
+YIELD_STRESS = 0.01
 ELASTIC = Elastic(E, NU, "strain")
 PERFECT = J2Material(E, NU, YIELD_STRESS, 0.0, "strain")
 HARDENING = J2Material(E, NU, YIELD_STRESS, 0.1 * E, "strain")
@@ -53,8 +53,8 @@ def edge_nodes(V, facets: MeshTags, tag: int) -> np.ndarray:
 
 
 def scipy_matrix(A: PETSc.Mat) -> sp.csr_matrix:
-    I, J, values = A.getValuesCSR()
-    return sp.csr_matrix((values, J, I), shape=A.getSize())
+    rows, columns, values = A.getValuesCSR()
+    return sp.csr_matrix((values, columns, rows), shape=A.getSize())
 
 
 def internal_force(bulk: Bulk, u: np.ndarray) -> np.ndarray:
@@ -126,11 +126,8 @@ LOWER, UPPER = 1, 2  # cell tags of two blocks
 LOWER_TOP, UPPER_BOTTOM, BASE, LID, LEFT, RIGHT = range(1, 7)  # their facet tags
 
 
-def two_blocks(comm: MPI.Comm, n_lower: int, n_upper: int, shift: float = 0.0) -> tuple[Mesh, MeshTags, MeshTags]:
-    """Unit squares on top of each other, with ``n_lower`` and ``n_upper`` edges on their common line y = 0.
-
-    The vertices on the line are those of equal edges, moved by ``shift`` of an edge except at the ends.
-    """
+def two_blocks(comm: MPI.Comm, n_lower: int, n_upper: int) -> tuple[Mesh, MeshTags, MeshTags]:
+    """Unit squares on top of each other, with ``n_lower`` and ``n_upper`` edges on their common line y = 0."""
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
