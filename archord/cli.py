@@ -1,6 +1,7 @@
 """The command line: ``archord solve``, ``archord picture`` and ``archord scene``.
 
-Heavy packages are imported by the commands that need them. Bad input ends with exit code 2 and one sentence from rank 0.
+Heavy packages are imported by the commands that need them. Bad input ends with exit code 2 and one sentence from rank
+0.
 """
 
 from __future__ import annotations

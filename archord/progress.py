@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from archord.solver.scene import Scene, SceneError
 
@@ -34,12 +36,23 @@ def solve_with_progress(scene: Scene, folder: Path, *, force: bool, quiet: bool,
             on_step=report.step,
             on_attempt=report.attempt,
         )
+    for warning in _shortened(outcome.warnings):
+        print(f"archord: warning: {warning}.", file=sys.stderr)
     if comm.rank == 0 and outcome.status != "done":
         print(f"archord: {outcome.message}.", file=sys.stderr)
         print(f"archord: {outcome.status}; {len(outcome.steps)} accepted steps are in {folder}.", file=sys.stderr)
     elif comm.rank == 0 and not quiet:
         print(f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s, results in {folder}")
     return {"done": 0, "stopped": 3, "interrupted": 130}[outcome.status]
+
+
+def _shortened(warnings: list[str]) -> list[str]:
+    """Each kind of warning once, at the first step that gave it."""
+    first: dict[str, str] = {}
+    for warning in warnings:
+        kind = re.sub(r"[0-9.e+-]+", "#", warning.partition(": ")[2])
+        first.setdefault(kind, warning)
+    return list(first.values())
 
 
 def _claim(comm, folder: Path, force: bool) -> None:
@@ -58,7 +71,8 @@ def _claim(comm, folder: Path, force: bool) -> None:
 
 
 def _on_terminal() -> bool:
-    """Whether somebody watches: Open MPI gives its ranks a terminal of their own even where it writes to a file itself."""
+    """Whether somebody watches: Open MPI gives its ranks a terminal of their own even where it writes to a file
+    itself."""
     if not sys.stdout.isatty():
         return False
     if "PMIX_RANK" not in os.environ and "OMPI_COMM_WORLD_RANK" not in os.environ:
@@ -74,13 +88,17 @@ class _Progress:
 
     def __init__(self, scene: Scene, silent: bool) -> None:
         self.scene, self.silent = scene, silent
-        self._bar: AbstractContextManager = nullcontext()
-        self._task = None
+        self._bar: Any = nullcontext()
+        self._task: Any = None
         if not silent and _on_terminal():
             from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
             self._bar = Progress(
-                TextColumn("step"), MofNCompleteColumn(), BarColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+                TextColumn("step"),
+                MofNCompleteColumn(),
+                BarColumn(),
+                TextColumn("{task.description}"),
+                TimeElapsedColumn(),
             )
             self._task = self._bar.add_task("meshing", total=scene.load.steps)
 
@@ -95,10 +113,11 @@ class _Progress:
         """Say what is going to be solved."""
         if self.silent:
             return
+        geometry, ranks = self.scene.joint, joint.comm.size
         kind = "elastic-plastic" if self.scene.plastic else "elastic"
         text = (
-            f"{kind} joint, plane {self.scene.analysis.plane}, dR/R = {self.scene.joint.dR / self.scene.joint.radius:g}: "
-            f"{joint.n_cells} curved triangles, {joint.n_dofs} dofs, {joint.comm.size} rank{'s' * (joint.comm.size > 1)}"
+            f"{kind} joint, plane {self.scene.analysis.plane}, dR/R = {geometry.dR / geometry.radius:g}: "
+            f"{joint.n_cells} curved triangles, {joint.n_dofs} dofs, {ranks} rank{'s' if ranks > 1 else ''}"
         )
         self._print(text)
         if self._task is None:
@@ -107,7 +126,9 @@ class _Progress:
     def attempt(self, load: float, iterations: int) -> None:
         """Show a solve that ended."""
         if self._task is not None:
-            self._bar.update(self._task, description=f"delta/dR {load / self.scene.joint.dR:.4g}, {iterations} iterations")
+            self._bar.update(
+                self._task, description=f"delta/dR {load / self.scene.joint.dR:.4g}, {iterations} iterations"
+            )
 
     def step(self, m) -> None:
         """Show an accepted output step."""

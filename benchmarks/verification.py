@@ -1,8 +1,8 @@
 """What archord is checked against, as a table: ``python3 -m archord.benchmarks.verification``.
 
-References, for the quarter joint of the paper in plane strain (like bodies, nu = 0.3, dR/R = 0.5 %, block 100 R,
-delta = 2 dR), were computed with independent solvers, each refined until the digits stood: GetFEM 5.4 (Q2 elements of
-0.5 %R) with closest points on the deformed curves, NGSolve 6.2 (order 4) with fixed pairs, NGSolve for concentric circles.
+References, for the quarter joint of the paper in plane strain (like bodies, nu = 0.3, dR/R = 0.5 %, block 100 R, delta
+= 2 dR), were computed with independent solvers, each refined until the digits stood: GetFEM 5.4 (Q2 elements of 0.5 %R)
+with closest points on the deformed curves, NGSolve 6.2 (order 4) with fixed pairs, NGSolve for concentric circles.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ class _Row:
 
     def __str__(self) -> str:
         difference = abs(self.ours / self.reference - 1)
-        return f"| {self.what} | {self.reference:.7g} | {self.source} | {self.ours:.7g} | {difference:.1e} | {self.detail} |"
+        numbers = f"{self.reference:.7g} | {self.source} | {self.ours:.7g} | {difference:.1e}"
+        return f"| {self.what} | {numbers} | {self.detail} |"
 
 
 def _solve(element_size: float, steps: int, yield_stress: float = 0.0, **sections: dict) -> tuple[Outcome, str]:
@@ -84,12 +85,14 @@ def main() -> None:
     outcome, cost = _solve(0.006, 1, joint=small, load={"displacement": 0.006})
     m, radius = outcome.steps[-1], 3.0
     rows.append(_Row("small contact: p0/E*", math.sqrt(m.P / math.pi / radius), "Hertz", m.p0, cost))
-    rows.append(_Row("small contact: half-width/R", math.sqrt(4 * m.P * radius / math.pi), "Hertz", m.contact_area / 2, ""))
+    rows.append(
+        _Row("small contact: half-width/R", math.sqrt(4 * m.P * radius / math.pi), "Hertz", m.contact_area / 2, "")
+    )
     print("| what | reference | by | archord | relative difference | cost |\n|---|---|---|---|---|---|")
     print("\n".join(map(str, rows)))
     force, energy = _imbalances(outcomes)
-    print(f"\nForces at pin, contact and block differ by at most {force:.0e} of P in any step; work differs from stored and")
-    print(f"dissipated energy by at most {energy:.1e} of the work.")
+    print(f"\nForces at pin, contact and block differ by at most {force:.0e} of P in any step; work differs from")
+    print(f"stored and dissipated energy by at most {energy:.1e} of the work.")
 
 
 if __name__ == "__main__":

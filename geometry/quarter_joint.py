@@ -67,7 +67,8 @@ def quarter_joint(
         geo = gmsh.model.geo
         n_edges = max(2, math.ceil(math.pi / 2 / size))
         far = (-hole, 0.0, hole)
-        faces, curves = {}, {facet: [] for facet in Facets}
+        faces: dict[Cells, int] = {}
+        curves: dict[Facets, list[int]] = {facet: [] for facet in Facets}
         if not rigid_pin:
             centre, bottom, side = (geo.addPoint(x, y - (hole - 1), 0) for x, y in ((0, 0), (0, -1), (1, 0)))
             arc, top = geo.addCircleArc(bottom, centre, side), geo.addLine(side, centre)
@@ -88,9 +89,9 @@ def quarter_joint(
         geo.synchronize()
         for tag, face in faces.items():
             gmsh.model.addPhysicalGroup(2, [face], tag)
-        for tag, lines in curves.items():
+        for edge, lines in curves.items():
             if lines:
-                gmsh.model.addPhysicalGroup(1, lines, tag)
+                gmsh.model.addPhysicalGroup(1, lines, edge)
         field = gmsh.model.mesh.field.add("MathEval")
         gmsh.model.mesh.field.setString(field, "F", f"{size!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})")
         gmsh.model.mesh.field.setAsBackgroundMesh(field)

@@ -53,7 +53,9 @@ def _zone(figure, axes, folder: Path, scene, step: int) -> None:
         x, cells = file["mesh/coordinates"][:, :2] / R, file["mesh/cells"][()]
         x = x + file[f"displacement/{step_name(step)}"][:, :2] / R
         plastic = "peeq" in file
-        values = file[f"peeq/{step_name(step)}"][()] if plastic else file[f"von_mises/{step_name(step)}"][()] / scene.E_star
+        values = (
+            file[f"peeq/{step_name(step)}"][()] if plastic else file[f"von_mises/{step_name(step)}"][()] / scene.E_star
+        )
     near = (np.abs(x[cells[:, :3]]).max(axis=(1, 2))) < 3
     triangles = cells[near][:, _SUBTRIANGLES].reshape(-1, 3)
     shown = np.repeat(100 * values[near] if plastic else values[near], len(_SUBTRIANGLES))

@@ -6,8 +6,9 @@ tangent that changes; a joint without them compiles and stores none of it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import basix.ufl
 import numpy as np
@@ -21,13 +22,16 @@ from archord.geometry.basis import BULK_QUADRATURE_DEGREE, Array, bulk_quadratur
 from archord.materials.elasticity import Elastic, elastic_stress, elastic_tangent, mean_stress, von_mises
 from archord.solver.points import PlasticPoints, material_points
 
+if TYPE_CHECKING:
+    from archord.materials.j2 import J2Material
+
 
 @dataclass(frozen=True)
 class Body:
     """One body: its cell tag and its material (`Elastic` or `J2Material`)."""
 
     tag: int
-    material: object
+    material: Elastic | J2Material
 
     @property
     def plastic(self) -> bool:
@@ -49,7 +53,9 @@ def _voigt(u):
     return ufl.as_vector([e[0, 0], e[1, 1], 2 * e[0, 1]])
 
 
-def matrix(V: fem.FunctionSpace, forms: list[fem.Form], extra: tuple[np.ndarray, np.ndarray] | None = None) -> PETSc.Mat:
+def matrix(
+    V: fem.FunctionSpace, forms: list[fem.Form], extra: tuple[np.ndarray, np.ndarray] | None = None
+) -> PETSc.Mat:
     """An empty matrix with room for the bilinear ``forms`` of separate bodies and ``extra`` block (rows, columns).
 
     The extra slots are global block dofs in rows that this rank owns. What is not written before the first assembly is
@@ -128,7 +134,9 @@ class Bulk:
                 fem.Constant(V.mesh, float(value))
                 for value in elastic_tangent(m.E, m.nu, m.plane)[[0, 0, 2], [0, 1, 2]]
             )
-            dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": BULK_QUADRATURE_DEGREE})
+            dx = ufl.Measure(
+                "dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": BULK_QUADRATURE_DEGREE}
+            )
             eu, ev = _voigt(u), _voigt(v)
             sigma = ufl.as_vector([c11 * eu[0] + c12 * eu[1], c12 * eu[0] + c11 * eu[1], c33 * eu[2]])
             self._elastic_forms.append(fem.form(ufl.inner(sigma, ev) * dx(1)))
@@ -201,15 +209,12 @@ class Bulk:
     def energies(self, u: Array) -> tuple[float, float]:
         """Elastic energy and plastic dissipation of this rank's cells."""
         stored = dissipated = 0.0
-        for body in self.bodies:
-            if body.plastic:
-                data = self._plastic[body.tag]
-                w = data.weight.ravel()
-                stored += float(w @ body.material.elastic_energy(data.stress))
-                dissipated += float(w @ body.material.dissipation(data.points.trial.peeq))
-        if self.stiffness is not None:
-            for _, eps, w, sigma in self._elastic_points(u):
-                stored += 0.5 * float(np.einsum("p,pi,pi->", w, eps, sigma[:, [0, 1, 3]]))
+        for data in self._plastic.values():
+            w, points = data.weight.ravel(), data.points
+            stored += float(w @ points.material.elastic_energy(data.stress))
+            dissipated += float(w @ points.material.dissipation(points.trial.peeq))
+        for _, weight, eps, sigma in self._elastic_points(u):
+            stored += 0.5 * float(np.einsum("p,pi,pi->", weight.ravel(), eps, sigma[:, [0, 1, 3]]))
         return stored, dissipated
 
     def peeq(self) -> tuple[float, float]:
@@ -225,26 +230,28 @@ class Bulk:
         """Cell means of stress measures and PEEQ at ``u`` ``(n_nodes, 2)``."""
         n = self.V.mesh.topology.index_map(2).size_local
         mises, mean = np.zeros(n), np.zeros(n)
-        peeq = np.zeros(n) if self.plastic else None
+        peeq = np.zeros(n)
         for data in self._plastic.values():
-            w = data.weight / data.weight.sum(axis=1, keepdims=True)
-            shape = w.shape
-            mises[data.cells] = (w * von_mises(data.stress).reshape(shape)).sum(axis=1)
-            mean[data.cells] = (w * mean_stress(data.stress).reshape(shape)).sum(axis=1)
-            peeq[data.cells] = (w * data.points.trial.peeq.reshape(shape)).sum(axis=1)
-        for cells, _, weight, sigma in self._elastic_points(u):
-            w = weight.reshape(len(cells), len(weight) // max(len(cells), 1))
-            w = w / w.sum(axis=1, keepdims=True)
-            mises[cells] = (w * von_mises(sigma).reshape(w.shape)).sum(axis=1)
-            mean[cells] = (w * mean_stress(sigma).reshape(w.shape)).sum(axis=1)
-        return CellFields(mises, mean, peeq)
+            mises[data.cells] = _cell_mean(data.weight, von_mises(data.stress))
+            mean[data.cells] = _cell_mean(data.weight, mean_stress(data.stress))
+            peeq[data.cells] = _cell_mean(data.weight, data.points.trial.peeq)
+        for cells, weight, _, sigma in self._elastic_points(u):
+            mises[cells] = _cell_mean(weight, von_mises(sigma))
+            mean[cells] = _cell_mean(weight, mean_stress(sigma))
+        return CellFields(mises, mean, peeq if self.plastic else None)
 
-    def _elastic_points(self, u: Array):
+    def _elastic_points(self, u: Array) -> Iterator[tuple[np.ndarray, Array, Array, Array]]:
+        """Cells ``(n,)``, weights ``(n, q)``, strains ``(n q, 3)`` and stresses ``(n q, 4)`` of each elastic body."""
         X, w = bulk_quadrature()
         for body in self.bodies:
-            if body.plastic:
-                continue
-            cells, m = self.cells[body.tag], body.material
-            basis = cell_basis(self.V.mesh, self.V.element.basix_element.degree, cells, X)
-            eps = strain(basis.gradient, u[self.V.dofmap.list[cells]]).reshape(-1, 3)
-            yield cells, eps, (basis.measure * w).ravel(), elastic_stress(eps, m.E, m.nu, m.plane)
+            m = body.material
+            if isinstance(m, Elastic):
+                cells = self.cells[body.tag]
+                basis = cell_basis(self.V.mesh, self.V.element.basix_element.degree, cells, X)
+                eps = strain(basis.gradient, u[self.V.dofmap.list[cells]]).reshape(-1, 3)
+                yield cells, basis.measure * w, eps, elastic_stress(eps, m.E, m.nu, m.plane)
+
+
+def _cell_mean(weight: Array, values: Array) -> Array:
+    """Mean over each cell ``(n,)`` of values at its points ``(n q,)`` with ``weight`` ``(n, q)``."""
+    return (weight * values.reshape(weight.shape)).sum(axis=1) / weight.sum(axis=1)

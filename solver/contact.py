@@ -1,16 +1,17 @@
 """Nitsche contact between two curves that may not match (Chouly, Hild and Renard 2015; theta = 0).
 
-At a point ``x`` of a side, with closest point ``y`` on the opposite curve, ``n`` the opposite's outward normal there and
-``g = (x - y) . n`` the gap, the contact pressure is ``p = [t . n - gamma g]_+`` with ``t = sigma(u) N`` the traction of the
-own body, and the virtual work of the contact forces is ``sum over sides of share * integral of p n . (v(x) - v(y))``. The
-unbiased form gives like bodies one half each; of unlike bodies the softer takes more, in proportion to the compliances
-(Annavarapu, Hautefeuille and Dolbow 2012), or a stiff pin's ``gamma`` would swamp the other's. The one-sided form
-integrates one side only. ``gamma`` is ``gamma_factor`` times
-the share times the trace constant ``c`` of each contact cell, ``|sigma_n(v)|^2 <= c a(v, v)``. The form is coercive where
-``gamma > share c / 4``: Cauchy-Schwarz and ``c`` bound ``share * integral of sigma_n v_n`` by
-``sqrt(a(v, v)) * share sqrt(c) |v_n|``, which ``a(v, v) + share gamma |v_n|^2`` exceeds. Under current kinematics the closest points belong to the deformed curves and
-the linearisation includes the moving ``n`` and ``y``; under reference kinematics pairs are those of the undeformed
-curves, with the normal of the first side (the pin) for both, and the gap is linear in the displacement. A tied contact carries the full vector ``t - gamma ([[u]])`` whatever its sign.
+At a point ``x`` of a side, with closest point ``y`` on the opposite curve, ``n`` the opposite's outward normal there
+and ``g = (x - y) . n`` the gap, the contact pressure is ``p = [t . n - gamma g]_+`` with ``t = sigma(u) N`` the
+traction of the own body, and the virtual work of the contact forces is ``sum over sides of share * integral of p n .
+(v(x) - v(y))``. The unbiased form gives like bodies one half each; of unlike bodies the softer takes more, in
+proportion to the compliances (Annavarapu, Hautefeuille and Dolbow 2012), or a stiff pin's ``gamma`` would swamp the
+other's. The one-sided form integrates one side only. ``gamma`` is ``gamma_factor`` times the share times the trace
+constant ``c`` of each contact cell, ``|sigma_n(v)|^2 <= c a(v, v)``. The form is coercive where ``gamma > share c /
+4``: Cauchy-Schwarz and ``c`` bound ``share * integral of sigma_n v_n`` by ``sqrt(a(v, v)) * share sqrt(c) |v_n|``,
+which ``a(v, v) + share gamma |v_n|^2`` exceeds. Under current kinematics the closest points belong to the deformed
+curves and the linearisation includes the moving ``n`` and ``y``; under reference kinematics pairs are those of the
+undeformed curves, with the normal of the first side (the pin) for both, and the gap is linear in the displacement. A
+tied contact carries the full vector ``t - gamma ([[u]])`` whatever its sign.
 
 Opposite curves may lie on other ranks: their displacement is exchanged, forces on them are summed over the ranks, and
 their rows of the matrix travel with PETSc's assembly.
@@ -133,8 +134,8 @@ class Contact:
     def evaluate(self, u: Array) -> bool:
         """Gaps, pressures and trial history at the nodal displacements ``u`` ``(n, 2)`` of this rank.
 
-        Returns whether the matrix pattern had to grow (the pairs slid out of it). Collective; raises `ProjectionError` on
-        every rank if a point on any of them finds no partner.
+        Returns whether the matrix pattern had to grow (the pairs slid out of it). Collective; raises `ProjectionError`
+        on every rank if a point on any of them finds no partner.
         """
         motion = self._motions(u)
         failure = None
@@ -165,7 +166,8 @@ class Contact:
                 pair.gap = ((pair.separation + relative) * pair.fixed.normal).sum(1)
             s = stress.reshape(-1, 4)
             pair.traction = np.stack(
-                [s[:, 0] * outward[:, 0] + s[:, 3] * outward[:, 1], s[:, 3] * outward[:, 0] + s[:, 1] * outward[:, 1]], axis=1
+                [s[:, 0] * outward[:, 0] + s[:, 3] * outward[:, 1], s[:, 3] * outward[:, 0] + s[:, 1] * outward[:, 1]],
+                axis=1,
             )
             pair.tangent = tangent.reshape(-1, 3, 3)
             if self.kinematics == "tied":
@@ -203,7 +205,9 @@ class Contact:
         for pair in self.pairings:
             side, f = pair.side, self._forces(pair)
             n, q = side.weight.shape
-            trace_shape = np.take_along_axis(side.shape, np.broadcast_to(side.trace[:, None, :], (n, q, side.trace.shape[1])), axis=2)
+            trace_shape = np.take_along_axis(
+                side.shape, np.broadcast_to(side.trace[:, None, :], (n, q, side.trace.shape[1])), axis=2
+            )
             own = np.einsum("nqa,nqi->nai", trace_shape, f.reshape(n, q, 2))
             np.add.at(on_curve[id(side)], side.curve.connectivity[side.facet], -own)
             if isinstance(pair.opposite, ContactSide):
@@ -382,7 +386,9 @@ class Contact:
 def _stress_rows(C: Array, gradient: Array, N: Array) -> Array:
     """Derivative ``(m, 2, 2 a)`` of the traction ``sigma N`` with respect to the own cell's nodal displacements."""
     zero = np.zeros(len(N))
-    projector = np.stack([np.stack([N[:, 0], zero, N[:, 1]], axis=1), np.stack([zero, N[:, 1], N[:, 0]], axis=1)], axis=1)
+    projector = np.stack(
+        [np.stack([N[:, 0], zero, N[:, 1]], axis=1), np.stack([zero, N[:, 1], N[:, 0]], axis=1)], axis=1
+    )
     PC = projector @ C  # (m, 2, 3)
     gx, gy = gradient[..., 0], gradient[..., 1]
     x = PC[:, :, 0, None] * gx[:, None] + PC[:, :, 2, None] * gy[:, None]

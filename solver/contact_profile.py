@@ -83,8 +83,8 @@ def project(pressure: Array, s: Array, weight: Array) -> Array:
 def semi_angle(profile: ArcProfile) -> float:
     """Contact semi-angle ``eps`` in radians.
 
-    Near its edge an elastic contact pressure is ``C sqrt(eps - phi)``, so the force beyond an angle, to the power 2/3, is
-    linear in the angle; it is extrapolated to zero from the last facets in contact.
+    Near its edge an elastic contact pressure is ``C sqrt(eps - phi)``, so the force beyond an angle, to the power 2/3,
+    is linear in the angle; it is extrapolated to zero from the last facets in contact.
     """
     force = profile.facet_force
     last = int(np.flatnonzero(force > 0).max(initial=-1))

@@ -20,9 +20,9 @@ class ContactSide:
     """Facets tagged ``tag`` of the body with ``material`` in the displacement space ``V``.
 
     Arrays of this rank's ``n`` facets with ``q`` points: ``weight`` ``(n, q)`` (measure of the curved edge), ``point``
-    and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own cell's basis, ``shape`` ``(n, q, a)``, ``gamma``
-    ``(n,)``. ``facet`` ``(n,)`` numbers them along the curve; ``curve_cell_dofs`` holds the global cell dofs of every
-    facet of the curve, on every rank.
+    and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own cell's basis, ``shape`` ``(n, q, a)``,
+    ``gamma`` ``(n,)``. ``facet`` ``(n,)`` numbers them along the curve; ``curve_cell_dofs`` holds the global cell dofs
+    of every facet of the curve, on every rank.
     """
 
     def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material) -> None:
@@ -112,7 +112,8 @@ class ContactSide:
         return w, out
 
     def _trace_inequality(self) -> Array:
-        """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over the facet <= gamma a(v, v) over its cell`` for all ``v``.
+        """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over the facet <= gamma a(v, v) over its cell`` for all
+        ``v``.
 
         Warburton and Hesthaven (2003) give the constant for polynomials; here the generalised eigenvalue problem of
         each contact cell is solved, with its curved geometry and its elastic moduli. Unit: stress / length.
@@ -189,7 +190,8 @@ def _chain(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     first = sorted(set(by_start) - {int(e) for e in end}) or [min(by_start)]
     if len(first) != 1:
         raise ValueError(f"a contact edge must be one connected curve, this one has {len(first)} pieces")
-    order, at = [], by_start.get(first[0])
+    order: list[int] = []
+    at = by_start.get(first[0])
     while at is not None and len(order) < len(start):
         order.append(at)
         at = by_start.get(int(end[at]))

@@ -51,7 +51,8 @@ class Newton:
 
 
 class Equilibrium:
-    """Equilibrium of ``bulk`` and, if given, ``contact`` under ``supports``; ``rigid_rate`` moves a rigid pin with the load."""
+    """Equilibrium of ``bulk`` and, if given, ``contact`` under ``supports``; ``rigid_rate`` moves a rigid pin with the
+    load."""
 
     def __init__(
         self,
@@ -87,6 +88,7 @@ class Equilibrium:
         self._reaction = np.zeros((self.n_owned, 2))
         self._reaction_norm = 0.0
         self._make_matrix()
+        self._raised: BaseException | None = None
         self._snes = self._make_snes()
         self._failure = ""
 
@@ -104,9 +106,10 @@ class Equilibrium:
         # zeros into every slot first: what is not written before the first assembly is given back
         assemble(A, self.bulk.pattern_forms(), self._bcs)
         if slots is not None:
-            I, J = _csr(slots[0] - start, slots[1], n)
+            offsets, columns = _csr(slots[0] - start, slots[1], n)
             rowmap = np.arange(start, start + n, dtype=PETSc.IntType)
-            A.setValuesBlockedIJV(I, J, np.zeros(4 * len(J)), PETSc.InsertMode.ADD, rowmap)
+            zeros = np.zeros(4 * len(columns))
+            A.setValuesBlockedIJV(offsets, columns, zeros, PETSc.InsertMode.ADD, rowmap)
         A.assemble()
         A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
         A.zeroEntries()
@@ -133,19 +136,20 @@ class Equilibrium:
             self.bulk.assemble_plastic(A, self._bcs)
         with self.timer("assemble contact"):
             if self.contact is not None:
-                self._add_contact(A)
+                self._add_entries(A, *self.contact.tangent())
             A.assemble()
 
-    def _add_contact(self, A: PETSc.Mat) -> None:
-        rows, columns, values = self.contact.tangent()
+    def _add_entries(self, A: PETSc.Mat, rows: np.ndarray, columns: np.ndarray, values: Array) -> None:
+        """Add entries in global scalar dofs to ``A``, without those of prescribed displacements."""
         keep = ~(np.isin(rows, self._global_fixed) | np.isin(columns, self._global_fixed))
         rows, columns, values = rows[keep], columns[keep], values[keep]
         size = 2 * self.V.dofmap.index_map.size_global
         key, slot = np.unique(rows * size + columns, return_inverse=True)
         summed = np.bincount(slot, weights=values, minlength=len(key))
         row, start = np.unique(key // size, return_index=True)
-        I, J = np.append(start, len(key)), key % size
-        A.setValuesIJV(*(v.astype(PETSc.IntType) for v in (I, J)), summed, PETSc.InsertMode.ADD, row.astype(PETSc.IntType))
+        csr = (np.append(start, len(key)), key % size, row)
+        offsets, column, rowmap = (index.astype(PETSc.IntType) for index in csr)
+        A.setValuesIJV(offsets, column, summed, PETSc.InsertMode.ADD, rowmap)
 
     # ------------------------------------------------------------------ residual
 
@@ -255,7 +259,8 @@ class Equilibrium:
         return PETSc.SNES.ConvergedReason.ITERATING
 
     def solve(self, load: float, guess: Array, *, elastic_first: bool = False) -> Newton:
-        """Solve at ``load`` from the nodal displacements ``guess`` ``(n_local, 2)``, whose prescribed values are replaced.
+        """Solve at ``load`` from the nodal displacements ``guess`` ``(n_local, 2)``, whose prescribed values are
+        replaced.
 
         ``elastic_first`` finds the equilibrium of points that cannot yield (further) before the one asked for; if that
         fails, the solve starts from the guess.
@@ -285,7 +290,7 @@ class Equilibrium:
         self._x.array[:] = x[: self.n_owned].ravel()
         if self.contact is not None:
             self.contact.search()
-        self._raised: BaseException | None = None
+        self._raised = None
         with self.timer("solve"):
             try:
                 self._snes.solve(None, self._x)
@@ -333,8 +338,8 @@ def _scalar_bcs(V: fem.FunctionSpace, fixed: np.ndarray) -> list[fem.DirichletBC
 
 def _csr(rows: np.ndarray, columns: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     order = np.lexsort((columns, rows))
-    I = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
-    return I.astype(PETSc.IntType), columns[order].astype(PETSc.IntType)
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
+    return offsets.astype(PETSc.IntType), columns[order].astype(PETSc.IntType)
 
 
 _R = PETSc.SNES.ConvergedReason

@@ -26,13 +26,14 @@ class _Gather:
     def __init__(self, comm: MPI.Comm, index: np.ndarray) -> None:
         self.comm = comm
         parts = comm.gather(index)
-        if comm.rank == 0:
+        if parts is not None:
             self.unique, self._slot = np.unique(np.concatenate(parts), return_inverse=True)
 
-    def __call__(self, values: np.ndarray) -> np.ndarray | None:
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """The values of all ranks on rank 0, nothing elsewhere."""
         parts = self.comm.gather(values)
-        if self.comm.rank != 0:
-            return None
+        if parts is None:
+            return np.zeros(0)
         whole = np.concatenate(parts)
         ordered = np.empty((len(self.unique), *whole.shape[1:]), dtype=whole.dtype)
         ordered[self._slot] = whole
@@ -67,7 +68,7 @@ class FieldWriter:
             self._loads: list[float] = []
             cells = np.searchsorted(self._nodes.unique, cells)[:, _VTK_ORDER]
             self._shape = len(coordinates), len(cells)
-            shapes = {name: ((len(cells),), "f8") for name in self.names}
+            shapes: dict[str, tuple[tuple[int, ...], str]] = {name: ((len(cells),), "f8") for name in self.names}
             shapes["displacement"] = ((len(coordinates), 3), "f8")
             fixed = {"mesh/coordinates": coordinates, "mesh/cells": cells, "mesh/body": body_of}
             self._file = StepFile(folder / "fields.h5", steps, shapes, fixed)
@@ -82,7 +83,7 @@ class FieldWriter:
         if means.peeq is not None:
             values["peeq"] = means.peeq
         values["contact_state"], values["contact_pressure"] = self._contact_on_cells()
-        arrays = {name: self._cells(values[name]) for name in self.names}
+        arrays = {name: self._cells(np.asarray(values[name])) for name in self.names}
         nodal = self._nodes(u[self._dof])
         if joint.comm.rank == 0:
             arrays["displacement"] = np.pad(nodal, ((0, 0), (0, 1)))
@@ -120,17 +121,20 @@ class FieldWriter:
         return (
             f'<Grid Name="{escape(f"step {step}")}" GridType="Uniform">\n<Time Value="{load!r}"/>\n'
             f'<Topology TopologyType="Triangle_6" NumberOfElements="{n_cells}">'
-            f'{_data(f"{n_cells} 6", "mesh/cells", "Int", 8)}</Topology>\n'
+            f"{_data(f'{n_cells} 6', 'mesh/cells', 'Int', 8)}</Topology>\n"
             f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", "mesh/coordinates")}</Geometry>\n'
             + _attribute("displacement", "Vector", "Node", f"{n_nodes} 3", f"displacement/{at}")
             + cell
-            + f'<Attribute Name="body" AttributeType="Scalar" Center="Cell">{_data(f"{n_cells}", "mesh/body", "Char", 1)}'
-            "</Attribute>\n</Grid>\n"
+            + _attribute("body", "Scalar", "Cell", f"{n_cells}", "mesh/body", "Char", 1)
+            + "</Grid>\n"
         )
 
 
-def _attribute(name: str, kind: str, centre: str, dimensions: str, path: str) -> str:
-    return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{_data(dimensions, path)}</Attribute>\n'
+def _attribute(
+    name: str, rank: str, centre: str, dimensions: str, path: str, kind: str = "Float", precision: int = 8
+) -> str:
+    data = _data(dimensions, path, kind, precision)
+    return f'<Attribute Name="{name}" AttributeType="{rank}" Center="{centre}">{data}</Attribute>\n'
 
 
 def _data(dimensions: str, path: str, kind: str = "Float", precision: int = 8) -> str:

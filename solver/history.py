@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +13,13 @@ from archord.solver.scene import Scene
 @dataclass(frozen=True)
 class _Column:
     heading: str
-    value: Callable[[Measures], float | int]
+    attribute: str
+    divisor: float | int = 1
+
+    def of(self, m: Measures) -> str:
+        """The entry of a step; whole numbers stay whole."""
+        value = getattr(m, self.attribute)
+        return str(value) if isinstance(value, int) else f"{value / self.divisor:.12g}"
 
 
 def _columns(scene: Scene) -> list[_Column]:
@@ -36,11 +41,11 @@ def _columns(scene: Scene) -> list[_Column]:
         ("cutbacks", "", "", 1.0),
         ("seconds", "s", "", 1.0),
     ]
-    columns = [_Column("step", lambda m: m.step)]
+    columns = [_Column("step", "step")]
     for name, unit, dimensionless, divisor in table:
-        columns.append(_Column(f"{name} [{unit}]" if unit else name, lambda m, n=name: getattr(m, n)))
+        columns.append(_Column(f"{name} [{unit}]" if unit else name, name))
         if dimensionless:
-            columns.append(_Column(dimensionless, lambda m, n=name, d=divisor: getattr(m, n) / d))
+            columns.append(_Column(dimensionless, name, divisor))
     return columns
 
 
@@ -56,11 +61,7 @@ class History:
     def add(self, m: Measures) -> None:
         """Append one step."""
         with self.path.open("a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow([_digits(c.value(m)) for c in self._columns])
-
-
-def _digits(value: float | int) -> str:
-    return str(value) if isinstance(value, int) else f"{value:.12g}"
+            csv.writer(file).writerow([c.of(m) for c in self._columns])
 
 
 def read_history(path: str | Path) -> dict[str, list[float]]:

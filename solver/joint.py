@@ -91,7 +91,7 @@ class Joint:
         return u
 
     def forces(self) -> dict[str, float]:
-        """Downward force of the whole joint at the pin, at the contact and at the block's support, per unit thickness."""
+        """Downward force of the whole joint at pin, contact and block's support, per unit thickness."""
         contact = -2 * self.contact.resultant()[1]
         block = 2 * self.equilibrium.reaction("block")[1]
         pin = contact if self.scene.pin.rigid else -2 * self.equilibrium.reaction("pin")[1]

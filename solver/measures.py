@@ -16,10 +16,10 @@ from archord.solver.stepping import Step
 class Measures:
     """One accepted output step of the whole joint (both symmetric halves), per unit thickness, in the scene's units.
 
-    ``contact_area`` is the arc length in contact, the mean of both sides; ``peeq_max`` the largest value at a quadrature
-    point, which grows without bound under mesh refinement where perfect plasticity localises. ``work`` is the integral of
-    ``P`` over ``delta`` by the trapezoidal rule. ``force_balance`` is the largest difference between the forces at pin,
-    contact and block, over ``P``.
+    ``contact_area`` is the arc length in contact, the mean of both sides; ``peeq_max`` the largest value at a
+    quadrature point, which grows without bound under mesh refinement where perfect plasticity localises. ``work`` is
+    the integral of ``P`` over ``delta`` by the trapezoidal rule. ``force_balance`` is the largest difference between
+    the forces at pin, contact and block, over ``P``.
     """
 
     step: int
@@ -61,7 +61,9 @@ def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
     return {name: p for name, p in profiles.items() if p is not None}
 
 
-def measure(joint: Joint, number: int, step: Step, profiles: dict[str, ArcProfile], work: Work, seconds: float) -> Measures:
+def measure(
+    joint: Joint, number: int, step: Step, profiles: dict[str, ArcProfile], work: Work, seconds: float
+) -> Measures:
     """Sum up the last accepted state of ``joint``. Collective."""
     comm, arcs = joint.comm, list(profiles.values())
     u = joint.equilibrium.displacement()

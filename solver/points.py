@@ -46,7 +46,8 @@ class PlasticPoints:
         self.elastic_only = False
 
     def update(self, strain: Array) -> tuple[Array, Array]:
-        """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the committed history."""
+        """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the committed
+        history."""
         material = self._unyielding if self.elastic_only else self.material
         stress, tangent, self.trial = material.return_map(strain, self.state)
         return stress, tangent

@@ -11,12 +11,15 @@ FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", 
 
 
 def claim_folder(folder: Path, force: bool) -> None:
-    """Make ``folder`` ready for a run. Raises `SceneError` if it cannot be, or holds something already without ``force``."""
+    """Make ``folder`` ready for a run. Raises `SceneError` if it cannot be, or holds something already without
+    ``force``."""
     try:
         if folder.exists() and not folder.is_dir():
             raise SceneError(f"{folder}: is a file, not a run folder.")
         if folder.exists() and any(folder.iterdir()) and not force:
-            raise SceneError(f"{folder}: already holds results; choose another folder with -o, or overwrite with --force.")
+            raise SceneError(
+                f"{folder}: already holds results; choose another folder with -o, or overwrite with --force."
+            )
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):
             raise SceneError(f"{folder}: cannot be used as run folder: Permission denied.")

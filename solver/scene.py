@@ -26,7 +26,7 @@ Positive = Annotated[float, Field(gt=0)]
 
 def _key(description: str, unit: str = "", *, default: Any = ..., example: Any = None, **limits: Any) -> Any:
     """A documented key: its unit is the scene's unit of that kind, `example` is what ``--example`` shows."""
-    extra = {"unit": unit} if unit else {}
+    extra: Any = {"unit": unit} if unit else {}
     example = default if example is None else example
     return Field(default, description=description, examples=[example], json_schema_extra=extra, **limits)
 
@@ -44,7 +44,9 @@ class Units(_Section):
     @property
     def force(self) -> str:
         """Unit of force per unit thickness."""
-        return {("mm", "MPa"): "N/mm", ("m", "Pa"): "N/m"}.get((self.length, self.stress), f"{self.stress} {self.length}")
+        return {("mm", "MPa"): "N/mm", ("m", "Pa"): "N/m"}.get(
+            (self.length, self.stress), f"{self.stress} {self.length}"
+        )
 
     @property
     def energy(self) -> str:
@@ -99,7 +101,9 @@ class JointGeometry(_Section):
 
 class _Strength(_Section):
     yield_stress: Positive | None = _key("yield stress; elastic if absent", "stress", default=None, example=300.0)
-    hardening: float = _key("hardening modulus d(yield stress)/d(PEEQ); 0: perfect plasticity", "stress", default=0.0, ge=0)
+    hardening: float = _key(
+        "hardening modulus d(yield stress)/d(PEEQ); 0: perfect plasticity", "stress", default=0.0, ge=0
+    )
 
     @model_validator(mode="after")
     def _plasticity(self):
@@ -158,7 +162,10 @@ class Analysis(_Section):
         "whose contact edge carries the integral: both halves (unbiased), or one side's alone", default="both"
     )
     gamma_factor: float = _key(
-        "Nitsche's gamma over the trace constant of each contact cell; coercive above 0.25", default=0.5, gt=0.25, le=1000
+        "Nitsche's gamma over the trace constant of each contact cell; coercive above 0.25",
+        default=0.5,
+        gt=0.25,
+        le=1000,
     )
     tolerance: float = _key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
     max_iterations: int = _key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
@@ -167,7 +174,9 @@ class Analysis(_Section):
 class Load(_Section):
     """The displacement of the pin, from first touch, in equal output steps."""
 
-    displacement: Positive | None = _key("largest displacement delta of the pin, in clearances dR", default=None, example=2.0)
+    displacement: Positive | None = _key(
+        "largest displacement delta of the pin, in clearances dR", default=None, example=2.0
+    )
     displacement_absolute: Positive | None = _key(
         "largest displacement delta of the pin, instead of displacement", "length", default=None
     )
@@ -243,7 +252,8 @@ def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) ->
 
 
 def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, str] | None = None) -> Scene:
-    """Check scene ``data`` as read from ``source``; ``origin`` names another source of some keys. Raises `SceneError`."""
+    """Check scene ``data`` as read from ``source``; ``origin`` names another source of some keys. Raises
+    `SceneError`."""
     try:
         return Scene.model_validate(data)
     except ValidationError as error:
@@ -252,7 +262,8 @@ def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, s
 
 
 def _override(data: dict[str, Any], override: str) -> str:
-    """Set one ``a.b=value`` in ``data`` (value: TOML, a number, else text; nothing: drop it); returns the dotted key."""
+    """Set one ``a.b=value`` in ``data`` (value: TOML, a number, else text; nothing: drop it); returns the dotted
+    key."""
     key, sign, text = override.partition("=")
     key = key.strip()
     section, dot, name = key.partition(".")
@@ -383,7 +394,12 @@ def example() -> str:
 
 def reference() -> str:
     """All sections and keys as Markdown tables."""
-    lines = ["# Scene reference", "", "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.", ""]
+    lines = [
+        "# Scene reference",
+        "",
+        "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.",
+        "",
+    ]
     for section, info, keys in _sections():
         lines += [f"## [{section}]", "", f"{info.description[0].upper()}{info.description[1:]}.", ""]
         lines += ["| key | unit | default | allowed | what |", "|---|---|---|---|---|"]

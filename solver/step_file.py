@@ -15,7 +15,9 @@ import numpy as np
 class StepFile:
     """An HDF5 file with room for ``steps`` steps of the named arrays, as ``name/0001`` and so on."""
 
-    def __init__(self, path: Path, steps: int, shapes: dict[str, tuple[tuple[int, ...], str]], fixed: dict[str, np.ndarray]):
+    def __init__(
+        self, path: Path, steps: int, shapes: dict[str, tuple[tuple[int, ...], str]], fixed: dict[str, np.ndarray]
+    ):
         self.path, self.steps = path, steps
         with h5py.File(path, "w") as file:
             for name, values in fixed.items():

@@ -39,9 +39,10 @@ def march(
     """Solve at the increasing loads ``targets`` and, where a step fails, at loads between them.
 
     The guess for a step extrapolates the last increment; the first step starts from ``first_guess(load)``, and from the
-    elastic solution there if any point would yield. A step that fails is halved, at most ``max_cutbacks`` times below an
-    output step; two accepted steps in a row double it again. ``substep_done(load)`` follows every accepted step with
-    its history still to be committed, ``target_done`` every output target, ``attempted(load, iterations)`` every solve. Raises `StepFailure`.
+    elastic solution there if any point would yield. A step that fails is halved, at most ``max_cutbacks`` times below
+    an output step; two accepted steps in a row double it again. ``substep_done(load)`` follows every accepted step with
+    its history still to be committed, ``target_done`` every output target, ``attempted(load, iterations)`` every solve.
+    Raises `StepFailure`.
     """
     load, u = 0.0, equilibrium.displacement()
     increment, length = None, 0.0
@@ -87,6 +88,6 @@ def _why(result: Newton, load: float, cutbacks: int, step: float) -> str:
     last = f"{result.residuals[-1]:.1e}" if result.residuals else "none"
     tried = f"the step was cut {cutbacks} times, to {step:.3g}" if cutbacks else "no smaller step is allowed"
     return (
-        f"no equilibrium at delta = {load:.6g}: {result.reason}; after {result.iterations} iterations the residual over "
-        f"reaction was {last}{where}; {tried}"
+        f"no equilibrium at delta = {load:.6g}: {result.reason}; after {result.iterations} iterations the residual "
+        f"over reaction was {last}{where}; {tried}"
     )

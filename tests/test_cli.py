@@ -81,9 +81,21 @@ def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
 @pytest.mark.parametrize(("kill", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
 def test_a_killed_run_leaves_its_steps_readable(tmp_path, kill, code):
     """Whatever step is on disk when the process dies can be read; Ctrl-C says so in one line."""
-    command = [sys.executable, "-m", "archord", "solve", SCENE, "--set", "joint.relative_element_size=0.02", "-o", "run"]
+    command = [
+        sys.executable,
+        "-m",
+        "archord",
+        "solve",
+        SCENE,
+        "--set",
+        "joint.relative_element_size=0.02",
+        "-o",
+        "run",
+    ]
     history = tmp_path / "run" / "history.csv"
-    with subprocess.Popen(command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+    with subprocess.Popen(
+        command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    ) as process:
         deadline = time.monotonic() + 120
         while time.monotonic() < deadline and not (history.exists() and len(history.read_text().splitlines()) > 3):
             time.sleep(0.02)

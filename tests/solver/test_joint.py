@@ -75,7 +75,8 @@ def test_forces_balance(variant):
 
 
 def test_a_projected_pressure_has_no_more_than_its_force():
-    """The vertical integral of both sides' pressure is P: within O(dR/R), as the arcs' normals are the undeformed ones."""
+    """The vertical integral of both sides' pressure is P: within O(dR/R), as the arcs' normals are the undeformed
+    ones."""
     solution = solve(scene())
     for p in solution.profiles[-1].values():
         assert 2 * (p.pressure * p.weight * np.cos(p.angle)).sum() == pytest.approx(solution.steps[-1].P, rel=1e-2)
@@ -183,5 +184,14 @@ def test_results_do_not_depend_on_the_ranks(cut, variant):
     assert together.joint.n_dofs == alone.joint.n_dofs
     for a, b in zip(together.steps, alone.steps, strict=True):
         assert (a.iterations, a.cutbacks) == (b.iterations, b.cutbacks)
-        for name in ("P", "p0", "eps", "contact_area", "peeq_max", "peeq_integral", "elastic_energy", "plastic_dissipation"):
+        for name in (
+            "P",
+            "p0",
+            "eps",
+            "contact_area",
+            "peeq_max",
+            "peeq_integral",
+            "elastic_energy",
+            "plastic_dissipation",
+        ):
             assert getattr(a, name) == pytest.approx(getattr(b, name), rel=1e-9), name

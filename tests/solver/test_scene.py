@@ -69,7 +69,12 @@ def test_files_that_are_no_scenes(tmp_path):
     bad.write_text("[joint\n")
     binary = tmp_path / "binary.toml"
     binary.write_bytes(b"\xff\xfe\x00")
-    for path, said in ((bad, "is not valid TOML"), (binary, "UTF-8"), (tmp_path, "cannot be read"), ("nope", "cannot be read")):
+    for path, said in (
+        (bad, "is not valid TOML"),
+        (binary, "UTF-8"),
+        (tmp_path, "cannot be read"),
+        ("nope", "cannot be read"),
+    ):
         with pytest.raises(SceneError, match=said) as caught:
             load_scene(path)
         assert str(caught.value).startswith(str(path))
@@ -93,11 +98,21 @@ def test_overrides_replace_values_and_alternatives(tmp_path):
 
 def test_the_resolved_scene_is_the_same_scene():
     """What a run folder keeps solves to the same numbers."""
-    for change in ({}, {"pin": {"rigid": True}}, {"block": {"E": 1.0, "nu": 0.2, "yield_stress": 0.01, "hardening": 0.1}}):
+    for change in (
+        {},
+        {"pin": {"rigid": True}},
+        {"block": {"E": 1.0, "nu": 0.2, "yield_stress": 0.01, "hardening": 0.1}},
+    ):
         scene = parse_scene(basic() | change)
         again = parse_scene(tomllib.loads(resolved(scene)))
         for a, b in ((scene, again),):
-            assert (a.joint.dR, a.joint.h, a.joint.W, a.delta, a.E_star) == (b.joint.dR, b.joint.h, b.joint.W, b.delta, b.E_star)
+            assert (a.joint.dR, a.joint.h, a.joint.W, a.delta, a.E_star) == (
+                b.joint.dR,
+                b.joint.h,
+                b.joint.W,
+                b.delta,
+                b.E_star,
+            )
             assert (a.pin.solid, a.block, a.analysis, a.load) == (b.pin.solid, b.block, b.analysis, b.load)
 
 

@@ -1,0 +1,150 @@
+"""run.json: how a run was made and what it cost; rewritten after every step."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import sys
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.solver.contact_profile import ArcProfile
+from archord.solver.joint import Joint
+from archord.solver.measures import Measures
+from archord.solver.stepping import Step
+
+_INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact")
+_ARC_FULL = 0.99  # share of the arc's end facet in contact from which the modelled arc is too short
+_FEW_FACETS = 5
+
+
+class Report:
+    """The content of run.json for ``joint``; ``begun`` is the ``perf_counter`` from which the seconds count."""
+
+    def __init__(self, path: Path, joint: Joint, begun: float) -> None:
+        self.path, self.joint, self.begun = path, joint, begun
+        self.measures: list[Measures] = []
+        self.content: dict[str, Any] = {
+            "status": "running",
+            "message": "",
+            "started": datetime.now(UTC).isoformat(timespec="seconds"),
+            "command": sys.argv,
+            "versions": _versions(),
+            "ranks": joint.comm.size,
+            "mesh": _mesh(joint),
+            "model": _model(joint),
+            "tolerances": {
+                "newton": joint.equilibrium.tolerance,
+                "gamma_factor": joint.scene.analysis.gamma_factor,
+            },
+            "warnings": [],
+            "steps": [],
+        }
+
+    def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
+        """Note an accepted output step."""
+        self.measures.append(m)
+        self.content["warnings"] += _warnings(self.joint, profiles, m)
+        self.content["steps"].append(asdict(m) | {"substeps": step.substeps, "residuals": step.residuals})
+        self.write()
+
+    def finish(self, status: str, message: str) -> None:
+        """Note how the run ended."""
+        self.content |= {"status": status, "message": message}
+        self.write()
+
+    def write(self) -> None:
+        """Replace run.json in one move, so that a reader never sees half of it."""
+        self.content |= {"totals": self._totals(), "seconds": self._seconds(), "error_estimates": self._errors()}
+        new = self.path.with_suffix(".json.new")
+        new.write_text(json.dumps(self.content, indent=1) + "\n", encoding="utf-8")
+        os.replace(new, self.path)
+
+    def _totals(self) -> dict[str, int]:
+        counts = self.joint.timer.counts
+        return {
+            "newton_iterations": sum(m.iterations for m in self.measures),
+            "cutbacks": sum(m.cutbacks for m in self.measures),
+            "factorisations": counts.get("assemble bulk", 0),
+            "residual_evaluations": counts.get("return mapping", 0),
+            "accepted_steps": len(self.measures),
+        }
+
+    def _seconds(self) -> dict[str, float]:
+        s = dict(self.joint.timer.seconds)
+        if "solve" in s:
+            s["linear solve"] = s.pop("solve") - sum(s.get(name, 0.0) for name in _INSIDE_SOLVE)
+        s["total"] = perf_counter() - self.begun
+        return {name: round(value, 4) for name, value in s.items()}
+
+    def _errors(self) -> dict[str, float]:
+        if not self.measures:
+            return {}
+        m = self.measures[-1]
+        return {
+            "force_balance": max(m.force_balance for m in self.measures),
+            "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / m.work if m.work else math.nan,
+            "newton_residual": max(s["residuals"][-1][-1] for s in self.content["steps"]),
+        }
+
+
+def _versions() -> dict[str, str]:
+    import dolfinx
+    from petsc4py import PETSc
+
+    import archord
+
+    return {
+        "archord": archord.__version__,
+        "dolfinx": dolfinx.__version__,
+        "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
+        "mpi": MPI.Get_library_version().split(",")[0].strip(),
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+    }
+
+
+def _mesh(joint: Joint) -> dict[str, Any]:
+    lengths = {name: np.diff(s.curve.arc_length(np.array([0.0, 1.0])))[:, 0] for name, s in joint.sides.items()}
+    return {
+        "cells": joint.n_cells,
+        "dofs": joint.n_dofs,
+        "contact_facets": {name: len(length) for name, length in lengths.items()},
+        "element_size_on_arc": {name: [float(length.min()), float(length.max())] for name, length in lengths.items()},
+        "growth": joint.scene.joint.growth,
+        "block_size": joint.scene.joint.W,
+    }
+
+
+def _model(joint: Joint) -> dict[str, Any]:
+    scene = joint.scene
+    return {
+        "E_star": scene.E_star,
+        "clearance": scene.joint.dR,
+        "delta": scene.delta,
+        "plastic": joint.bulk.plastic,
+        "pin": "rigid" if scene.pin.rigid else "deformable",
+        "contact_shares": [pair.share for pair in joint.contact.pairings],
+    }
+
+
+def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures) -> list[str]:
+    said = []
+    if any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
+        said.append("the contact reaches the end of the modelled quarter arc")
+    touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
+    if touching < _FEW_FACETS:
+        said.append(f"only {touching} facets in contact; a smaller element_size would resolve it")
+    if m.delta > 0.1 * joint.scene.joint.radius:
+        said.append("delta exceeds 0.1 R, too much for small-strain theory")
+    if m.force_balance > 1e-8:
+        said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")
+    return [f"step {m.step}: {text}" for text in said]
