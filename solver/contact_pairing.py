@@ -1,0 +1,116 @@
+"""One integrated side of a contact against its opposite: pairs, gaps and pressures at its points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from archord.geometry.curve import Array, Curve, Projection, RigidCircle
+from archord.solver.contact_side import ContactSide
+
+Kinematics = Literal["current", "reference", "tied"]
+
+
+@dataclass
+class Pairing:
+    """The points of ``side`` (``m`` on this rank) against ``opposite``; arrays hold the last evaluated displacement.
+
+    ``share`` of the contact's virtual work is integrated here, with ``gamma`` ``(m,)``. Under reference and tied
+    kinematics the pairs stay those of the undeformed curves.
+    """
+
+    side: ContactSide
+    opposite: ContactSide | RigidCircle
+    share: float
+    gamma: Array
+    kinematics: Kinematics
+    projection: Projection = field(init=False)
+    separation: Array = field(init=False)  # x - y (m, 2)
+    gap: Array = field(init=False)  # (m,)
+    traction: Array = field(init=False)  # (m, 2) of the own body; tied: with the penalty of the jump
+    pressure: Array = field(init=False)  # (m,)
+    tangent: Array = field(init=False)  # (m, 3, 3) of the material
+    _search: bool = field(init=False, default=True)
+
+    def __post_init__(self) -> None:
+        """Pair the undeformed curves. Raises `ProjectionError`."""
+        x, outward = self.side.point.reshape(-1, 2), self.side.outward.reshape(-1, 2)
+        self.projection = self.curve.closest_point(x, outward, self.opposite_motion(None))
+        self.separation = x - self.projection.point
+
+    @property
+    def curve(self) -> Curve | RigidCircle:
+        """The opposite as a curve."""
+        return self.opposite.curve if isinstance(self.opposite, ContactSide) else self.opposite
+
+    def opposite_motion(self, u: Array | None, rigid_motion: Array | None = None) -> Array:
+        """Displacement of the opposite's nodes, or of the rigid disc ``(2,)``; at rest without ``u``. Collective."""
+        if isinstance(self.opposite, ContactSide):
+            return np.zeros_like(self.opposite.curve.X) if u is None else self.opposite.curve_displacement(u)
+        return np.zeros(2) if rigid_motion is None else rigid_motion
+
+    def search(self) -> None:
+        """Forget where the pairs were: the next evaluation searches them anew, over the whole curve."""
+        self._search = True
+
+    def evaluate(self, u: Array, motion: Array) -> None:
+        """Pairs, gaps, pressures and trial history at ``u`` ``(n, 2)``, with the opposite moved by ``motion``.
+
+        Raises `ProjectionError`.
+        """
+        side, outward = self.side, self.side.outward.reshape(-1, 2)
+        displacement, stress, tangent = (values.reshape(-1, *values.shape[2:]) for values in side.deform(u))
+        self.tangent = tangent
+        traction = np.stack(
+            [
+                stress[:, 0] * outward[:, 0] + stress[:, 3] * outward[:, 1],
+                stress[:, 3] * outward[:, 0] + stress[:, 1] * outward[:, 1],
+            ],
+            axis=1,
+        )
+        if self.kinematics == "current":
+            self._pair_anew(side.point.reshape(-1, 2) + displacement, outward, motion)
+            opening = self.separation
+        else:
+            jump = displacement - self._opposite_displacement(motion)
+            opening = self.separation + jump
+            if self.kinematics == "tied":
+                traction = traction - self.gamma[:, None] * jump
+        normal = self.projection.normal
+        self.traction = traction
+        self.gap = (opening * normal).sum(1)
+        normal_traction = (traction * normal).sum(1)
+        if self.kinematics == "tied":
+            self.pressure = normal_traction
+        else:
+            trial = normal_traction - self.gamma * self.gap
+            self.pressure = np.where(self.projection.found & (trial > 0), trial, 0.0)
+
+    def _pair_anew(self, x: Array, outward: Array, motion: Array) -> None:
+        if isinstance(self.curve, Curve):
+            start = None if self._search else self.projection.facet
+            self.projection = self.curve.closest_point(x, outward, motion, start)
+        else:
+            self.projection = self.curve.closest_point(x, outward, motion)
+        self._search = False
+        self.separation = x - self.projection.point
+
+    def _opposite_displacement(self, motion: Array) -> Array:
+        if isinstance(self.opposite, RigidCircle):
+            return motion
+        return np.einsum("ma,mai->mi", self.projection.shape, motion[self.projection.nodes])
+
+    @property
+    def active(self) -> np.ndarray:
+        """Points ``(m,)`` that carry a contact force."""
+        return self.projection.found if self.kinematics == "tied" else self.pressure > 0
+
+    @property
+    def forces(self) -> Array:
+        """Weighted contact force ``(m, 2)`` of each point on its own body."""
+        w = self.share * self.side.weight.ravel()
+        if self.kinematics == "tied":
+            return np.where(self.projection.found, w, 0.0)[:, None] * self.traction
+        return (w * self.pressure)[:, None] * self.projection.normal
