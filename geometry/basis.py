@@ -26,7 +26,7 @@ def lagrange_triangle(degree: int) -> basix.finite_element.FiniteElement:
 class CellBasis:
     """A displacement basis at ``q`` points of each of ``n`` cells with ``a`` nodes."""
 
-    shape: Array  # (q, a)
+    shape: Array  # (q, a), or (n, q, a) where each cell has points of its own
     gradient: Array  # (n, q, a, 2) in physical coordinates
     point: Array  # (n, q, 2)
     jacobian: Array  # (n, q, 2, 2) d x_i / d X_j
@@ -44,18 +44,25 @@ class CellBasis:
 
 
 def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) -> CellBasis:
-    """Basis of the given ``degree`` at the reference points ``X`` ``(q, 2)`` of ``cells``."""
-    geometry = lagrange_triangle(mesh.geometry.cmap.degree).tabulate(1, X)[..., 0]
-    table = lagrange_triangle(degree).tabulate(1, X)[..., 0]
+    """Basis of the given ``degree`` at the reference points ``X`` of ``cells``: ``(q, 2)``, or ``(n, q, 2)`` for each."""
+    geometry = _tabulate(mesh.geometry.cmap.degree, X)
+    table = _tabulate(degree, X)
     nodes = mesh.geometry.x[mesh.geometry.dofmap[cells], :2]
-    point = np.einsum("qa,nai->nqi", geometry[0], nodes)
-    J = np.einsum("jqa,nai->nqij", geometry[1:], nodes)
+    at = "qa" if X.ndim == 2 else "nqa"
+    point = np.einsum(f"{at},nai->nqi", geometry[0], nodes)
+    J = np.einsum(f"j{at},nai->nqij", geometry[1:], nodes)
     det = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
     inverse = np.empty_like(J)  # d X_j / d x_i as [j, i]
     inverse[..., 0, 0], inverse[..., 1, 1] = J[..., 1, 1] / det, J[..., 0, 0] / det
     inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1] / det, -J[..., 1, 0] / det
-    gradient = np.einsum("jqa,nqji->nqai", table[1:], inverse)
+    gradient = np.einsum(f"j{at},nqji->nqai", table[1:], inverse)
     return CellBasis(table[0], gradient, point, J)
+
+
+def _tabulate(degree: int, X: Array) -> Array:
+    """Values and two derivatives ``(3, ..., a)`` of the basis at ``X`` ``(..., 2)``."""
+    table = lagrange_triangle(degree).tabulate(1, X.reshape(-1, 2))[..., 0]
+    return table.reshape(3, *X.shape[:-1], table.shape[-1])
 
 
 def bulk_quadrature() -> tuple[Array, Array]:

@@ -69,12 +69,11 @@ class Curve:
         return powers @ c, first @ c, second @ c
 
     def arc_length(self, xi: Array) -> Array:
-        """Length ``(n, len(xi))`` along the curve from its start to ``xi`` of each facet."""
+        """Length ``(n, m)`` along the curve from its start to ``xi`` ``(m,)``, or ``(n, m)``, of each facet."""
+        ends = np.concatenate([np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1])), np.ones((self.n_facets, 1))], axis=1)
         q, w = np.polynomial.legendre.leggauss(8)
-        ends = np.concatenate([np.atleast_1d(xi), [1.0]])
-        at = ends[:, None] * (q + 1) / 2
-        _, slope, _ = self.shapes(at)
-        speed = np.linalg.norm(np.einsum("fai,mqa->fmqi", self.X[self.connectivity], slope), axis=-1)
+        _, slope, _ = self.shapes(ends[..., None] * (q + 1) / 2)
+        speed = np.linalg.norm(np.einsum("fai,fmqa->fmqi", self.X[self.connectivity], slope), axis=-1)
         lengths = (speed @ w) * ends / 2
         start = np.concatenate([[0.0], np.cumsum(lengths[:, -1])[:-1]])
         return start[:, None] + lengths[:, :-1]

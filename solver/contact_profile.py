@@ -60,7 +60,7 @@ def arc_profile(contact: Contact, side: ContactSide, radius: float, axis_point: 
     values = np.concatenate(
         [side.weight[..., None], displaced, state.pressure[..., None], state.gap[..., None]], axis=-1
     )
-    local[side.facet] = np.where(side.flipped[:, None, None], values[:, ::-1], values)  # points along the curve
+    local[side.facet] = values
     whole = side.sum_over_ranks(local)
     s = side.arc_position(axis_point)
     if s[0, 0] > s[-1, 0]:

@@ -19,16 +19,18 @@ from archord.solver.points import material_points
 class ContactSide:
     """Facets tagged ``tag`` of the body with ``material`` in the displacement space ``V``.
 
-    Arrays of this rank's ``n`` facets with ``q`` points: ``weight`` ``(n, q)`` (measure of the curved edge), ``point``
-    and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own cell's basis, ``shape`` ``(n, q, a)``,
-    ``gamma`` ``(n,)``. ``facet`` ``(n,)`` numbers them along the curve; ``curve_cell_dofs`` holds the global cell dofs
-    of every facet of the curve, on every rank.
+    Arrays of this rank's ``n`` facets with ``q`` points each, in the order in which the curve runs: ``weight`` ``(n, q)``
+    (measure of the curved edge), ``point`` and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own cell's
+    basis, ``shape`` ``(n, q, a)``, ``gamma`` ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve, ``trace``
+    their nodes within the cell; ``curve_cell_dofs`` holds the global cell dofs of every facet of the curve, on every
+    rank.
     """
 
     def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material) -> None:
         mesh = V.mesh
         self.comm = mesh.comm
         self.V = V
+        self.material = material
         self.degree = V.element.basix_element.degree
         index_map = V.dofmap.index_map
         cells, local_facets = _owned_facets(mesh, facets.find(tag))
@@ -36,14 +38,8 @@ class ContactSide:
         # closure order is vertex, vertex, interior; along the facet the interior nodes come between the vertices
         along = [[c[0], *c[2:], c[1]] for c in closure]
         trace = np.array([along[k] for k in local_facets], dtype=np.int64).reshape(-1, self.degree + 1)
-
-        w, basis = self._tabulate(cells, local_facets)
-        tangent = basis["tangent"]
-        length = np.linalg.norm(tangent, axis=-1)
-        outward = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
-        flip = (outward * basis["outward"]).sum(-1)[:, 0] < 0 if len(cells) else np.zeros(0, dtype=bool)
-        outward[flip] *= -1
-        trace[flip] = trace[flip, ::-1]
+        flipped = self._runs_clockwise(cells, local_facets)
+        trace[flipped] = trace[flipped, ::-1]
 
         cell_dofs = V.dofmap.list[cells].astype(np.int64)
         global_dofs = index_map.local_to_global(cell_dofs.ravel().astype(np.int32)).reshape(cell_dofs.shape)
@@ -61,55 +57,45 @@ class ContactSide:
         position = np.empty(len(order), dtype=np.int64)
         position[order] = np.arange(len(order))
         start = sum(len(g[0]) for g in gathered[: self.comm.rank])
-        self.facet = position[start : start + len(cells)]
+        facet = position[start : start + len(cells)]
 
-        sort = np.argsort(self.facet)
-        self.facet = self.facet[sort]
+        sort = np.argsort(facet)
+        self.facet = facet[sort]
         self.cells = cells[sort]
         self.cell_dofs = cell_dofs[sort]
         self.cell_global = global_dofs[sort]
         self.trace = trace[sort]
-        self.weight = (length * w)[sort]
-        self.outward = outward[sort]
-        self.point = basis["point"][sort]
-        self.gradient = basis["gradient"][sort]
-        self.shape = basis["shape"][sort]
-        self.flipped = flip[sort]
-        self.reference_points = basis["reference"]
-        self.points = material_points(material, self.weight.size)
+        self._flipped = flipped[sort]
+        self._local_facet = local_facets[sort]
         owned = self.curve_dofs - index_map.local_range[0]
         self._owned = np.flatnonzero((owned >= 0) & (owned < index_map.size_local))
         self._owned_local = owned[self._owned]
+        xi, w = basix.make_quadrature(basix.CellType.interval, 2 * CONTACT_POINTS - 1)
+        self.place_points(np.tile(xi[:, 0], (self.curve.n_facets, 1)), np.tile(w, (self.curve.n_facets, 1)))
         self.gamma = self._trace_inequality()
 
-    def _tabulate(self, cells, local_facets) -> tuple[Array, dict[str, Array]]:
-        X1, w = basix.make_quadrature(basix.CellType.interval, 2 * CONTACT_POINTS - 1)
-        vertices = basix.geometry(basix.CellType.triangle)
-        topology = basix.topology(basix.CellType.triangle)[1]
-        normals = basix.cell.facet_outward_normals(basix.CellType.triangle)
-        n, q, a = len(cells), len(w), (self.degree + 1) * (self.degree + 2) // 2
-        out = {
-            "point": np.zeros((n, q, 2)),
-            "gradient": np.zeros((n, q, a, 2)),
-            "shape": np.zeros((n, q, a)),
-            "tangent": np.zeros((n, q, 2)),
-            "outward": np.zeros((n, q, 2)),
-            "reference": X1[:, 0],
-        }
-        for k in range(3):
-            here = np.flatnonzero(local_facets == k)
-            v0, v1 = vertices[topology[k]]
-            basis = cell_basis(self.V.mesh, self.degree, cells[here], v0 + X1 * (v1 - v0))
-            out["point"][here], out["gradient"][here] = basis.point, basis.gradient
-            out["shape"][here] = basis.shape
-            out["tangent"][here] = basis.jacobian @ (v1 - v0)
-            # covariant transform up to its positive length: n ~ J^-T N
-            J, N = basis.jacobian, normals[k]
-            cofactor = np.stack(
-                [J[..., 1, 1] * N[0] - J[..., 1, 0] * N[1], J[..., 0, 0] * N[1] - J[..., 0, 1] * N[0]], axis=-1
-            )
-            out["outward"][here] = cofactor * np.sign(basis.determinant)[..., None]
-        return w, out
+    def _runs_clockwise(self, cells: np.ndarray, local_facets: np.ndarray) -> np.ndarray:
+        """Facets ``(n,)`` whose reference direction has its cell on the right."""
+        v0, v1 = _facet_ends(local_facets)
+        basis = cell_basis(self.V.mesh, self.degree, cells, ((v0 + v1) / 2)[:, None])
+        tangent = np.einsum("nij,nj->ni", basis.jacobian[:, 0], v1 - v0)
+        centroid = cell_basis(self.V.mesh, self.degree, cells, np.full((1, 2), 1 / 3)).point[:, 0]
+        inward = centroid - basis.point[:, 0]
+        return tangent[:, 0] * inward[:, 1] - tangent[:, 1] * inward[:, 0] < 0
+
+    def place_points(self, xi: Array, w: Array) -> None:
+        """Put the contact points at ``xi`` ``(n_facets of the curve, q)`` in (0, 1) with weights ``w``; no history."""
+        self.curve_xi = xi
+        v0, v1 = _facet_ends(self._local_facet)
+        t = np.where(self._flipped[:, None], 1 - xi[self.facet], xi[self.facet])
+        basis = cell_basis(self.V.mesh, self.degree, self.cells, v0[:, None] + t[..., None] * (v1 - v0)[:, None])
+        tangent = np.einsum("nqij,nj->nqi", basis.jacobian, v1 - v0)
+        tangent[self._flipped] *= -1
+        length = np.linalg.norm(tangent, axis=-1)
+        self.weight = length * w[self.facet]
+        self.outward = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
+        self.point, self.gradient, self.shape = basis.point, basis.gradient, basis.shape
+        self.points = material_points(self.material, self.weight.size)
 
     def _trace_inequality(self) -> Array:
         """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over the facet <= gamma a(v, v) over its cell`` for all
@@ -138,9 +124,8 @@ class ContactSide:
 
         Points are in the curve's order: that of this rank's arrays, but for ``flipped`` facets, which have it reversed.
         """
-        xi = self.reference_points
-        length = self.curve.arc_length(np.concatenate([xi, [1.0]]))
-        s, total = length[:, :-1], length[-1, -1]
+        s = self.curve.arc_length(self.curve_xi)
+        total = self.curve.arc_length(np.ones((self.curve.n_facets, 1)))[-1, 0]
         ends = np.linalg.norm(self.curve.X[[0, -1]] - origin, axis=1)
         return total - s if ends[1] < ends[0] else s
 
@@ -169,6 +154,12 @@ class ContactSide:
         n, q = self.weight.shape
         stress, tangent = self.points.update(strain(self.gradient, nodal).reshape(-1, 3))
         return displacement, stress.reshape(n, q, 4), tangent.reshape(n, q, 3, 3)
+
+
+def _facet_ends(local_facets: np.ndarray) -> tuple[Array, Array]:
+    """Reference coordinates ``(n, 2)`` of both ends of facets with the given numbers in their cells."""
+    ends = basix.geometry(basix.CellType.triangle)[np.array(basix.topology(basix.CellType.triangle)[1])]
+    return ends[local_facets, 0], ends[local_facets, 1]
 
 
 def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray]:
