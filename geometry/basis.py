@@ -44,7 +44,7 @@ class CellBasis:
 
 
 def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) -> CellBasis:
-    """Basis of the given ``degree`` at the reference points ``X`` of ``cells``: ``(q, 2)``, or ``(n, q, 2)`` for each."""
+    """Basis of the given ``degree`` at the reference points ``X`` ``(q, 2)`` of ``cells``, or ``(n, q, 2)`` of each."""
     geometry = _tabulate(mesh.geometry.cmap.degree, X)
     table = _tabulate(degree, X)
     nodes = mesh.geometry.x[mesh.geometry.dofmap[cells], :2]

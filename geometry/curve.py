@@ -70,7 +70,8 @@ class Curve:
 
     def arc_length(self, xi: Array) -> Array:
         """Length ``(n, m)`` along the curve from its start to ``xi`` ``(m,)``, or ``(n, m)``, of each facet."""
-        ends = np.concatenate([np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1])), np.ones((self.n_facets, 1))], axis=1)
+        xi = np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1]))
+        ends = np.concatenate([xi, np.ones((self.n_facets, 1))], axis=1)
         q, w = np.polynomial.legendre.leggauss(8)
         _, slope, _ = self.shapes(ends[..., None] * (q + 1) / 2)
         speed = np.linalg.norm(np.einsum("fai,fmqa->fmqi", self.X[self.connectivity], slope), axis=-1)

@@ -19,6 +19,9 @@ Under current kinematics the closest points belong to the deformed curves and th
 (the pin) for both, and the gap is linear in the displacement. A tied contact carries the full vector
 ``t - gamma [[u]]`` whatever its sign.
 
+Each side's quadrature respects the facets of the opposite curve where the undeformed curves touch
+(`contact_segments`), so that meshes that match nowhere pass the patch tests.
+
 Opposite curves may lie on other ranks: their displacement is exchanged, forces on them are summed over the ranks, and
 their rows of the matrix travel with PETSc's assembly.
 """
@@ -32,6 +35,7 @@ import numpy as np
 from archord.geometry.curve import Array, ProjectionError, RigidCircle
 from archord.solver.contact_pairing import Kinematics, Pairing
 from archord.solver.contact_pattern import ContactPattern
+from archord.solver.contact_segments import segment_rule
 from archord.solver.contact_side import ContactSide
 from archord.solver.contact_tangent import entries
 from archord.solver.points import PlasticPoints
@@ -72,6 +76,9 @@ class Contact:
         self.comm = sides[0].comm
         opposites: list = [rigid] if rigid is not None else [sides[1], sides[0]]
         chosen = range(len(sides)) if one_sided is None else [one_sided]
+        if rigid is None:
+            for i in chosen:
+                sides[i].place_points(*segment_rule(sides[i].curve, sides[1 - i].curve))
         compliance = np.array([1 / sides[i].points.elastic_tangent[0, 0] for i in chosen])
         self.pairings: list[Pairing] = []
         failure = None

@@ -19,11 +19,11 @@ from archord.solver.points import material_points
 class ContactSide:
     """Facets tagged ``tag`` of the body with ``material`` in the displacement space ``V``.
 
-    Arrays of this rank's ``n`` facets with ``q`` points each, in the order in which the curve runs: ``weight`` ``(n, q)``
-    (measure of the curved edge), ``point`` and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own cell's
-    basis, ``shape`` ``(n, q, a)``, ``gamma`` ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve, ``trace``
-    their nodes within the cell; ``curve_cell_dofs`` holds the global cell dofs of every facet of the curve, on every
-    rank.
+    Arrays of this rank's ``n`` facets with ``q`` points each, in the order in which the curve runs: ``weight`` ``(n,
+    q)`` (measure of the curved edge), ``point`` and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own
+    cell's basis, ``shape`` ``(n, q, a)``, ``gamma`` ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve,
+    ``trace`` their nodes within the cell; ``curve_cell_dofs`` holds the global cell dofs of every facet of the curve,
+    on every rank.
     """
 
     def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material) -> None:

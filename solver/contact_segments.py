@@ -1,0 +1,51 @@
+"""Quadrature that respects the facets of the opposite curve.
+
+A point's force goes to the nodes of its partner facet, whose shape functions have kinks at its ends. Points that ignore
+them integrate a uniform pressure with an error of the order of the mesh (11 % scatter where 4 edges meet 7); on facets
+that are broken there a patch test is passed exactly. Breaks stay where the undeformed curves face each other, as points
+carry history: pairs that slide by a part of a facet get that part of the error back.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from archord.geometry.basis import CONTACT_POINTS
+from archord.geometry.curve import Array, Curve
+
+_SHORTEST = 1e-6  # breaks nearer than this, in xi, are one
+
+
+def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
+    """Positions and weights ``(n_facets of own, q)`` in xi; all facets of ``own`` get equally many segments.
+
+    Breaks lie where ``own`` faces the vertices of ``opposite``; facets with fewer of them are broken further.
+    """
+    vertices = opposite.X[:: opposite.degree]
+    step = np.gradient(vertices, axis=0)
+    outward = np.stack([step[:, 1], -step[:, 0]], axis=1)
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    met = own.closest_point(vertices, outward, np.zeros_like(own.X))
+    inside = met.found & (met.xi > _SHORTEST) & (met.xi < 1 - _SHORTEST)
+    breaks = [_apart(np.sort(met.xi[inside & (met.facet == k)])) for k in range(own.n_facets)]
+    segments = max(len(b) for b in breaks) - 1
+    ends = np.array([_refined(b, segments) for b in breaks])
+    # three points are exact for a quadratic pressure against quadratic shape functions, but for the curve's measure
+    x, w = np.polynomial.legendre.leggauss(CONTACT_POINTS if segments == 1 else 3)
+    length = np.diff(ends, axis=1)[:, :, None]
+    xi = ends[:, :-1, None] + length * (x + 1) / 2
+    return xi.reshape(own.n_facets, -1), (length * w / 2).reshape(own.n_facets, -1)
+
+
+def _apart(breaks: Array) -> Array:
+    """0, the breaks that are distinct, and 1."""
+    keep = np.diff(breaks, prepend=0.0) > _SHORTEST
+    return np.concatenate([[0.0], breaks[keep], [1.0]])
+
+
+def _refined(ends: Array, segments: int) -> Array:
+    """``ends`` with the longest segment halved until there are ``segments``."""
+    while len(ends) <= segments:
+        k = int(np.argmax(np.diff(ends)))
+        ends = np.insert(ends, k + 1, (ends[k] + ends[k + 1]) / 2)
+    return ends

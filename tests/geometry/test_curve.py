@@ -1,0 +1,315 @@
+"""Closest points on piecewise quadratic curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from archord.geometry import curve as curve_module
+from archord.geometry.curve import Curve, ProjectionError, RigidCircle, lagrange
+
+
+def ellipse(s):
+    """Lower half of an ellipse, from left to right; the body lies inside. Smallest radius of curvature 0.5."""
+    return np.stack([-2 * np.cos(np.pi * s), -np.sin(np.pi * s)], axis=-1)
+
+
+def hole(s):
+    """Quarter circle run through clockwise: the body lies outside."""
+    return ellipse_of(1.0, 1.0, -np.pi / 2 * s)
+
+
+def pin(s):
+    """Quarter circle run through counter-clockwise: the body lies inside."""
+    return ellipse_of(1.0, 1.0, np.pi / 2 * (s - 1))
+
+
+def ellipse_of(a, b, angle):
+    return np.stack([a * np.cos(angle), b * np.sin(angle)], axis=-1)
+
+
+def wave(s):
+    """Five humps; smallest radius of curvature about 0.6."""
+    return np.stack([4 * s, 0.1 * np.sin(4 * np.pi * s)], axis=-1)
+
+
+def backwards(f):
+    return lambda s: f(1 - s)
+
+
+CURVES = {"ellipse": ellipse, "ellipse from outside": backwards(ellipse), "hole": hole, "pin": pin, "wave": wave}
+CURVES["wave from below"] = backwards(wave)
+every_curve = pytest.mark.parametrize("f", CURVES.values(), ids=CURVES.keys())
+
+
+def interpolate(f, n: int, grading: float = 1.0) -> Curve:
+    """Quadratic interpolation of ``f`` on ``n`` facets, shorter towards the start for ``grading`` > 1."""
+    s = np.linspace(0, 1, n + 1) ** grading
+    return Curve(f(np.sort(np.concatenate([s, (s[1:] + s[:-1]) / 2]))), 2)
+
+
+def on_curve(c: Curve, facet, xi, displacement=0.0):
+    """Points and unit outward normals at ``xi`` of ``facet``."""
+    N, dN, _ = c.shapes(xi)
+    nodes = (c.X + displacement)[c.connectivity[facet]]
+    y, t = np.einsum("ma,mai->mi", N, nodes), np.einsum("ma,mai->mi", dN, nodes)
+    return y, np.stack([t[:, 1], -t[:, 0]], axis=1) / np.linalg.norm(t, axis=1)[:, None]
+
+
+def scatter(c: Curve, distance: float, displacement=0.0, n: int = 500, seed: int = 3):
+    """Random points up to ``distance`` off the curve, on both sides of it, and outward normals of a body facing it."""
+    rng = np.random.default_rng(seed)
+    facet, xi = rng.integers(0, c.n_facets, n), rng.uniform(size=n)
+    y, normal = on_curve(c, facet, xi, displacement)
+    return y + normal * (distance * rng.uniform(-1, 1, n))[:, None], -normal
+
+
+def brute_force(c: Curve, x, displacement=0.0, per_facet: int = 200):
+    """Distance of ``x`` from the nearest of many points of the curve."""
+    samples, _ = on_curve(
+        c,
+        np.repeat(np.arange(c.n_facets), per_facet + 1),
+        np.tile(np.linspace(0, 1, per_facet + 1), c.n_facets),
+        displacement,
+    )
+    return np.array([np.sqrt(((samples - p) ** 2).sum(axis=1).min()) for p in x])
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_lagrange_polynomials_are_one_at_their_own_node(degree):
+    """And zero at the others."""
+    nodes = np.linspace(0, 1, degree + 1)
+    values = np.vander(nodes, increasing=True) @ lagrange(degree).T
+    np.testing.assert_allclose(values, np.eye(degree + 1), atol=1e-14)
+
+
+def test_shape_functions_and_their_derivatives():
+    """They reproduce 1, xi and xi^2 with first and second derivatives."""
+    c = interpolate(wave, 2)
+    xi = np.linspace(-0.05, 1.05, 7)
+    nodes = np.array([0, 0.5, 1.0])
+    for power in range(3):
+        values = nodes**power
+        expected = [xi**power, power * xi ** max(power - 1, 0), np.full_like(xi, 2.0 * (power == 2))]
+        for found, wanted in zip(c.shapes(xi), expected, strict=True):
+            np.testing.assert_allclose(found @ values, wanted, atol=1e-14)
+
+
+def test_arc_length_of_a_circle():
+    """Fourth order, the geometry's own: quarter circles of 4, 8 and 16 facets against pi / 2."""
+    errors = []
+    for n in (4, 8, 16):
+        length = interpolate(pin, n).arc_length(np.array([0.0, 1.0]))
+        np.testing.assert_allclose(length[:, 0], length[-1, 1] / n * np.arange(n), atol=1e-14)
+        errors.append(abs(length[-1, 1] - np.pi / 2))
+    assert errors[-1] < 1e-6
+    assert np.all(np.diff(np.log2(errors)) < -3.9)
+
+
+def test_arc_length_is_additive():
+    """The end of a facet is the start of the next, also on a graded wave."""
+    length = interpolate(wave, 9, grading=1.5).arc_length(np.array([0.0, 0.4, 1.0]))
+    np.testing.assert_allclose(length[1:, 0], length[:-1, 2], rtol=1e-14)
+    assert np.all(np.diff(length, axis=1) > 0)
+
+
+@every_curve
+@pytest.mark.parametrize(("n", "grading"), [(8, 1.0), (30, 1.0), (20, 1.5)])
+@pytest.mark.parametrize("distance", [1e-3, 0.3])
+def test_closest_point_is_the_nearest_of_all(f, n, grading, distance):
+    """No point of the curve is nearer; only a sample next to the closest point comes as near."""
+    c = interpolate(f, n, grading)
+    x, outward = scatter(c, distance)
+    p = c.closest_point(x, outward, np.zeros_like(c.X))
+    assert p.found.all()
+    found, sampled = np.linalg.norm(x - p.point, axis=1), brute_force(c, x)
+    assert np.all(found <= sampled + 1e-14)
+    spacing = 1.1 * np.linalg.norm(p.tangent, axis=1).max() / 200
+    assert np.all((sampled**2 - found**2)[p.slides] < 1.3 * (spacing / 2) ** 2)  # 1 + distance * curvature of the hump
+
+
+@every_curve
+@pytest.mark.parametrize("n", [8, 30])
+def test_the_separation_is_normal_to_the_curve(f, n):
+    """(x - y) . tangent = 0 where the point slides, and the distance is the gap; the normal is a unit vector."""
+    c = interpolate(f, n)
+    x, outward = scatter(c, 0.3)
+    p = c.closest_point(x, outward, np.zeros_like(c.X))
+    d = (x - p.point)[p.slides]
+    assert p.slides.mean() > 0.95
+    assert np.abs((d * p.tangent[p.slides]).sum(1) / np.linalg.norm(p.tangent[p.slides], axis=1)).max() < 1e-13
+    np.testing.assert_allclose(
+        np.abs((d * p.normal[p.slides]).sum(1)), np.linalg.norm(d, axis=1), rtol=1e-12, atol=1e-15
+    )
+    np.testing.assert_allclose(np.linalg.norm(p.normal, axis=1), 1, rtol=1e-14)
+    np.testing.assert_allclose((p.normal * p.tangent).sum(1), 0, atol=1e-14)
+    np.testing.assert_allclose(np.einsum("ma,mai->mi", p.shape, c.X[p.nodes]), p.point, atol=1e-14)
+
+
+@every_curve
+def test_closest_points_of_a_displaced_curve(f):
+    """A displaced curve is the curve through its displaced nodes."""
+    c = interpolate(f, 12)
+    u = 0.03 * np.sin(2 * c.X[:, ::-1] + 1)
+    x, outward = scatter(c, 0.2, u)
+    p, q = c.closest_point(x, outward, u), Curve(c.X + u, 2).closest_point(x, outward, np.zeros_like(u))
+    np.testing.assert_array_equal(p.point, q.point)
+    assert np.all(np.linalg.norm(x - p.point, axis=1) <= brute_force(c, x, u) + 1e-14)
+
+
+@every_curve
+@pytest.mark.parametrize("shift", [-3, -2, -1, 0, 1, 2, 3, "anywhere"])
+def test_the_start_does_not_matter(f, shift):
+    """From a facet near the partner, or from any facet, the result is that of the search over the whole curve."""
+    c = interpolate(f, 24)
+    x, outward = scatter(c, 0.2)
+    rest = np.zeros_like(c.X)
+    p = c.closest_point(x, outward, rest)
+    random = np.random.default_rng(0).integers(0, c.n_facets, len(x))
+    start = random if shift == "anywhere" else np.clip(p.facet + shift, 0, c.n_facets - 1)
+    q = c.closest_point(x, outward, rest, start)
+    np.testing.assert_allclose(q.point, p.point, rtol=0, atol=1e-13)
+    np.testing.assert_array_equal(q.found, p.found)
+    np.testing.assert_allclose(
+        c.arc_length(q.xi)[q.facet, np.arange(len(x))], c.arc_length(p.xi)[p.facet, np.arange(len(x))], atol=1e-12
+    )
+
+
+def test_a_search_in_the_wrong_place_is_an_error(monkeypatch):
+    """Points whose closest points lie beyond the facets searched are never left at the rim of these."""
+    c = interpolate(ellipse, 24)
+    x, outward = scatter(c, 0.2)
+    monkeypatch.setattr(Curve, "nearest_facet", lambda self, x, displacement: np.full(len(x), 5))
+    with pytest.raises(ProjectionError, match="beyond the facets searched"):
+        c.closest_point(x, outward, np.zeros_like(c.X))
+
+
+def roof():
+    """Two straight facets that meet at a right angle at the origin; the body lies below, its corner points up."""
+    return Curve(np.array([[1.0, -1], [0.5, -0.5], [0, 0], [-0.5, -0.5], [-1, -1]]), 2)
+
+
+def test_a_corner_is_the_closest_point_of_its_cone():
+    """Points in the cone of normals find the vertex, which stands still; points beside it slide on a facet."""
+    c = roof()
+    angle = np.radians([50.0, 80, 100, 130, 30, 150])
+    x = 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    p = c.closest_point(x, np.tile([0.0, -1.0], (6, 1)), np.zeros_like(c.X))
+    assert p.found.all()
+    np.testing.assert_array_equal(p.slides, [False] * 4 + [True] * 2)
+    np.testing.assert_allclose(p.point[:4], 0, atol=1e-15)
+    np.testing.assert_array_equal(p.facet[4:], [0, 1])
+    for start in range(2):
+        q = c.closest_point(x, np.tile([0.0, -1.0], (6, 1)), np.zeros_like(c.X), np.full(6, start))
+        np.testing.assert_allclose(q.point, p.point, atol=1e-15)
+
+
+@every_curve
+def test_points_beyond_a_free_end_have_no_partner(f):
+    """Points farther out than a twentieth of a facet have no partner; nearer ones use the end's continuation."""
+    c = interpolate(f, 10)
+    y, normal = on_curve(c, np.array([0, 9]), np.array([0.0, 1.0]))
+    _, dN, _ = c.shapes(np.array([0.0, 1.0]))
+    forward = np.einsum("ma,mai->mi", dN, c.X[c.connectivity[[0, 9]]]) * [[-1.0], [1.0]]
+    rest = np.zeros_like(c.X)
+    assert not c.closest_point(y + 0.1 * forward + 0.01 * normal, -normal, rest).found.any()
+    near = c.closest_point(y + 0.02 * forward + 0.01 * normal, -normal, rest)
+    assert near.found.all()
+    assert near.slides.all()
+    assert c.closest_point(y - 0.02 * forward + 0.01 * normal, -normal, rest).found.all()
+
+
+@every_curve
+def test_points_that_face_away_have_no_partner(f):
+    """Only the far side of a body could see them."""
+    c = interpolate(f, 10)
+    x, outward = scatter(c, 0.1)
+    assert not c.closest_point(x, -outward, np.zeros_like(c.X)).found.any()
+
+
+def linearisation(p, x, dx, du, n_nodes):
+    """Directional derivatives of gap, normal and closest point that the fields of a projection stand for."""
+    speed = np.linalg.norm(p.tangent, axis=1)
+    d = x - p.point
+    gap = (d * p.normal).sum(1)
+    dy_fixed = np.einsum("ma,mai->mi", p.shape, du[p.nodes]) if n_nodes else np.broadcast_to(du, x.shape)
+    dt = np.einsum("ma,mai->mi", p.slope, du[p.nodes]) if n_nodes else np.zeros_like(x)
+    dxi = ((dx - dy_fixed) * p.tangent).sum(1) + (d * dt).sum(1)
+    dxi *= p.slides / (speed**2 - gap * p.bend)
+    turn = ((dt * p.normal).sum(1) + p.bend * dxi) / speed
+    dn = -turn[:, None] * p.tangent / speed[:, None]
+    dy = dy_fixed + dxi[:, None] * p.tangent
+    dgap = ((dx - dy) * p.normal).sum(1) + (d * dn).sum(1)
+    return dgap, dn, dy
+
+
+def assert_derivative(project, x, dx, u, du, n_nodes, h=1e-6):
+    """`linearisation` against central differences of the projection."""
+    p, plus, minus = project(x, u), project(x + h * dx, u + h * du), project(x - h * dx, u - h * du)
+    same = (plus.facet == p.facet) & (minus.facet == p.facet) & (plus.slides == p.slides) & (minus.slides == p.slides)
+    assert same.mean() > 0.98
+    dgap, dn, dy = linearisation(p, x, dx, du, n_nodes)
+    gap = [((x + s * h * dx - q.point) * q.normal).sum(1) for s, q in ((1, plus), (-1, minus))]
+    np.testing.assert_allclose(dgap[same], ((gap[0] - gap[1]) / (2 * h))[same], atol=1e-7)
+    np.testing.assert_allclose(dn[same], ((plus.normal - minus.normal) / (2 * h))[same], atol=1e-6)
+    np.testing.assert_allclose(dy[same], ((plus.point - minus.point) / (2 * h))[same], atol=1e-6)
+
+
+@every_curve
+def test_linearisation_of_the_closest_point(f):
+    """Gap, normal and closest point move as tangent, bend and slope say, for moving points on a moving curve."""
+    rng = np.random.default_rng(4)
+    c = interpolate(f, 12)
+    u = 0.02 * np.sin(2 * c.X[:, ::-1] + 1)
+    x, outward = scatter(c, 0.2, u)
+    assert_derivative(
+        lambda x, u: c.closest_point(x, outward, u),
+        x,
+        rng.normal(size=x.shape),
+        u,
+        0.1 * rng.normal(size=u.shape),
+        len(u),
+    )
+
+
+def test_linearisation_at_a_corner():
+    """A vertex stands still on its facets, its normal turns with the nodes."""
+    rng = np.random.default_rng(4)
+    c = roof()
+    angle = rng.uniform(np.radians(50), np.radians(130), 50)
+    x = 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    outward, u = np.tile([0.0, -1.0], (50, 1)), np.zeros_like(c.X)
+    assert not c.closest_point(x, outward, u).slides.any()
+    p = c.closest_point(x, outward, u)
+    start = p.facet
+
+    def project(x, u):
+        return c.closest_point(x, outward, u, start)
+
+    assert_derivative(project, x, rng.normal(size=x.shape), u, 0.1 * rng.normal(size=u.shape), len(u))
+
+
+def test_rigid_circle():
+    """Gap = distance from the centre - radius, negative inside; and the linearisation of it."""
+    rng = np.random.default_rng(4)
+    circle = RigidCircle(np.array([0.3, -0.2]), 2.0)
+    motion = np.array([0.01, -0.02])
+    ray = rng.normal(size=(100, 2))
+    x = circle.centre + motion + ray / np.linalg.norm(ray, axis=1)[:, None] * rng.uniform(1.9, 2.1, (100, 1))
+    p = circle.closest_point(x, -ray, motion)
+    assert p.found.all()
+    assert not circle.closest_point(x, ray, motion).found.any()
+    distance = np.linalg.norm(x - circle.centre - motion, axis=1) - 2.0
+    np.testing.assert_allclose(((x - p.point) * p.normal).sum(1), distance, rtol=0, atol=1e-14)
+    assert_derivative(
+        lambda x, u: circle.closest_point(x, -ray, u), x, rng.normal(size=x.shape), motion, rng.normal(size=2), 0
+    )
+
+
+def test_a_lost_point_is_an_error(monkeypatch):
+    """A point whose projection does not converge is never taken for one without a partner."""
+    c = interpolate(ellipse, 8)
+    x, outward = scatter(c, 0.3)
+    monkeypatch.setattr(curve_module, "_NEWTON_STEPS", 1)
+    with pytest.raises(ProjectionError, match="found no closest point"):
+        c.closest_point(x, outward, np.zeros_like(c.X))

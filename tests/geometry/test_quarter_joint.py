@@ -1,0 +1,133 @@
+"""The mesh of the quarter joint."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dolfinx import mesh as dolfinx_mesh
+from mpi4py import MPI
+
+from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.geometry.quarter_joint import Cells, Facets, quarter_joint
+
+R, DR, W = 1.0, 0.005, 10.0
+SIZE, GROWTH = 0.2, 0.4
+
+
+@pytest.fixture(scope="module")
+def joint():
+    return quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH)
+
+
+def facet_nodes(joint, tag):
+    """Coordinates ``(n, 3, 2)`` of the nodes of the tagged facets: two vertices and the midpoint."""
+    mesh = joint.mesh
+    mesh.topology.create_connectivity(1, 2)
+    return mesh.geometry.x[dolfinx_mesh.entities_to_geometry(mesh, 1, joint.facets.find(tag))][..., :2]
+
+
+def edge_lengths(joint, tag):
+    x = facet_nodes(joint, tag)
+    return np.linalg.norm(x[:, 0] - x[:, 1], axis=1)
+
+
+def area(joint, tag, comm=MPI.COMM_SELF):
+    n_owned = joint.mesh.topology.index_map(2).size_local
+    cells = joint.cells.find(tag)
+    X, w = bulk_quadrature()
+    return comm.allreduce(float((cell_basis(joint.mesh, 2, cells[cells < n_owned], X).measure @ w).sum()))
+
+
+def sector(radius, n):
+    """Area of a quarter disc whose arc consists of ``n`` parabolas through points of the circle."""
+    half = np.pi / 4 / n
+    chord, height = 2 * np.sin(half), 1 - np.cos(half)
+    return radius**2 * n * (np.sin(half) * np.cos(half) + 2 / 3 * chord * height)
+
+
+def test_arc_nodes_lie_on_their_radius(joint):
+    """Vertices and midpoints, to the last bit but one: the clearance is a small difference of large numbers."""
+    pin, hole = facet_nodes(joint, Facets.PIN_ARC), facet_nodes(joint, Facets.HOLE_ARC)
+    assert np.abs(np.linalg.norm(pin - np.array([0, -DR]), axis=-1) - R).max() < 1e-15
+    assert np.abs(np.linalg.norm(hole, axis=-1) - R - DR).max() < 1e-15
+
+
+def test_arcs_reach_from_the_axis_to_the_top(joint):
+    """Both end on the symmetry axis and on the height of their centre, with equal edges (to gmsh's 1e-8)."""
+    for tag, radius, centre in ((Facets.PIN_ARC, R, -DR), (Facets.HOLE_ARC, R + DR, 0.0)):
+        x = facet_nodes(joint, tag) - [0, centre]
+        angle = np.arctan2(x[..., 0], -x[..., 1])
+        assert angle.min() == pytest.approx(0, abs=1e-15)
+        assert angle.max() == pytest.approx(np.pi / 2, abs=1e-14)
+        np.testing.assert_allclose(np.abs(angle[:, 1] - angle[:, 0]), np.pi / 2 / len(x), rtol=1e-7)
+        np.testing.assert_allclose(angle[:, 2], angle[:, :2].mean(axis=1), atol=1e-8)
+        assert np.linalg.norm(x, axis=-1).max() == pytest.approx(radius)
+
+
+def test_pin_and_hole_touch_at_the_bottom(joint):
+    """At (0, -R - dR), and nowhere else are they nearer."""
+    pin, hole = (facet_nodes(joint, tag).reshape(-1, 2) for tag in (Facets.PIN_ARC, Facets.HOLE_ARC))
+    for x in (pin, hole):
+        np.testing.assert_allclose(x[np.argmin(x[:, 1])], [0, -R - DR], rtol=0, atol=1e-15)
+    assert np.all(np.linalg.norm(pin, axis=1) <= R + DR + 1e-15)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("size", [0.2, 0.1])
+def test_areas(size, comm):
+    """A quarter disc, and a square without one: exact for parabolic arcs, so in error by O(size^4) only."""
+    joint = quarter_joint(comm, R, DR, W, size, GROWTH)
+    n = int(np.ceil(np.pi / 2 / size))
+    pin, block = area(joint, Cells.PIN, comm), area(joint, Cells.BLOCK, comm)
+    assert pin == pytest.approx(sector(R, n), rel=1e-12)
+    assert block == pytest.approx(W**2 - sector(R + DR, n), rel=1e-12)
+    assert abs(pin - np.pi * R**2 / 4) < 0.01 * size**4
+    assert abs(block - W**2 + np.pi * (R + DR) ** 2 / 4) < 0.01 * size**4
+
+
+@pytest.mark.parametrize("size", [0.3, 0.1])
+def test_edges_of_the_arcs_have_the_element_size(size):
+    """Not longer, and no shorter than a whole number of them asks for."""
+    joint = quarter_joint(MPI.COMM_SELF, R, DR, W, size, GROWTH)
+    for tag in (Facets.PIN_ARC, Facets.HOLE_ARC):
+        lengths = edge_lengths(joint, tag)
+        assert lengths.max() <= size * (1 + DR)
+        assert lengths.min() >= size * (1 - 1 / len(lengths)) * 0.99
+
+
+def test_edges_grow_with_the_distance(joint):
+    """Around element_size + growth * distance, to the accuracy gmsh keeps: within a factor 2, 25 % in the mean."""
+    corners = joint.mesh.geometry.x[joint.mesh.geometry.dofmap[:, :3], :2]
+    following = np.roll(corners, 1, axis=1)
+    distance = np.abs(np.linalg.norm((corners + following) / 2, axis=-1) - R - DR)
+    ratio = np.linalg.norm(corners - following, axis=-1) / (SIZE + GROWTH * distance)
+    assert 0.5 < ratio.min() < ratio.max() < 2
+    assert ratio.mean() == pytest.approx(1, abs=0.25)
+
+
+@pytest.mark.parametrize("unit", [1024.0, 2.0**-10, 1000.0])
+def test_mesh_does_not_depend_on_the_unit_of_length(joint, unit):
+    """The same cells, and the same nodes times the unit to the last bit."""
+    scaled = quarter_joint(MPI.COMM_SELF, unit * R, unit * DR, unit * W, unit * SIZE, GROWTH)
+    np.testing.assert_array_equal(scaled.mesh.geometry.dofmap, joint.mesh.geometry.dofmap)
+    np.testing.assert_array_equal(scaled.mesh.geometry.x, unit * joint.mesh.geometry.x)
+    np.testing.assert_array_equal(scaled.cells.values, joint.cells.values)
+
+
+def test_a_rigid_pin_is_not_meshed(joint):
+    """No cells and no facets of a pin; the block is the same to the area."""
+    rigid = quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH, rigid_pin=True)
+    assert set(rigid.cells.values) == {Cells.BLOCK}
+    assert set(rigid.facets.values) == {Facets.HOLE_ARC, Facets.BLOCK_TOP, Facets.SYMMETRY}
+    assert area(rigid, Cells.BLOCK) == pytest.approx(area(joint, Cells.BLOCK), rel=1e-12)
+
+
+def test_tagged_edges_are_where_their_names_say(joint):
+    """Tops on y = 0 and y = -dR, symmetry on x = 0 along pin and block, each with its full length."""
+    pin_top, block_top, axis = (facet_nodes(joint, t) for t in (Facets.PIN_TOP, Facets.BLOCK_TOP, Facets.SYMMETRY))
+    np.testing.assert_allclose(pin_top[..., 1], -DR, atol=1e-15)
+    np.testing.assert_allclose(block_top[..., 1], 0, atol=1e-15)
+    np.testing.assert_allclose(axis[..., 0], 0, atol=1e-15)
+    assert edge_lengths(joint, Facets.PIN_TOP).sum() == pytest.approx(R)
+    assert edge_lengths(joint, Facets.BLOCK_TOP).sum() == pytest.approx(W - R - DR)
+    assert edge_lengths(joint, Facets.SYMMETRY).sum() == pytest.approx(R + W - R - DR)

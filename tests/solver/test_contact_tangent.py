@@ -1,0 +1,142 @@
+"""The contact's linearisation is the derivative of its forces, in every variant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from archord.geometry.quarter_joint import Cells
+from tests.solver.parts import (
+    DR,
+    ELASTIC,
+    HARDENING,
+    PERFECT,
+    PLANE_STRESS,
+    YIELD_STRESS,
+    E,
+    contact_force,
+    joint_parts,
+)
+
+YIELD_STRAIN = YIELD_STRESS / E
+
+BODIES = {
+    "elastic": (ELASTIC, ELASTIC),
+    "perfect": (PERFECT, PERFECT),
+    "hardening in plane stress": (PLANE_STRESS, PLANE_STRESS),
+    "elastic pin, plastic hole": (ELASTIC, HARDENING),
+    "rigid pin": (None, ELASTIC),
+    "rigid pin, plastic hole": (None, PERFECT),
+}
+every_kinematics = pytest.mark.parametrize("kinematics", ["current", "reference", "tied"])
+
+
+def matrix(contact, n):
+    rows, columns, values = contact.tangent()
+    return sp.coo_matrix((values, (rows, columns)), shape=(n, n)).tocsr()
+
+
+def branch(contact):
+    """What decides on the branch of every point: contact, partner, flow."""
+    flags = [p.trial.peeq > p.state.peeq for p in contact.plastic_points()]
+    for pair in contact.pairings:
+        P = pair.projection
+        flags += [pair.pressure > 0, P.found, P.slides, P.facet.astype(float)]
+    return np.concatenate(flags)
+
+
+def assert_tangent_is_derivative(parts, u, *, directions=3):
+    """Central differences in random directions that move the pin as a whole as well as every node by itself."""
+    contact, rng = parts.contact, np.random.default_rng(7)
+    contact.search()
+    contact_force(contact, u)
+    K, at = matrix(contact, u.size), branch(contact)
+    active = contact.n_active()
+    h = 1e-6 * DR
+    for k in range(directions):
+        d = rng.normal(size=u.shape) if k else parts.pressed(1.0)
+        sides = []
+        for sign in (1, -1):
+            sides.append(contact_force(contact, u + sign * h * d))
+            np.testing.assert_array_equal(branch(contact), at)
+        difference = (sides[0] - sides[1]).ravel() / (2 * h)
+        assert np.linalg.norm(difference) > 0
+        assert np.linalg.norm(K @ d.ravel() - difference) < 1e-6 * np.linalg.norm(difference)
+    return active
+
+
+def indented(parts):
+    """A state with a history, in partial contact, at which points flow, unload and lift."""
+    contact = parts.contact
+    if parts.cells.find(Cells.PIN).size == 0:
+        contact.rigid_motion = np.array([0.0, -1.5 * DR])
+    contact.evaluate(parts.pressed(1.2 * DR, noise=0.02 * YIELD_STRAIN, seed=1))
+    contact.commit()
+    return parts.pressed(1.5 * DR, noise=0.04 * YIELD_STRAIN, seed=2)
+
+
+CASES = [
+    pytest.param(bodies, one_sided, id=f"{name}, {'both sides' if one_sided is None else ('pin', 'hole')[one_sided]}")
+    for name, bodies in BODIES.items()
+    for one_sided in ((None, 0, 1) if bodies[0] else (None,))
+]
+
+
+@every_kinematics
+@pytest.mark.parametrize(("bodies", "one_sided"), CASES)
+def test_tangent_is_the_derivative_of_the_forces(bodies, one_sided, kinematics):
+    """Of either body's points or both's, pairs moving, fixed or tied, whatever the bodies are made of."""
+    parts = joint_parts(pin=bodies[0], block=bodies[1], kinematics=kinematics, one_sided=one_sided)
+    active = assert_tangent_is_derivative(parts, indented(parts))
+    points = sum(pair.side.weight.size for pair in parts.contact.pairings)
+    assert active > 0.2 * points
+    assert active < points or kinematics == "tied"
+    for p in parts.contact.plastic_points():
+        assert 0.1 < (p.trial.peeq > p.state.peeq).mean() < 1
+
+
+@pytest.mark.parametrize("kinematics", ["current", "reference"])
+def test_tangent_when_the_pin_has_slid_along_the_hole(kinematics):
+    """Far from the matching nodes of the first touch: another facet, no symmetry."""
+    parts = joint_parts(size=0.15, kinematics=kinematics)
+    u = parts.pressed(0.08, noise=1e-4)
+    pin = np.unique(parts.V.dofmap.list[parts.cells.find(Cells.PIN)])
+    u[pin, 0] += 0.2
+    assert_tangent_is_derivative(parts, u)
+
+
+def test_tangent_where_the_closest_points_are_vertices():
+    """A hole of bulging facets has corners between them: points that have one as partner do not slide."""
+    parts = joint_parts(size=0.3)
+    u = parts.pressed(20 * DR)
+    hole = parts.sides[1]
+    middle = hole.curve_dofs[1::2]
+    normal = hole.curve.X[1::2] / np.linalg.norm(hole.curve.X[1::2], axis=1)[:, None]
+    u[middle] -= 0.02 * normal
+    parts.contact.evaluate(u)
+    pair = parts.contact.pairings[0]
+    corner = ~pair.projection.slides & (pair.pressure > 0)
+    assert corner.sum() >= 2, corner.sum()
+    assert_tangent_is_derivative(parts, u)
+
+
+def test_tangent_of_a_tied_elastic_contact_is_constant():
+    """Tied elastic bodies are linear: K u + f0 is the force anywhere."""
+    parts = joint_parts(kinematics="tied")
+    u, v = parts.pressed(DR, noise=1e-4, seed=1), parts.pressed(30 * DR, noise=1e-2, seed=2)
+    at_u = contact_force(parts.contact, u).ravel()
+    K = matrix(parts.contact, u.size)
+    at_v = contact_force(parts.contact, v).ravel()
+    np.testing.assert_allclose(at_v - at_u, K @ (v - u).ravel(), rtol=0, atol=1e-12 * np.abs(at_v).max())
+
+
+@every_kinematics
+def test_the_pattern_holds_the_tangent(kinematics):
+    """No entry of the tangent lies outside the slots announced for the matrix."""
+    parts = joint_parts(kinematics=kinematics)
+    parts.contact.evaluate(parts.pressed(1.5 * DR, noise=1e-4))
+    rows, columns, _ = parts.contact.tangent()
+    n = len(parts.pressed(0.0))
+    slots = set((parts.contact.pattern()[0] * n + parts.contact.pattern()[1]).tolist())
+    assert set((rows // 2 * n + columns // 2).tolist()) <= slots
