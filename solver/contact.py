@@ -139,7 +139,8 @@ class Contact:
             side.add_to_owned(side.sum_over_ranks(on_curve[id(side)]), force)
 
     def tangent(self) -> tuple[np.ndarray, np.ndarray, Array]:
-        """Entries ``(rows, columns, values)`` in global scalar dofs of the derivative of what `add_force` adds."""
+        """Derivative of what `add_force` adds: blocks ``(n, 2, 2)`` at ``rows`` and ``columns`` ``(n,)`` in global
+        dofs, some places several times. Returns ``(rows, columns, blocks)``."""
         rows, columns, values = zip(*(entries(pair) for pair in self.pairings), strict=True)
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 

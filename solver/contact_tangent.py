@@ -26,7 +26,10 @@ class _Basis(NamedTuple):
 
 
 def entries(pair: Pairing) -> tuple[np.ndarray, np.ndarray, Array]:
-    """Entries ``(rows, columns, values)`` in global scalar dofs of the derivative of the residual."""
+    """Derivative of the residual: blocks ``(n, 2, 2)`` at ``rows`` and ``columns`` ``(n,)`` in global block dofs.
+
+    Returns ``(rows, columns, blocks)``.
+    """
     on = np.flatnonzero(pair.active)
     side, P = pair.side, pair.projection
     facet = on // side.weight.shape[1]
@@ -46,27 +49,27 @@ def entries(pair: Pairing) -> tuple[np.ndarray, np.ndarray, Array]:
     if isinstance(pair.opposite, ContactSide):
         opposite = pair.opposite.curve_dofs[P.nodes[on]]
     own_rows = np.take_along_axis(side.cell_global[facet], side.trace[facet], axis=1)
-    rows = _scalar(np.concatenate([own_rows, opposite], axis=1))
-    columns = _scalar(np.concatenate([side.cell_global[facet], opposite], axis=1))
+    rows = np.concatenate([own_rows, opposite], axis=1)
+    columns = np.concatenate([side.cell_global[facet], opposite], axis=1)
     return (
         np.repeat(rows, columns.shape[1], axis=1).ravel(),
         np.tile(columns, (1, rows.shape[1])).ravel(),
-        block.ravel(),
+        block.reshape(-1, 2, 2),
     )
 
 
 def _tied(pair: Pairing, on: np.ndarray, basis: _Basis) -> Array:
-    """Derivative ``(m, r + k, 2, a + k, 2)`` of ``jump . (t - gamma [[u]])``."""
+    """Derivative ``(m, r + k, a + k, 2, 2)`` of ``jump . (t - gamma [[u]])``."""
     rows = _traction_rows(pair, on)
-    change = np.zeros((len(on), 2, basis.jump.shape[1], 2))
-    change[:, :, : rows.shape[2]] = rows
+    change = np.zeros((*basis.jump.shape, 2, 2))
+    change[:, : rows.shape[2]] = rows.swapaxes(1, 2)
     for i in range(2):
-        change[:, i, :, i] -= pair.gamma[on, None] * basis.jump
+        change[:, :, i, i] -= pair.gamma[on, None] * basis.jump
     return basis.rows[:, :, None, None, None] * change[:, None]
 
 
 def _pressed(pair: Pairing, on: np.ndarray, basis: _Basis) -> Array:
-    """Derivative ``(m, r + k, 2, a + k, 2)`` of ``p n . (v(x) - v(y))`` with ``p = t . n - gamma g``."""
+    """Derivative ``(m, r + k, a + k, 2, 2)`` of ``p n . (v(x) - v(y))`` with ``p = t . n - gamma g``."""
     P, gamma, p = pair.projection, pair.gamma[on], pair.pressure[on]
     n = P.normal[on]
     rows = np.einsum("mi,miaj->maj", n, _traction_rows(pair, on))
@@ -74,7 +77,7 @@ def _pressed(pair: Pairing, on: np.ndarray, basis: _Basis) -> Array:
     dp[:, : rows.shape[1]] += rows
     along_n = basis.rows[:, :, None] * n[:, None, :]
     if pair.kinematics == "reference":
-        return along_n[:, :, :, None, None] * dp[:, None, None]
+        return _outer(along_n, dp)
 
     tau, d, bend = P.tangent[on], pair.separation[on], P.bend[on]
     speed = np.linalg.norm(tau, axis=1)
@@ -87,9 +90,9 @@ def _pressed(pair: Pairing, on: np.ndarray, basis: _Basis) -> Array:
     dp += lever[:, None, None] * turn
     along_unit = p[:, None, None] * basis.rows[:, :, None] * unit[:, None, :]
     sliding = p[:, None, None] * basis.slope_rows[:, :, None] * n[:, None, :]
-    block = along_n[:, :, :, None, None] * dp[:, None, None]
-    block -= along_unit[:, :, :, None, None] * turn[:, None, None]
-    block -= sliding[:, :, :, None, None] * d_xi[:, None, None]
+    block = _outer(along_n, dp)
+    block -= _outer(along_unit, turn)
+    block -= _outer(sliding, d_xi)
     return block
 
 
@@ -108,6 +111,6 @@ def _traction_rows(pair: Pairing, on: np.ndarray) -> Array:
     return np.stack([x, y], axis=-1)
 
 
-def _scalar(blocks: np.ndarray) -> np.ndarray:
-    """Scalar dofs ``(m, 2 k)`` of block dofs ``(m, k)``."""
-    return (2 * blocks[:, :, None] + np.arange(2)).reshape(len(blocks), 2 * blocks.shape[1])
+def _outer(rows: Array, columns: Array) -> Array:
+    """``(m, r, c, 2, 2)`` from ``(m, r, 2)`` and ``(m, c, 2)``."""
+    return rows[:, :, None, :, None] * columns[:, None, :, None, :]

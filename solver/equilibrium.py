@@ -117,17 +117,19 @@ class Equilibrium:
         A.assemble()
         self._A = A
         self._elastic = A.copy()
-        self._global_fixed = self._global_fixed_mask()
+        self._near, self._free_near = self._free_near_contact()
 
-    def _global_fixed_mask(self) -> np.ndarray:
-        """Fixed scalar dofs among the contact's nodes, over all ranks (sorted)."""
+    def _free_near_contact(self) -> tuple[np.ndarray, Array]:
+        """The contact's nodes on all ranks ``(n,)`` (sorted), and 1 for each of their free displacements ``(n, 2)``."""
         if self.contact is None:
-            return np.zeros(0, dtype=np.int64)
-        start = 2 * self.V.dofmap.index_map.local_range[0]
-        mine = np.flatnonzero(self._fixed[: self.n_owned].ravel()) + start
+            return np.zeros(0, dtype=np.int64), np.zeros((0, 2))
         near = np.unique(np.concatenate([s.curve_cell_dofs.ravel() for s in self.contact.sides]))
-        mine = mine[np.isin(mine // 2, near)]
-        return np.sort(np.concatenate(self.comm.allgather(mine)))
+        free = np.zeros((len(near), 2))
+        start = self.V.dofmap.index_map.local_range[0]
+        mine = (near >= start) & (near < start + self.n_owned)
+        free[mine] = ~self._fixed[near[mine] - start]
+        self.comm.Allreduce(MPI.IN_PLACE, free)
+        return near, free
 
     def _jacobian(self, snes, x, A, P) -> None:
         A = self._A
@@ -136,20 +138,22 @@ class Equilibrium:
             self.bulk.assemble_plastic(A, self._bcs)
         with self.timer("assemble contact"):
             if self.contact is not None:
-                self._add_entries(A, *self.contact.tangent())
+                self._add_blocks(A, *self.contact.tangent())
             A.assemble()
 
-    def _add_entries(self, A: PETSc.Mat, rows: np.ndarray, columns: np.ndarray, values: Array) -> None:
-        """Add entries in global scalar dofs to ``A``, without those of prescribed displacements."""
-        keep = ~(np.isin(rows, self._global_fixed) | np.isin(columns, self._global_fixed))
-        rows, columns, values = rows[keep], columns[keep], values[keep]
-        size = 2 * self.V.dofmap.index_map.size_global
+    def _add_blocks(self, A: PETSc.Mat, rows: np.ndarray, columns: np.ndarray, values: Array) -> None:
+        """Add blocks ``(n, 2, 2)`` in global block dofs to ``A``, nothing to those of prescribed displacements."""
+        if not len(rows):
+            return
+        size = self.V.dofmap.index_map.size_global
         key, slot = np.unique(rows * size + columns, return_inverse=True)
-        summed = np.bincount(slot, weights=values, minlength=len(key))
-        row, start = np.unique(key // size, return_index=True)
-        csr = (np.append(start, len(key)), key % size, row)
-        offsets, column, rowmap = (index.astype(PETSc.IntType) for index in csr)
-        A.setValuesIJV(offsets, column, summed, PETSc.InsertMode.ADD, rowmap)
+        summed = np.stack([np.bincount(slot, v, len(key)) for v in values.reshape(-1, 4).T], axis=1).reshape(-1, 2, 2)
+        row, column = np.divmod(key, size)
+        summed *= self._free_near[np.searchsorted(self._near, row), :, None]
+        summed *= self._free_near[np.searchsorted(self._near, column), None, :]
+        rowmap, start = np.unique(row, return_index=True)
+        offsets, column, rowmap = (i.astype(PETSc.IntType) for i in (np.append(start, len(key)), column, rowmap))
+        A.setValuesBlockedIJV(offsets, column, summed, PETSc.InsertMode.ADD, rowmap)
 
     # ------------------------------------------------------------------ residual
 

@@ -12,8 +12,6 @@ from archord.materials.elasticity import Array, Elastic, elastic_stress, elastic
 class ElasticPoints:
     """Points of a linear elastic body: no history."""
 
-    has_history = False
-
     def __init__(self, material: Elastic) -> None:
         self.material = material
         self.elastic_tangent = elastic_tangent(material.E, material.nu, material.plane)
@@ -33,8 +31,6 @@ class PlasticPoints:
 
     With ``elastic_only`` set, `update` answers as if the points could not yield (further).
     """
-
-    has_history = True
 
     def __init__(self, material, n: int) -> None:
         from archord.materials.j2 import PlasticState
