@@ -76,15 +76,14 @@ class Contact:
         self.comm = sides[0].comm
         opposites: list = [rigid] if rigid is not None else [sides[1], sides[0]]
         chosen = range(len(sides)) if one_sided is None else [one_sided]
-        if rigid is None:
-            for i in chosen:
-                sides[i].place_points(*segment_rule(sides[i].curve, sides[1 - i].curve))
         compliance = np.array([1 / sides[i].points.elastic_tangent[0, 0] for i in chosen])
         self.pairings: list[Pairing] = []
         failure = None
         for i, share in zip(chosen, compliance / compliance.sum(), strict=True):
-            gamma = np.repeat(gamma_factor * share * sides[i].gamma, sides[i].weight.shape[1])
             try:
+                if rigid is None:
+                    sides[i].place_points(*segment_rule(sides[i].curve, sides[1 - i].curve))
+                gamma = np.repeat(gamma_factor * share * sides[i].gamma, sides[i].weight.shape[1])
                 self.pairings.append(Pairing(sides[i], opposites[i], float(share), gamma, kinematics))
             except ProjectionError as error:
                 failure = str(error)
