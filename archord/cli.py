@@ -17,7 +17,6 @@ import typer
 
 app = typer.Typer(
     name="archord",
-    help="Conformal contact of pins in holes: P(delta), pressure and plastic zone, by finite elements.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -42,6 +41,7 @@ def run(arguments: list[str], begun: float | None = None) -> int:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
     try:
         code = app(arguments, prog_name="archord", standalone_mode=False)
+        sys.stdout.flush()
         return code if isinstance(code, int) else 0
     except click.ClickException as error:
         if launcher_rank() == 0:
@@ -49,6 +49,9 @@ def run(arguments: list[str], begun: float | None = None) -> int:
         return error.exit_code
     except click.exceptions.Abort:
         return 130
+    except BrokenPipeError:  # the reader, like head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except KeyboardInterrupt:
         say("archord: interrupted.")
         return 130
@@ -80,6 +83,23 @@ def _fail(error: Exception) -> int:
     return 1
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from archord import __version__
+
+        print(f"archord {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="print the version")
+    ] = False,
+) -> None:
+    """Conformal contact of pins in holes: P(delta), pressure and plastic zone, by finite elements."""
+
+
 @app.command()
 def solve(
     scene: Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)")],
@@ -92,7 +112,7 @@ def solve(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but errors")] = False,
 ) -> int:
     """Solve a scene into a run folder. Under mpirun, all ranks work on it."""
-    from archord.solver.scene import load_scene
+    from archord.solver.scene_file import load_scene
 
     checked = load_scene(scene, overrides or [])
     folder = output or Path("runs") / scene.stem
@@ -122,12 +142,12 @@ def scene_format(
     """Print what a scene file may hold."""
     if schema + example + reference != 1:
         raise click.UsageError("choose one of --schema, --example and --reference")
-    from archord.solver import scene
+    from archord.solver import scene_format as scene
 
     if schema:
         import json
 
-        print(json.dumps(scene.Scene.model_json_schema(), indent=2))
+        print(json.dumps(scene.schema(), indent=2))
     else:
         print(scene.example() if example else scene.reference(), end="")
     return 0

@@ -43,7 +43,7 @@ def solve_with_progress(scene: Scene, folder: Path, *, force: bool, quiet: bool,
         print(f"archord: {outcome.status}; {len(outcome.steps)} accepted steps are in {folder}.", file=sys.stderr)
     elif comm.rank == 0 and not quiet:
         print(f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s, results in {folder}")
-    return {"done": 0, "stopped": 3, "interrupted": 130}[outcome.status]
+    return {"done": 0, "stopped": 3, "interrupted": 128 + outcome.signal}[outcome.status]
 
 
 def _shortened(warnings: list[str]) -> list[str]:

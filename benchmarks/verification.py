@@ -15,7 +15,7 @@ from time import perf_counter
 
 from archord.solver.measures import Measures
 from archord.solver.run import Outcome, solve_scene
-from archord.solver.scene import parse_scene
+from archord.solver.scene_file import parse_scene
 
 _E = 2 * (1 - 0.3**2)  # with E* = 1 and R = 1
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from archord.solver.history import read_history
 from archord.solver.run_folder import FILES
-from archord.solver.scene import SceneError, parse_scene
+from archord.solver.scene import SceneError
+from archord.solver.scene_file import parse_scene
 from archord.solver.step_file import step_name
 
 _SUBTRIANGLES = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]  # of a VTK second-order triangle
@@ -19,7 +20,7 @@ _SUBTRIANGLES = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]  # of a VTK second-
 def draw(folder: str | Path, target: str | Path | None = None) -> Path:
     """Draw the run in ``folder`` as ``target`` (by default ``picture.png`` in it); returns the file.
 
-    Raises `SceneError` if the folder holds no accepted step of a run.
+    Raises `SceneError` if the folder holds no accepted step of a run, or ``target`` cannot be written.
     """
     import matplotlib
 
@@ -28,12 +29,17 @@ def draw(folder: str | Path, target: str | Path | None = None) -> Path:
 
     folder = Path(folder)
     missing = [name for name in FILES if not (folder / name).is_file()]
-    if missing:
+    if "history.csv" in missing or "scene.toml" in missing:
         raise SceneError(f"{folder}: is not a run folder: {missing[0]} is missing.")
     history = read_history(folder / "history.csv")
-    if not history["step"]:
+    if missing or not history["step"]:
         raise SceneError(f"{folder}: holds no accepted step.")
     target = Path(target) if target else folder / "picture.png"
+    formats = plt.gcf().canvas.get_supported_filetypes()
+    if target.suffix[1:].lower() not in formats:
+        raise SceneError(f"{target}: must end in one of {', '.join('.' + name for name in sorted(formats))}.")
+    if not target.parent.is_dir():
+        raise SceneError(f"{target}: cannot be written: {target.parent} is not a folder.")
     scene = parse_scene(tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8")), str(folder / "scene.toml"))
     figure, axes = plt.subplots(1, 3, figsize=(13, 4.2), layout="constrained", width_ratios=[1.0, 1.1, 1.1])
     _zone(figure, axes[0], folder, scene, len(history["step"]))
@@ -67,17 +73,21 @@ def _zone(figure, axes, folder: Path, scene, step: int) -> None:
 
 
 def _pressure(axes, folder: Path, scene, history: dict[str, list[float]]) -> None:
-    """Projected contact pressure over the angle from the contact axis at up to four steps."""
+    """Mean contact pressure of each facet over the angle from the contact axis, at up to four steps."""
     n = len(history["step"])
     steps = sorted({max(1, round(n * k / 4)) for k in range(1, 5)})
     with h5py.File(folder / "contact.h5") as file:
         for i, step in enumerate(steps):
             for name in ("pin", "hole"):
                 if name in file:
-                    angle, p = np.degrees(file[f"{name}/angle"][()]), file[f"{name}/pressure/{step_name(step)}"][()]
+                    weight = file[f"{name}/weight"][()]
+                    angle, p = (
+                        (file[f"{name}/{what}"][()] * weight).sum(axis=1) / weight.sum(axis=1)
+                        for what in ("angle", f"pressure/{step_name(step)}")
+                    )
                     style = {"color": f"C{i}", "lw": 1.4, "ls": "-" if name == "hole" else "--"}
                     label = f"δ = {history['delta/dR'][step - 1]:g} ΔR" if name == "hole" else None
-                    axes.plot(angle.ravel(), p.ravel() / scene.E_star, label=label, **style)
+                    axes.plot(np.degrees(angle), p / scene.E_star, label=label, **style)
     title = "contact pressure (hole solid, pin dashed)" if scene.pin.solid else "contact pressure"
     axes.set(xlabel="angle from the contact axis [°]", ylabel="p / E*", title=title, xlim=(0, 90), ylim=(0, None))
     axes.legend(frameon=False)

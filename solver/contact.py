@@ -123,6 +123,14 @@ class Contact:
             self.search()
             raise ProjectionError(failures[0])
 
+    def round_off(self) -> float:
+        """Size of the force that rounding of this rank's contact points leaves: positions times gamma."""
+        squares = 0.0
+        for pair in self.pairings:
+            spring = (pair.share * pair.gamma * pair.side.weight.ravel())[pair.active]
+            squares += (spring**2).sum() * np.abs(pair.side.point).max(initial=0.0) ** 2
+        return float(2 * np.finfo(float).eps * np.sqrt(squares))
+
     def add_force(self, force: Array) -> None:
         """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, 2)`` of owned nodes."""
         on_curve = {id(side): np.zeros((len(side.curve_dofs), 2)) for side in self.sides}

@@ -20,6 +20,7 @@ from archord.geometry.curve import ProjectionError
 from archord.geometry.fenicsx import create_vector
 from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact import Contact
+from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.timer import Timer
 
 
@@ -49,6 +50,13 @@ class Newton:
     residuals: list[float]
     worst: tuple[float, float] | None = None
 
+    def after(self, before: Newton | None) -> Newton:
+        """This solve with the iterations and residuals of the one ``before`` it."""
+        if before is None:
+            return self
+        iterations, residuals = before.iterations + self.iterations, before.residuals + self.residuals
+        return replace(self, iterations=iterations, residuals=residuals)
+
 
 class Equilibrium:
     """Equilibrium of ``bulk`` and, if given, ``contact`` under ``supports``; ``rigid_rate`` moves a rigid pin with the
@@ -72,6 +80,7 @@ class Equilibrium:
         self.rigid_rate = rigid_rate
         self.tolerance, self.max_iterations = tolerance, max_iterations
         self.timer = timer or Timer()
+        self.interrupt = Interrupt()
         self.u = fem.Function(V, name="displacement")
         self.load = 0.0
         index_map = V.dofmap.index_map
@@ -86,7 +95,11 @@ class Equilibrium:
         self._free_owned = ~self._fixed[: self.n_owned].ravel()
         self._force = create_vector(index_map, 2)
         self._reaction = np.zeros((self.n_owned, 2))
-        self._reaction_norm = 0.0
+        self._reaction_norm = self._noise = 0.0
+        stiffness = max(body.material.E for body in bulk.bodies)
+        rate = max(float(np.max(np.abs(s.rate), initial=0.0)) for s in supports)
+        rigid = 0.0 if rigid_rate is None else float(np.abs(rigid_rate).max())
+        self._stiffest = stiffness * self.comm.allreduce(max(rate, rigid), op=MPI.MAX)
         self._make_matrix()
         self._raised: BaseException | None = None
         self._snes = self._make_snes()
@@ -173,7 +186,8 @@ class Equilibrium:
         f.array[:] = np.where(self._free_owned, self._force.array_r, 0.0)
 
     def evaluate(self) -> None:
-        """Residual, reactions and trial history at the current displacement and load."""
+        """Residual, reactions and trial history at the current displacement and load. Raises `Interrupted` on every
+        rank if ``interrupt`` was received by any."""
         u = self.u.x.array.reshape(-1, 2)
         with self.timer("return mapping"):
             self.bulk.update(u)
@@ -189,8 +203,13 @@ class Equilibrium:
                 self._pattern_grew = self.contact.evaluate(u)
                 self.contact.add_force(self._force.array.reshape(-1, 2))
         self._reaction = np.where(self._free_owned, 0.0, self._force.array_r).reshape(-1, 2)
-        square = float((self._reaction**2).sum())
-        self._reaction_norm = np.sqrt(self.comm.allreduce(square))
+        noise = 0.0 if self.contact is None else self.contact.round_off()
+        totals = np.array([(self._reaction**2).sum(), noise**2, self.interrupt.received > 0])
+        self.comm.Allreduce(MPI.IN_PLACE, totals)
+        self._reaction_norm, contact_noise = np.sqrt(totals[:2])
+        self._noise = self._bulk_noise() + contact_noise
+        if totals[2]:
+            raise Interrupted(self.comm.allreduce(self.interrupt.received, op=MPI.MAX))
 
     def _set_displacement(self, x: PETSc.Vec) -> None:
         self.u.x.array[: 2 * self.n_owned] = x.array_r
@@ -242,18 +261,14 @@ class Equilibrium:
 
         return call
 
-    def _floor(self) -> float:
-        """Round-off of the residual: forces that a rigid motion of the size of the load leaves."""
-        stiffness = max(body.material.E for body in self.bulk.bodies)
-        rate = max(float(np.max(np.abs(s.rate), initial=0.0)) for s in self.supports)
-        rigid = 0.0 if self.rigid_rate is None else float(np.abs(self.rigid_rate).max())
-        return 1e-13 * stiffness * abs(self.load) * self.comm.allreduce(max(rate, rigid), op=MPI.MAX)
+    def _bulk_noise(self) -> float:
+        """Round-off of the bulk's residual: forces that a rigid motion of the size of the load leaves."""
+        return 1e-13 * self._stiffest * abs(self.load)
 
     def _test(self, snes, iteration, norms):
         norm = norms[2]
         scale = max(self._reaction_norm, self._noise / self.tolerance)
-        relative = norm / scale if scale > 0 else norm
-        self._residuals.append(relative)
+        self._residuals.append(norm / self._reaction_norm if self._reaction_norm > 0 else norm)
         if not np.isfinite(norm):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
         if norm <= self.tolerance * scale:
@@ -270,21 +285,36 @@ class Equilibrium:
         fails, the solve starts from the guess.
         """
         self.load = load
-        self._noise = self._floor()
         points = self.bulk.plastic_points() + (self.contact.plastic_points() if self.contact is not None else [])
         yielding = self.comm.allreduce(len(points)) > 0
-        before = 0
-        if elastic_first and yielding:
+        if not yielding:
+            return self._run_elastic(guess)
+        before = None
+        if elastic_first:
             for p in points:
                 p.elastic_only = True
-            result = self._run(guess)
+            before = self._run_elastic(guess)
             for p in points:
                 p.elastic_only = False
-            before = result.iterations
-            if result.converged:
+            if before.converged:
                 guess = self.displacement()
+        return self._run(guess).after(before)
+
+    def _run_elastic(self, guess: Array) -> Newton:
+        """Without plasticity the problem is nearly linear by pieces, and full steps find the right ones where the line
+        search, which wants a smaller residual in every step, creeps: large gamma, nearly incompressible bodies."""
         result = self._run(guess)
-        return replace(result, iterations=before + result.iterations)
+        if result.converged:
+            return result
+        self._line_search("basic")
+        try:
+            return self._run(guess).after(result)
+        finally:
+            self._line_search("bt")
+
+    def _line_search(self, kind: str) -> None:
+        PETSc.Options("archord_")["snes_linesearch_type"] = kind
+        self._snes.setFromOptions()
 
     def _run(self, guess: Array) -> Newton:
         self._residuals: list[float] = []

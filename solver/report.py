@@ -52,13 +52,15 @@ class Report:
     def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
         """Note an accepted output step."""
         self.measures.append(m)
-        self.content["warnings"] += _warnings(self.joint, profiles, m)
+        self.content["warnings"] += _warnings(self.joint, profiles, m, step.residuals[-1][-1])
         self.content["steps"].append(asdict(m) | {"substeps": step.substeps, "residuals": step.residuals})
         self.write()
 
-    def finish(self, status: str, message: str) -> None:
-        """Note how the run ended."""
+    def finish(self, status: str, message: str, failed: Step | None = None) -> None:
+        """Note how the run ended, and the output step that ``failed``."""
         self.content |= {"status": status, "message": message}
+        if failed is not None:
+            self.content["failed_step"] = asdict(failed)
         self.write()
 
     def write(self) -> None:
@@ -136,15 +138,19 @@ def _model(joint: Joint) -> dict[str, Any]:
     }
 
 
-def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures) -> list[str]:
+def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
     said = []
     if any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc")
     touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
     if touching < _FEW_FACETS:
-        said.append(f"only {touching} facets in contact; a smaller element_size would resolve it")
+        said.append(
+            f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
+        )
     if m.delta > 0.1 * joint.scene.joint.radius:
         said.append("delta exceeds 0.1 R, too much for small-strain theory")
+    if residual > 1e-8:
+        said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
     if m.force_balance > 1e-8:
         said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")
     return [f"step {m.step}: {text}" for text in said]

@@ -12,20 +12,27 @@ from mpi4py import MPI
 from archord.solver.contact_file import ContactWriter
 from archord.solver.fields import FieldWriter
 from archord.solver.history import History
+from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures, Work, arc_profiles, measure
 from archord.solver.report import Report
 from archord.solver.run_folder import FILES
-from archord.solver.scene import Scene, resolved
+from archord.solver.scene import Scene
+from archord.solver.scene_file import resolved
 from archord.solver.stepping import Step, StepFailure, march
 from archord.solver.timer import Timer
+
+_UNSEEN = (
+    "no contact point is pressed, even at the largest delta: the contact is smaller than the mesh can see; reduce "
+    "joint.element_size or increase load.displacement"
+)
 
 
 @dataclass
 class Outcome:
     """How a run ended: ``status`` is "done", "stopped" or "interrupted" (``message`` says why), and its steps.
 
-    ``warnings`` are known on rank 0 only.
+    ``signal`` interrupted it. ``warnings`` are known on rank 0 only.
     """
 
     folder: Path
@@ -33,6 +40,7 @@ class Outcome:
     message: str
     steps: list[Measures]
     warnings: list[str]
+    signal: int = 0
 
 
 def solve_scene(
@@ -50,7 +58,7 @@ def solve_scene(
 
     ``on_start``, ``on_step`` and ``on_attempt(load, Newton iterations)`` report progress on every rank. ``begun`` is
     the ``perf_counter`` from which the seconds count. A step that cannot be solved ends the run with status "stopped",
-    Ctrl-C with "interrupted"; what was accepted before stays.
+    Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was accepted before stays.
     """
     begun = perf_counter() if begun is None else begun
     joint = Joint(scene, comm, timer=timer)
@@ -62,23 +70,26 @@ def solve_scene(
     def target_done(step: Step) -> None:
         on_step(output.add(step, work))
 
-    status, message = "done", ""
+    status, message, failed, received = "done", "", None, 0
     try:
-        march(
-            joint.equilibrium,
-            [scene.delta * k / n for k in range(1, n)] + [scene.delta],
-            joint.rigid_translation,
-            max_cutbacks=scene.load.max_cutbacks,
-            substep_done=lambda load: work.add(load, joint.forces()["pin"]),
-            target_done=target_done,
-            attempted=on_attempt,
-        )
+        with Interrupt() as joint.equilibrium.interrupt:
+            march(
+                joint.equilibrium,
+                [scene.delta * k / n for k in range(1, n)] + [scene.delta],
+                joint.rigid_translation,
+                max_cutbacks=scene.load.max_cutbacks,
+                substep_done=lambda load: work.add(load, joint.forces()["pin"]),
+                target_done=target_done,
+                attempted=on_attempt,
+            )
     except StepFailure as failure:
-        status, message = "stopped", str(failure)
-    except KeyboardInterrupt:
-        status, message = "interrupted", f"interrupted after {len(output.steps)} steps"
-    warnings = output.finish(status, message)
-    return Outcome(folder, status, message, output.steps, warnings)
+        status, message, failed = "stopped", str(failure), failure.attempt
+    except Interrupted as interrupted:
+        status, message, received = "interrupted", f"{interrupted} after step {len(output.steps)}", interrupted.number
+    if status == "done" and not joint.contact.n_active():
+        status, message = "stopped", _UNSEEN
+    warnings = output.finish(status, message, failed)
+    return Outcome(folder, status, message, output.steps, warnings, received)
 
 
 class _Output:
@@ -115,9 +126,9 @@ class _Output:
                 self._report.add(m, step, profiles)
         return m
 
-    def finish(self, status: str, message: str) -> list[str]:
+    def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
         """Note how the run ended; returns the warnings on rank 0."""
         if not self._root:
             return []
-        self._report.finish(status, message)
+        self._report.finish(status, message, failed)
         return self._report.content["warnings"]

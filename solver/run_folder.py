@@ -18,7 +18,7 @@ def claim_folder(folder: Path, force: bool) -> None:
             raise SceneError(f"{folder}: is a file, not a run folder.")
         if folder.exists() and any(folder.iterdir()) and not force:
             raise SceneError(
-                f"{folder}: already holds results; choose another folder with -o, or overwrite with --force."
+                f"{folder}: is not empty; choose another folder with -o, or overwrite a run in it with --force."
             )
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):

@@ -1,26 +1,20 @@
-"""The scene: what a TOML file says about a joint, checked, with every key's unit and default.
+"""The scene: a joint and its loading, checked, with every key's unit and default.
 
 Any consistent set of units will do; ``[units]`` only names them. Where a key has an alternative (``clearance`` and
-``relative_clearance``), the scene gives one of the two; an override drops the other.
+``relative_clearance``), the scene gives one of the two.
 """
 
 from __future__ import annotations
 
-import difflib
-import tomllib
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from archord.materials.elasticity import Elastic, contact_modulus
 
-ALTERNATIVES = {
-    "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
-    "load": [("displacement", "displacement_absolute")],
-}
-
+_LINE = r"^[^\x00-\x1f]*$"
+_RANGE = 1e-30, 1e30  # of lengths and moduli; powers of them must not leave the range of numbers
+_SOFTEST = 1e-8  # ratio of the moduli
 Positive = Annotated[float, Field(gt=0)]
 
 
@@ -31,6 +25,10 @@ def _key(description: str, unit: str = "", *, default: Any = ..., example: Any =
     return Field(default, description=description, examples=[example], json_schema_extra=extra, **limits)
 
 
+def _one_of(other: str, value: float | None) -> str:
+    return f"is missing (or {other})" if value is None else f"must not be given together with {other}"
+
+
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
@@ -38,8 +36,8 @@ class _Section(BaseModel):
 class Units(_Section):
     """Names of the scene's units, for headings; they must be consistent (force = stress times length squared)."""
 
-    length: str = _key("unit of length", default="mm", min_length=1)
-    stress: str = _key("unit of stress and of Young's modulus", default="MPa", min_length=1)
+    length: str = _key("unit of length", default="mm", min_length=1, pattern=_LINE)
+    stress: str = _key("unit of stress and of Young's modulus", default="MPa", min_length=1, pattern=_LINE)
 
     @property
     def force(self) -> str:
@@ -58,19 +56,25 @@ class JointGeometry(_Section):
     """The pin of radius ``R`` in a hole of radius ``R + dR``, and the mesh of both."""
 
     radius: float = _key("radius R of the pin", "length", gt=0, example=10.0)
-    clearance: Positive | None = _key("radial clearance dR = hole radius - pin radius", "length", default=None)
-    relative_clearance: Positive | None = _key("dR/R, instead of clearance", default=None, example=0.005)
-    block_size: Positive | None = _key("width and depth of the block; 100 R if absent", "length", default=None)
-    element_size: Positive | None = _key("edge length of the elements on both arcs", "length", default=None)
-    relative_element_size: Positive | None = _key(
-        "element_size / R, instead of element_size; 0.04 if both are absent", default=None, example=0.04
+    clearance: Positive | None = _key(
+        "radial clearance dR = hole radius - pin radius, 1e-6 to 0.5 times R", "length", default=None
     )
-    growth: float = _key("growth of the element size per unit of distance from the arcs", default=0.25, gt=0, le=2)
+    relative_clearance: Positive | None = _key("dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005)
+    block_size: Positive | None = _key(
+        "width and depth of the block, at least the diameter of the hole; 100 R if absent", "length", default=None
+    )
+    element_size: Positive | None = _key(
+        "edge length of the elements on both arcs, 1e-4 to 0.5 times R", "length", default=None
+    )
+    relative_element_size: Positive | None = _key(
+        "element_size / R, instead of element_size: 1e-4 to 0.5; 0.04 if both are absent", default=None, example=0.04
+    )
+    growth: float = _key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
 
     @model_validator(mode="after")
     def _geometry(self) -> JointGeometry:
         if (self.clearance is None) == (self.relative_clearance is None):
-            raise ValueError("clearance|must be given, or else relative_clearance, and not both")
+            raise ValueError("clearance|" + _one_of("relative_clearance", self.clearance))
         name = "clearance" if self.relative_clearance is None else "relative_clearance"
         if not 1e-6 <= self.dR / self.radius <= 0.5:
             raise ValueError(f"{name}|must be a clearance: between 1e-6 and 0.5 times the radius")
@@ -175,7 +179,7 @@ class Load(_Section):
     """The displacement of the pin, from first touch, in equal output steps."""
 
     displacement: Positive | None = _key(
-        "largest displacement delta of the pin, in clearances dR", default=None, example=2.0
+        "largest displacement delta of the pin, in clearances dR; at most R/2", default=None, example=2.0
     )
     displacement_absolute: Positive | None = _key(
         "largest displacement delta of the pin, instead of displacement", "length", default=None
@@ -186,7 +190,12 @@ class Load(_Section):
     @model_validator(mode="after")
     def _one_displacement(self) -> Load:
         if (self.displacement is None) == (self.displacement_absolute is None):
-            raise ValueError("displacement|must be given, or else displacement_absolute, and not both")
+            fault = (
+                "is missing (or displacement_absolute)"
+                if self.displacement is None
+                else "excludes displacement_absolute"
+            )
+            raise ValueError(f"displacement|{fault}")
         return self
 
 
@@ -203,7 +212,15 @@ class Scene(_Section):
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
         if self.pin.rigid and self.analysis.integration == "pin":
-            raise ValueError("analysis.integration|a rigid pin has no contact edge to integrate: block or both")
+            raise ValueError(
+                'analysis.integration|must be "block" or "both": a rigid pin has no contact edge to integrate'
+            )
+        sizes = {"joint.radius": self.joint.radius, "block.E": self.block.E, "pin.E": self.pin.E}
+        for name, size in sizes.items():
+            if size is not None and not _RANGE[0] <= size <= _RANGE[1]:
+                raise ValueError(f"{name}|must be between 1e-30 and 1e30; choose other units")
+        if self.pin.E is not None and not _SOFTEST <= self.pin.E / self.block.E <= 1 / _SOFTEST:
+            raise ValueError("pin.E|must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
         if self.delta > 0.5 * self.joint.radius:
             name = "displacement" if self.load.displacement_absolute is None else "displacement_absolute"
             raise ValueError(f"load.{name}|must not exceed half the radius ({0.5 * self.joint.radius:g})")
@@ -230,194 +247,3 @@ class Scene(_Section):
 
 class SceneError(ValueError):
     """Bad input; the message holds one sentence a line."""
-
-
-def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) -> Scene:
-    """Read and check the scene file ``path``, with ``overrides`` like ``"joint.clearance=0.01"`` on top.
-
-    Raises `SceneError` with one sentence per fault: file, key, value, and what is allowed.
-    """
-    try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"{path}: cannot be read: {error.strerror or error}.") from None
-    except UnicodeDecodeError:
-        raise SceneError(f"{path}: cannot be read: it is not UTF-8 text.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{path}: is not valid TOML: {error}.") from None
-    origin = {}
-    for override in overrides:
-        origin[_override(data, override)] = f"--set {override}"
-    return parse_scene(data, str(path), origin)
-
-
-def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, str] | None = None) -> Scene:
-    """Check scene ``data`` as read from ``source``; ``origin`` names another source of some keys. Raises
-    `SceneError`."""
-    try:
-        return Scene.model_validate(data)
-    except ValidationError as error:
-        sentences = [_sentence(e, data, source, origin or {}) for e in error.errors()]
-        raise SceneError("\n".join(sentences)) from None
-
-
-def _override(data: dict[str, Any], override: str) -> str:
-    """Set one ``a.b=value`` in ``data`` (value: TOML, a number, else text; nothing: drop it); returns the dotted
-    key."""
-    key, sign, text = override.partition("=")
-    key = key.strip()
-    section, dot, name = key.partition(".")
-    if not (sign and dot and section and name and "." not in name):
-        raise SceneError(f"--set {override}: must read section.key=value, like joint.clearance=0.01.")
-    table = data.setdefault(section, {})
-    if not isinstance(table, dict):
-        raise SceneError(f"--set {override}: {section} is not a section of the scene.")
-    for pair in ALTERNATIVES.get(section, []):
-        if name in pair:
-            for other in pair:
-                table.pop(other, None)
-    if not text.strip():
-        table.pop(name, None)
-        return key
-    value = _value(text.strip())
-    if key == "pin.rigid" and value is True:
-        table.clear()
-    table[name] = value
-    return key
-
-
-def _value(text: str) -> Any:
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        pass
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
-def _sentence(error: Any, data: dict[str, Any], source: str, origin: dict[str, str]) -> str:
-    """One sentence for one fault that pydantic found."""
-    location, kind, context = [str(part) for part in error["loc"]], error["type"], error.get("ctx", {})
-    said = None
-    if kind == "value_error":
-        name, said = str(context["error"]).split("|", 1)
-        location += name.split(".")
-    key = ".".join(location)
-    given: Any = data
-    for part in location:
-        given = given.get(part) if isinstance(given, dict) else None
-    where = next((said_in for name, said_in in origin.items() if name == key or name.startswith(f"{key}.")), source)
-    shown = "" if given is None or isinstance(given, dict) or where != source else f" = {_toml(given)}"
-    limits = {
-        "greater_than": "must be greater than {gt:g}",
-        "greater_than_equal": "must be at least {ge:g}",
-        "less_than": "must be less than {lt:g}",
-        "less_than_equal": "must be at most {le:g}",
-        "literal_error": "must be {expected}",
-        "float_type": "must be a number",
-        "int_type": "must be a whole number",
-        "bool_type": "must be true or false",
-        "string_type": "must be text",
-        "string_too_short": "must not be empty",
-        "finite_number": "must be a finite number",
-        "missing": "is missing",
-        "model_type": "must be a section, [{name}]",
-    }
-    if said is None and kind == "extra_forbidden":
-        allowed = _keys(location[:-1])
-        near = difflib.get_close_matches(location[-1], allowed, 1)
-        hint = f"did you mean {near[0]}? " if near else ""
-        said = f"is not a known key; {hint}{'Sections' if len(location) == 1 else 'Keys'} are {', '.join(allowed)}"
-    elif said is None:
-        said = limits.get(kind, error["msg"]).format(**{**context, "name": key})
-    return f"{where}: {key}{shown} {said}."
-
-
-def _keys(location: list[str]) -> list[str]:
-    model: Any = Scene
-    for part in location:
-        model = model.model_fields[part].annotation
-    return list(model.model_fields)
-
-
-def _toml(value: Any) -> str:
-    import json
-
-    return json.dumps(value, default=str, ensure_ascii=False)
-
-
-def resolved(scene: Scene) -> str:
-    """The scene as TOML, with every default filled in; it loads as the same scene."""
-    import tomli_w
-
-    data = scene.model_dump(exclude_none=True)
-    joint = data["joint"]
-    joint["block_size"] = scene.joint.W
-    if "element_size" not in joint:
-        joint.setdefault("relative_element_size", 0.04)
-    if scene.pin.rigid:
-        data["pin"] = {"rigid": True}
-    return tomli_w.dumps(data)
-
-
-def _sections() -> Iterator[tuple[str, Any, list[tuple[str, Any]]]]:
-    """Name, field and documented keys of every section."""
-    for section, info in Scene.model_fields.items():
-        model: Any = info.annotation
-        names = sorted(model.model_fields, key=lambda name: name not in ("E", "nu"))
-        yield section, info, [(name, model.model_fields[name]) for name in names]
-
-
-def _unit(key: Any) -> str:
-    return (key.json_schema_extra or {}).get("unit", "")
-
-
-_SHOWN = {"block_size": 1000.0, "clearance": 0.05, "element_size": 0.4, "displacement_absolute": 0.1}
-
-
-def example() -> str:
-    """A commented scene that shows every key; alternatives and absent defaults are commented out."""
-    lines = ["# An archord scene: archord solve scene.toml", ""]
-    for section, info, keys in _sections():
-        lines += [f"[{section}]  # {info.description}"]
-        for name, key in keys:
-            shown = (key.examples or [None])[0]
-            hidden = "# " if shown is None or name == "rigid" else ""
-            default = "" if key.is_required() or key.default is None else f", default {_toml(key.default)}"
-            unit = f" [{_unit(key)}]" if _unit(key) else ""
-            lines.append(f"{hidden}{name} = {_toml(_SHOWN.get(name, shown))}  # {key.description}{unit}{default}")
-        lines.append("")
-    return "\n".join(lines)
-
-
-def reference() -> str:
-    """All sections and keys as Markdown tables."""
-    lines = [
-        "# Scene reference",
-        "",
-        "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.",
-        "",
-    ]
-    for section, info, keys in _sections():
-        lines += [f"## [{section}]", "", f"{info.description[0].upper()}{info.description[1:]}.", ""]
-        lines += ["| key | unit | default | allowed | what |", "|---|---|---|---|---|"]
-        schema = info.annotation.model_json_schema()["properties"]
-        for name, key in keys:
-            default = "required" if key.is_required() else "" if key.default is None else f"`{_toml(key.default)}`"
-            what = key.description.replace("|", "\\|")
-            lines.append(f"| `{name}` | {_unit(key)} | {default} | {_allowed(schema[name])} | {what} |")
-        lines.append("")
-    return "\n".join(lines)
-
-
-def _allowed(schema: dict[str, Any]) -> str:
-    """Type and limits of a key from its JSON schema, in words."""
-    schema = next((s for s in schema.get("anyOf", []) if s.get("type") != "null"), schema)
-    if "enum" in schema:
-        return ", ".join(f"`{_toml(value)}`" for value in schema["enum"])
-    signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
-    limits = [f"{sign} {schema[name]:g}" for name, sign in signs.items() if name in schema]
-    kind = {"number": "number", "integer": "whole number", "boolean": "true, false", "string": "text"}[schema["type"]]
-    return " ".join([kind, ", ".join(limits)]).strip()

@@ -12,7 +12,14 @@ _PREDICTOR_LIMIT = 4.0  # an increment is not extrapolated to more than this man
 
 
 class StepFailure(RuntimeError):
-    """Equilibrium was not found even with the smallest allowed step; the last accepted state stands."""
+    """Equilibrium was not found even with the smallest allowed step; the last accepted state stands.
+
+    ``attempt`` is the output step that failed.
+    """
+
+    def __init__(self, message: str, attempt: Step) -> None:
+        super().__init__(message)
+        self.attempt = attempt
 
 
 @dataclass
@@ -68,7 +75,7 @@ def march(
                 in_a_row = 0
                 halvings += 1
                 if halvings > max_cutbacks:
-                    raise StepFailure(_why(result, new_load, record.cutbacks - 1, step))
+                    raise StepFailure(_why(result, new_load, halvings - 1, step), record)
                 continue
             record.substeps += 1
             new = equilibrium.displacement()
@@ -83,10 +90,10 @@ def march(
         start = target
 
 
-def _why(result: Newton, load: float, cutbacks: int, step: float) -> str:
+def _why(result: Newton, load: float, halvings: int, step: float) -> str:
     where = "" if result.worst is None else f", the largest residual at ({result.worst[0]:.4g}, {result.worst[1]:.4g})"
     last = f"{result.residuals[-1]:.1e}" if result.residuals else "none"
-    tried = f"the step was cut {cutbacks} times, to {step:.3g}" if cutbacks else "no smaller step is allowed"
+    tried = f"the step was halved {halvings} times, to {step:.3g}" if halvings else "no smaller step is allowed"
     return (
         f"no equilibrium at delta = {load:.6g}: {result.reason}; after {result.iterations} iterations the residual "
         f"over reaction was {last}{where}; {tried}"

@@ -37,7 +37,7 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
     second = archord("solve", SCENE, *COARSE, cwd=tmp_path)
     assert second.returncode == 2
     assert second.stderr == (
-        "runs/steel_pin: already holds results; choose another folder with -o, or overwrite with --force.\n"
+        "runs/steel_pin: is not empty; choose another folder with -o, or overwrite a run in it with --force.\n"
     )
     assert (tmp_path / "runs" / "steel_pin" / "history.csv").read_text() == history
     quiet = archord("solve", SCENE, *COARSE, "--force", "--quiet", cwd=tmp_path)
@@ -78,7 +78,7 @@ def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
     assert len(read_history(tmp_path / "runs" / "steel_pin" / "history.csv")["P"]) == 4
 
 
-@pytest.mark.parametrize(("kill", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
+@pytest.mark.parametrize(("kill", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
 def test_a_killed_run_leaves_its_steps_readable(tmp_path, kill, code):
     """Whatever step is on disk when the process dies can be read; Ctrl-C says so in one line."""
     command = [
@@ -110,9 +110,60 @@ def test_a_killed_run_leaves_its_steps_readable(tmp_path, kill, code):
         loads = [reader.read_data(k)[0] for k in range(reader.num_steps)]
     assert loads == sorted(loads)
     assert json.loads((tmp_path / "run" / "run.json").read_text())["totals"]["accepted_steps"] >= rows - 1
-    if kill == signal.SIGINT:
-        assert b"interrupted" in errors
+    if kill != signal.SIGKILL:
+        assert f"interrupted by {kill.name} after step {rows}".encode() in errors
         assert b"Traceback" not in errors
+        assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "interrupted"
+
+
+def test_ranks_stop_together(tmp_path):
+    """mpirun hands Ctrl-C on as SIGTERM: the run notes it before all ranks end."""
+    history = tmp_path / "run" / "history.csv"
+    command = [
+        "mpirun",
+        "-n",
+        "2",
+        sys.executable,
+        "-m",
+        "archord",
+        "solve",
+        SCENE,
+        "--set",
+        "load.steps=500",
+        "-o",
+        "run",
+    ]
+    with subprocess.Popen(
+        command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    ) as process:
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline and not (history.exists() and len(history.read_text().splitlines()) > 3):
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert b"Traceback" not in errors
+    report = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert report["status"] == "interrupted"
+    assert report["totals"]["accepted_steps"] == len(read_history(history)["P"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["empty"], "empty: is not a run folder: scene.toml is missing."),
+        (["run", "-o", "nowhere/picture.png"], "nowhere/picture.png: cannot be written: nowhere is not a folder."),
+        (["run", "-o", "picture.xyz"], "picture.xyz: must end in one of "),
+    ],
+)
+def test_a_picture_that_cannot_be_drawn_is_one_sentence(tmp_path, arguments, said):
+    """No run, no folder, no such format."""
+    (tmp_path / "empty").mkdir()
+    assert archord("solve", SCENE, *COARSE, "--set", "load.steps=1", "-o", "run", "-q", cwd=tmp_path).returncode == 0
+    result = archord("picture", *arguments, cwd=tmp_path)
+    assert result.returncode == 2
+    assert result.stderr.startswith(said)
+    assert len(result.stderr.splitlines()) == 1
 
 
 def test_scene_prints_schema_and_example(tmp_path):

@@ -9,7 +9,8 @@ from mpi4py import MPI
 from archord.solver.contact_profile import ArcProfile
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures, Work, arc_profiles, measure
-from archord.solver.scene import Scene, parse_scene
+from archord.solver.scene import Scene
+from archord.solver.scene_file import parse_scene
 from archord.solver.stepping import march
 
 E = 2 * (1 - 0.3**2)  # E* = 1 for two like bodies in plane strain

@@ -94,6 +94,30 @@ def test_gamma_does_not_matter():
     assert forces == pytest.approx([forces[0]] * 3, rel=1e-4)
 
 
+EXTREMES = {
+    "tight fit": {"joint": {"clearance": 1e-6}},
+    "tiny load": {"load": {"displacement": 1e-3}},
+    "large gamma": {"analysis": {"gamma_factor": 100.0}},
+    "nearly incompressible": {"pin": {"nu": 0.499}, "block": {"nu": 0.499}},
+    "soft pin": {"pin": {"E": 1e-6 * E}},
+}
+
+
+@pytest.mark.parametrize("extreme", EXTREMES)
+def test_extreme_joints_are_solved_to_round_off(extreme):
+    """Where rounding of positions of size R limits the residual, it is what remains, and the forces balance."""
+    solution = solve(scene(0.08, steps=2, **EXTREMES[extreme]))
+    limit = max(1e-10, 2 * solution.joint.contact.round_off() / solution.steps[-1].P)
+    assert all(m.force_balance < max(1e-8, limit) for m in solution.steps)
+    assert sum(m.cutbacks for m in solution.steps) == 0
+
+
+def test_the_force_is_proportional_to_the_clearance():
+    """P(delta/dR) / dR tends to a limit as dR/R falls (concentric circles): 1e-6 R against 1e-4 R."""
+    tight, tighter = (solve(scene(joint={"clearance": c}, steps=1)).steps[-1].P / c for c in (1e-4, 1e-6))
+    assert tight == pytest.approx(tighter, rel=1e-3)
+
+
 def test_energy_is_kept_within_the_step_error():
     """Work = stored + dissipated; what is missing falls at least with the step, to below 0.1 %."""
     missing = []

@@ -11,7 +11,8 @@ from mpi4py import MPI
 from archord.solver.history import read_history
 from archord.solver.run import solve_scene
 from archord.solver.run_folder import FILES, claim_folder
-from archord.solver.scene import SceneError, load_scene
+from archord.solver.scene import SceneError
+from archord.solver.scene_file import load_scene
 from tests.solver.solving import scene
 
 
@@ -120,6 +121,13 @@ def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
         assert reader.num_steps == 4
     with h5py.File(tmp_path / "contact.h5") as file:
         assert file["accepted"][()] == 4
+
+
+def test_a_contact_that_no_point_sees_is_no_success(tmp_path):
+    """A load far below what the mesh resolves leaves no contact point pressed: stopped, not a joint without force."""
+    outcome = solve_scene(scene(0.08, steps=1, load={"displacement": 1e-8}), tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "stopped"
+    assert "the contact is smaller than the mesh can see" in outcome.message
 
 
 @pytest.mark.mpi

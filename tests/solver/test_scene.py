@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from archord.solver.scene import Scene, SceneError, example, load_scene, parse_scene, reference, resolved
+from archord.solver.scene import Scene, SceneError
+from archord.solver.scene_file import load_scene, parse_scene, resolved
+from archord.solver.scene_format import example, reference
 
 
 def basic() -> dict:
@@ -27,17 +29,17 @@ def basic() -> dict:
         ("joint", "radius", float("inf"), "scene: joint.radius = Infinity must be a finite number."),
         ("joint", "relative_clearance", 0.0, "scene: joint.relative_clearance = 0.0 must be greater than 0."),
         ("joint", "relative_clearance", 0.9, "must be a clearance: between 1e-6 and 0.5 times the radius."),
-        ("joint", "clearance", 0.05, "must be given, or else relative_clearance, and not both."),
+        ("joint", "clearance", 0.05, "= 0.05 must not be given together with relative_clearance."),
         ("joint", "element_size", 20.0, "must be between 1e-4 and 0.5 times the radius."),
         ("joint", "block_size", 15.0, "must be at least twice the radius of the hole."),
         ("joint", "raduis", 1.0, "did you mean radius?"),
-        ("block", "nu", 0.5, "scene: block.nu = 0.5 must be less than 0.5."),
+        ("block", "nu", 0.5, "scene: block.nu = 0.5 must be greater than -1 and less than 0.5."),
         ("block", "rigid", True, "is not a known key"),
         ("block", "hardening", 1.0, "needs a yield_stress."),
         ("block", "yield_stress", 0.0, "must be greater than 0."),
         ("pin", "rigid", True, "is not for a rigid pin."),
         ("load", "steps", 2.5, "must be a whole number."),
-        ("load", "steps", 0, "must be at least 1."),
+        ("load", "steps", 0, "must be at least 1 and at most 100000."),
         ("load", "displacement", -2.0, "must be greater than 0."),
         ("load", "displacement", 200.0, "must not exceed half the radius (5)."),
     ],
