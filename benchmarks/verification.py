@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
+from archord.benchmarks.paper_joint import paper_joint
 from archord.solver.measures import Measures
 from archord.solver.run import Outcome, solve_scene
-from archord.solver.scene_file import parse_scene
-
-_E = 2 * (1 - 0.3**2)  # with E* = 1 and R = 1
 
 
 @dataclass(frozen=True)
@@ -34,17 +32,9 @@ class _Row:
         return f"| {self.what} | {numbers} | {self.detail} |"
 
 
-def _solve(element_size: float, steps: int, yield_stress: float = 0.0, **sections: dict) -> tuple[Outcome, str]:
-    """Solve the paper's joint in units of R = E* = 1; the outcome, and its cost in words."""
-    solid = {"E": _E, "nu": 0.3} | ({"yield_stress": yield_stress} if yield_stress else {})
-    data: dict = {
-        "joint": {"radius": 1.0, "clearance": 0.005, "element_size": element_size},
-        "pin": solid,
-        "block": solid,
-        "load": {"displacement": 2.0, "steps": steps},
-    }
-    for name, values in sections.items():
-        data[name] = data.get(name, {}) | values
+def _solve(element_size: float, steps: int, yield_stress: float | None = None, **sections: dict) -> tuple[Outcome, str]:
+    """Solve the paper's joint; the outcome, and its cost in words."""
+    scene = paper_joint(element_size, steps, yield_stress, **sections)
     dofs = 0
 
     def count(joint) -> None:
@@ -53,7 +43,7 @@ def _solve(element_size: float, steps: int, yield_stress: float = 0.0, **section
 
     start = perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        outcome = solve_scene(parse_scene(data), Path(folder), on_start=count)
+        outcome = solve_scene(scene, Path(folder), on_start=count)
     iterations = sum(m.iterations for m in outcome.steps) / steps
     return outcome, f"{dofs} dofs, {iterations:.1f} iterations a step, {perf_counter() - start:.1f} s"
 

@@ -19,6 +19,7 @@ COARSE = ["--set", "joint.relative_element_size=0.1", "--set", "load.steps=4"]
 ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_"))}
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
+SOLVE = [sys.executable, "-m", "archord", "solve", SCENE]
 
 
 def archord(*arguments: str, cwd: Path, ranks: int = 0) -> subprocess.CompletedProcess:
@@ -78,30 +79,27 @@ def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
     assert len(read_history(tmp_path / "runs" / "steel_pin" / "history.csv")["P"]) == 4
 
 
-@pytest.mark.parametrize(("kill", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
-def test_a_killed_run_leaves_its_steps_readable(tmp_path, kill, code):
-    """Whatever step is on disk when the process dies can be read; Ctrl-C says so in one line."""
-    command = [
-        sys.executable,
-        "-m",
-        "archord",
-        "solve",
-        SCENE,
-        "--set",
-        "joint.relative_element_size=0.02",
-        "-o",
-        "run",
-    ]
-    history = tmp_path / "run" / "history.csv"
+def kill_after_three_steps(command: list[str], kill: int, folder: Path) -> tuple[int, bytes]:
+    """Run ``command``, which writes to ``run``, send it the signal once three steps are there; exit code and stderr."""
+    history = folder / "run" / "history.csv"
     with subprocess.Popen(
-        command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        command, cwd=folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     ) as process:
         deadline = time.monotonic() + 120
         while time.monotonic() < deadline and not (history.exists() and len(history.read_text().splitlines()) > 3):
             time.sleep(0.02)
         process.send_signal(kill)
-        _, errors = process.communicate(timeout=60)
-        assert process.returncode == code
+        errors = process.communicate(timeout=60)[1]
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize(("kill", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
+def test_a_killed_run_leaves_its_steps_readable(tmp_path, kill, code):
+    """Whatever step is on disk when the process dies can be read; Ctrl-C says so in one line."""
+    command = [*SOLVE, "--set", "joint.relative_element_size=0.02", "-o", "run"]
+    returned, errors = kill_after_three_steps(command, kill, tmp_path)
+    assert returned == code
+    history = tmp_path / "run" / "history.csv"
     rows = len(read_history(history)["P"])
     assert 3 <= rows < 20
     with meshio.xdmf.TimeSeriesReader(tmp_path / "run" / "fields.xdmf") as reader:
@@ -118,34 +116,13 @@ def test_a_killed_run_leaves_its_steps_readable(tmp_path, kill, code):
 
 def test_ranks_stop_together(tmp_path):
     """mpirun hands Ctrl-C on as SIGTERM: the run notes it before all ranks end."""
-    history = tmp_path / "run" / "history.csv"
-    command = [
-        "mpirun",
-        "-n",
-        "2",
-        sys.executable,
-        "-m",
-        "archord",
-        "solve",
-        SCENE,
-        "--set",
-        "load.steps=500",
-        "-o",
-        "run",
-    ]
-    with subprocess.Popen(
-        command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-    ) as process:
-        deadline = time.monotonic() + 120
-        while time.monotonic() < deadline and not (history.exists() and len(history.read_text().splitlines()) > 3):
-            time.sleep(0.02)
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
-    assert process.returncode != 0
+    command = ["mpirun", "-n", "2", *SOLVE, "--set", "load.steps=500", "-o", "run"]
+    returned, errors = kill_after_three_steps(command, signal.SIGINT, tmp_path)
+    assert returned != 0
     assert b"Traceback" not in errors
     report = json.loads((tmp_path / "run" / "run.json").read_text())
     assert report["status"] == "interrupted"
-    assert report["totals"]["accepted_steps"] == len(read_history(history)["P"])
+    assert report["totals"]["accepted_steps"] == len(read_history(tmp_path / "run" / "history.csv")["P"])
 
 
 @pytest.mark.parametrize(

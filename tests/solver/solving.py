@@ -6,28 +6,16 @@ from dataclasses import dataclass
 
 from mpi4py import MPI
 
+from archord.benchmarks.paper_joint import E, paper_joint
 from archord.solver.contact_profile import ArcProfile
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures, Work, arc_profiles, measure
 from archord.solver.scene import Scene
-from archord.solver.scene_file import parse_scene
 from archord.solver.stepping import march
 
-E = 2 * (1 - 0.3**2)  # E* = 1 for two like bodies in plane strain
+__all__ = ["E", "Solution", "scene", "solve"]
 
-
-def scene(element_size: float = 0.04, steps: int = 4, sigma_y: float | None = None, **sections: dict) -> Scene:
-    """The paper's joint: dR/R = 0.5 %, nu = 0.3, like bodies, delta = 2 dR; ``sections`` override."""
-    solid = {"E": E, "nu": 0.3} | ({"yield_stress": sigma_y} if sigma_y else {})
-    data: dict = {
-        "joint": {"radius": 1.0, "clearance": 0.005, "element_size": element_size},
-        "pin": solid,
-        "block": solid,
-        "load": {"displacement": 2.0, "steps": steps},
-    }
-    for name, values in sections.items():
-        data[name] = values if values.get("rigid") else data.get(name, {}) | values
-    return parse_scene(data)
+scene = paper_joint
 
 
 @dataclass

@@ -38,7 +38,7 @@ def test_elastic_contact_angle_and_peak_pressure():
 @pytest.mark.parametrize("element_size", [0.04, 0.02])
 def test_plastic_force_agrees_with_independent_solvers(element_size):
     """P(2 dR) within 0.2 % of GetFEM's and NGSolve's 0.006692, in at most 7 iterations a step and without cutback."""
-    solution = solve(scene(element_size, steps=20, sigma_y=0.002))
+    solution = solve(scene(element_size, steps=20, yield_stress=0.002))
     assert pytest.approx(0.006692, rel=2e-3) == solution.steps[-1].P
     assert sum(m.iterations for m in solution.steps) <= 7 * 20
     assert sum(m.cutbacks for m in solution.steps) == 0
@@ -46,19 +46,19 @@ def test_plastic_force_agrees_with_independent_solvers(element_size):
 
 def test_the_finest_plastic_mesh_completes():
     """0.5 %R elements, perfect plasticity with shear bands: the same force."""
-    solution = solve(scene(0.005, steps=20, sigma_y=0.002))
+    solution = solve(scene(0.005, steps=20, yield_stress=0.002))
     assert len(solution.steps) == 20
     assert pytest.approx(0.006692, rel=2e-3) == solution.steps[-1].P
 
 
 VARIANTS = {
     "elastic": {},
-    "plastic": {"sigma_y": 0.002},
-    "plane stress": {"sigma_y": 0.004, "analysis": {"plane": "stress"}},
-    "reference": {"sigma_y": 0.002, "analysis": {"kinematics": "reference"}},
+    "plastic": {"yield_stress": 0.002},
+    "plane stress": {"yield_stress": 0.004, "analysis": {"plane": "stress"}},
+    "reference": {"yield_stress": 0.002, "analysis": {"kinematics": "reference"}},
     "one-sided": {"analysis": {"integration": "block"}},
-    "rigid pin": {"sigma_y": 0.002, "pin": {"rigid": True}},
-    "stiff pin": {"sigma_y": 0.002, "pin": {"E": 100 * E}},
+    "rigid pin": {"yield_stress": 0.002, "pin": {"rigid": True}},
+    "stiff pin": {"yield_stress": 0.002, "pin": {"E": 100 * E}},
     "hardening": {"block": {"yield_stress": 0.001, "hardening": 0.05}},
 }
 
@@ -122,7 +122,7 @@ def test_energy_is_kept_within_the_step_error():
     """Work = stored + dissipated; what is missing falls at least with the step, to below 0.1 %."""
     missing = []
     for steps in (5, 10, 20):
-        m = solve(scene(0.08, steps, sigma_y=0.002)).steps[-1]
+        m = solve(scene(0.08, steps, yield_stress=0.002)).steps[-1]
         missing.append(abs(m.work - m.elastic_energy - m.plastic_dissipation) / m.work)
     assert missing[1] < 0.6 * missing[0]
     assert missing[2] < 0.6 * missing[1]
@@ -140,7 +140,7 @@ def test_a_very_stiff_pin_is_a_rigid_pin():
 def test_like_bodies_share_pin_and_hole_swapped():
     """An elastic body with a yield stress out of reach is elastic."""
     elastic = solve(scene(0.08, 2)).steps[-1]
-    plastic = solve(scene(0.08, 2, sigma_y=1e3)).steps[-1]
+    plastic = solve(scene(0.08, 2, yield_stress=1e3)).steps[-1]
     assert pytest.approx(elastic.P, rel=1e-9) == plastic.P
     assert plastic.elastic_energy == pytest.approx(elastic.elastic_energy, rel=1e-9)
     assert plastic.peeq_max == 0

@@ -19,7 +19,7 @@ from tests.solver.solving import scene
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    outcome = solve_scene(scene(0.08, 4, sigma_y=0.002), folder, MPI.COMM_SELF)
+    outcome = solve_scene(scene(0.08, 4, yield_stress=0.002), folder, MPI.COMM_SELF)
     return outcome
 
 
@@ -110,7 +110,7 @@ def test_the_resolved_scene_gives_the_same_numbers(run, tmp_path):
 
 def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
     """Four of ten steps, then no convergence: all four readable, and run.json says why."""
-    problem = scene(0.08, 10, sigma_y=0.002, analysis={"max_iterations": 5}, load={"max_cutbacks": 0})
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5}, load={"max_cutbacks": 0})
     outcome = solve_scene(problem, tmp_path, MPI.COMM_SELF)
     assert outcome.status == "stopped"
     assert len(read_history(tmp_path / "history.csv")["P"]) == 4
@@ -135,7 +135,7 @@ def test_ranks_write_the_same_files(tmp_path_factory):
     """fields.h5 and contact.h5 of all ranks together equal those of one rank, in the same order."""
     comm = MPI.COMM_WORLD
     folder = comm.bcast(tmp_path_factory.mktemp("ranks") if comm.rank == 0 else None)
-    problem = scene(0.1, 2, sigma_y=0.002)
+    problem = scene(0.1, 2, yield_stress=0.002)
     if comm.rank == 0:
         (folder / "one").mkdir()
         (folder / "all").mkdir()

@@ -9,8 +9,8 @@ from tests.solver.solving import scene, solve
 
 def test_cutbacks_change_the_path_but_not_the_targets():
     """With too few iterations allowed, steps are cut, all targets are hit, and P agrees within the step error."""
-    free = solve(scene(0.08, 4, sigma_y=0.002))
-    bound = solve(scene(0.08, 4, sigma_y=0.002, analysis={"max_iterations": 5}))
+    free = solve(scene(0.08, 4, yield_stress=0.002))
+    bound = solve(scene(0.08, 4, yield_stress=0.002, analysis={"max_iterations": 5}))
     assert sum(m.cutbacks for m in free.steps) == 0
     assert sum(m.cutbacks for m in bound.steps) > 0
     assert [m.delta for m in bound.steps] == [m.delta for m in free.steps]
@@ -19,7 +19,7 @@ def test_cutbacks_change_the_path_but_not_the_targets():
 
 def test_a_failed_step_leaves_no_trace():
     """Displacement and all history are what they were at the last accepted load."""
-    joint = solve(scene(0.1, 2, sigma_y=0.002)).joint
+    joint = solve(scene(0.1, 2, yield_stress=0.002)).joint
     equilibrium = joint.equilibrium
     points = joint.bulk.plastic_points() + joint.contact.plastic_points()
     states = [p.state for p in points]
@@ -38,7 +38,7 @@ def test_a_failed_step_leaves_no_trace():
 
 def test_a_solve_that_cannot_go_on_says_where_and_why():
     """The message holds delta, the reason, the residual and its place; accepted steps were reported before."""
-    problem = scene(0.08, 10, sigma_y=0.002, analysis={"max_iterations": 5})
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5})
     from archord.solver.joint import Joint
     from tests.solver.solving import MPI
 
@@ -60,4 +60,4 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
 
 def test_one_large_step_finds_the_plastic_state():
     """Elastic first touch, then the plastic state at 2 dR at once: the force of 20 steps within 0.5 %."""
-    assert pytest.approx(0.00669, rel=5e-3) == solve(scene(0.08, 1, sigma_y=0.002)).steps[-1].P
+    assert pytest.approx(0.00669, rel=5e-3) == solve(scene(0.08, 1, yield_stress=0.002)).steps[-1].P
