@@ -8,40 +8,12 @@ gmsh works in units of R whatever the units of the scene, so meshes do not depen
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
-from dolfinx.mesh import Mesh, MeshTags
 from mpi4py import MPI
 
 from archord.geometry.fenicsx import gmsh_to_mesh
-
-
-class Cells(IntEnum):
-    """Cell tags: the two bodies."""
-
-    PIN = 1
-    BLOCK = 2
-
-
-class Facets(IntEnum):
-    """Facet tags of the edges that carry a condition; the block's other edges are free."""
-
-    PIN_ARC = 1
-    HOLE_ARC = 2
-    PIN_TOP = 3
-    BLOCK_TOP = 4
-    SYMMETRY = 5
-
-
-@dataclass(frozen=True)
-class JointMesh:
-    """A mesh of the joint with its tags; all bodies live in one mesh."""
-
-    mesh: Mesh
-    cells: MeshTags
-    facets: MeshTags
+from archord.geometry.joint_mesh import Cells, Facets, JointMesh, on_circle, tag_and_size
 
 
 def quarter_joint(
@@ -83,27 +55,14 @@ def quarter_joint(
         arc = geo.addCircleArc(bottom, centre, side)
         edges = [geo.addLine(a, b) for a, b in zip([side, *corners], [*corners, bottom], strict=True)]
         faces[Cells.BLOCK] = geo.addPlaneSurface([geo.addCurveLoop([arc, *edges])])
-        curves[Facets.HOLE_ARC], curves[Facets.BLOCK_TOP] = [arc], [edges[0]]
+        curves[Facets.HOLE_ARC], curves[Facets.BLOCK_HELD] = [arc], [edges[0]]
         curves[Facets.SYMMETRY] += [edges[-1]]
         geo.mesh.setTransfiniteCurve(arc, n_edges + 1)
-        geo.synchronize()
-        for tag, face in faces.items():
-            gmsh.model.addPhysicalGroup(2, [face], tag)
-        for edge, lines in curves.items():
-            if lines:
-                gmsh.model.addPhysicalGroup(1, lines, edge)
-        field = gmsh.model.mesh.field.add("MathEval")
-        gmsh.model.mesh.field.setString(field, "F", f"{size!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})")
-        gmsh.model.mesh.field.setAsBackgroundMesh(field)
+        tag_and_size(gmsh, faces, curves, f"{size!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})")
 
-    def on_the_arcs(x: np.ndarray, tag: int) -> np.ndarray:
-        """Exact radius for the nodes of the arcs: the clearance is a small difference of large numbers."""
+    def exact(x: np.ndarray, tag: int) -> np.ndarray:
         if tag == Facets.PIN_ARC:
-            centre = np.array([0.0, 1 - hole, 0.0])
-            ray = x - centre
-            return ray / np.linalg.norm(ray, axis=1)[:, None] + centre
-        if tag == Facets.HOLE_ARC:
-            return x * (hole / np.linalg.norm(x, axis=1))[:, None]
-        return x
+            return on_circle(x, (0.0, 1 - hole), 1.0)
+        return on_circle(x, (0.0, 0.0), hole) if tag == Facets.HOLE_ARC else x
 
-    return JointMesh(*gmsh_to_mesh(comm, build, on_the_arcs, scale=radius, partitioner=partitioner))
+    return JointMesh(*gmsh_to_mesh(comm, build, exact, scale=radius, partitioner=partitioner))

@@ -8,7 +8,8 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import RigidCircle
-from archord.geometry.quarter_joint import Cells, Facets, JointMesh, quarter_joint
+from archord.geometry.joint_mesh import Cells, Facets, JointMesh
+from archord.geometry.quarter_joint import quarter_joint
 from archord.solver.bulk import Body, Bulk
 from archord.solver.contact import Contact
 from archord.solver.contact_side import ContactSide
@@ -72,8 +73,8 @@ class Joint:
     def _supports(self) -> list[Support]:
         supports = [
             Support("axis", 0, self._nodes(Facets.SYMMETRY)),
-            Support("block", 0, self._nodes(Facets.BLOCK_TOP)),
-            Support("block", 1, self._nodes(Facets.BLOCK_TOP)),
+            Support("block", 0, self._nodes(Facets.BLOCK_HELD)),
+            Support("block", 1, self._nodes(Facets.BLOCK_HELD)),
         ]
         if not self.scene.pin.rigid:
             supports.append(Support("pin", 1, self._nodes(Facets.PIN_TOP), -1.0))

@@ -8,7 +8,8 @@ from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis
-from archord.geometry.quarter_joint import Cells, Facets, quarter_joint
+from archord.geometry.joint_mesh import Cells, Facets
+from archord.geometry.quarter_joint import quarter_joint
 
 R, DR, W = 1.0, 0.005, 10.0
 SIZE, GROWTH = 0.2, 0.4
@@ -118,16 +119,16 @@ def test_a_rigid_pin_is_not_meshed(joint):
     """No cells and no facets of a pin; the block is the same to the area."""
     rigid = quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH, rigid_pin=True)
     assert set(rigid.cells.values) == {Cells.BLOCK}
-    assert set(rigid.facets.values) == {Facets.HOLE_ARC, Facets.BLOCK_TOP, Facets.SYMMETRY}
+    assert set(rigid.facets.values) == {Facets.HOLE_ARC, Facets.BLOCK_HELD, Facets.SYMMETRY}
     assert area(rigid, Cells.BLOCK) == pytest.approx(area(joint, Cells.BLOCK), rel=1e-12)
 
 
 def test_tagged_edges_are_where_their_names_say(joint):
     """Tops on y = 0 and y = -dR, symmetry on x = 0 along pin and block, each with its full length."""
-    pin_top, block_top, axis = (facet_nodes(joint, t) for t in (Facets.PIN_TOP, Facets.BLOCK_TOP, Facets.SYMMETRY))
+    pin_top, block_top, axis = (facet_nodes(joint, t) for t in (Facets.PIN_TOP, Facets.BLOCK_HELD, Facets.SYMMETRY))
     np.testing.assert_allclose(pin_top[..., 1], -DR, atol=1e-15)
     np.testing.assert_allclose(block_top[..., 1], 0, atol=1e-15)
     np.testing.assert_allclose(axis[..., 0], 0, atol=1e-15)
     assert edge_lengths(joint, Facets.PIN_TOP).sum() == pytest.approx(R)
-    assert edge_lengths(joint, Facets.BLOCK_TOP).sum() == pytest.approx(W - R - DR)
+    assert edge_lengths(joint, Facets.BLOCK_HELD).sum() == pytest.approx(W - R - DR)
     assert edge_lengths(joint, Facets.SYMMETRY).sum() == pytest.approx(R + W - R - DR)

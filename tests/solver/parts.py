@@ -13,7 +13,8 @@ from petsc4py import PETSc
 
 from archord.geometry.curve import RigidCircle
 from archord.geometry.fenicsx import create_vector, gmsh_to_mesh
-from archord.geometry.quarter_joint import Cells, Facets, quarter_joint
+from archord.geometry.joint_mesh import Cells, Facets
+from archord.geometry.quarter_joint import quarter_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.j2 import J2Material
 from archord.solver.bulk import Body, Bulk

@@ -9,7 +9,7 @@ import pytest
 
 from archord.geometry import curve as curve_module
 from archord.geometry.curve import Curve, ProjectionError
-from archord.geometry.quarter_joint import Cells
+from archord.geometry.joint_mesh import Cells
 from archord.solver.contact import Contact
 from tests.solver.parts import DR, contact_force, joint_parts, n_nodes, nodes_of
 

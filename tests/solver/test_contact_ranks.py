@@ -9,7 +9,7 @@ from mpi4py import MPI
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from archord.geometry.quarter_joint import Cells
+from archord.geometry.joint_mesh import Cells
 from tests.solver.parts import DR, ELASTIC, PERFECT, contact_force, coordinates, internal_force, joint_parts, nodes_of
 
 

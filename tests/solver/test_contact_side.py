@@ -7,7 +7,7 @@ import pytest
 from dolfinx.mesh import meshtags
 
 from archord.geometry.basis import bulk_quadrature, cell_basis, strain
-from archord.geometry.quarter_joint import Facets
+from archord.geometry.joint_mesh import Facets
 from archord.solver.contact_side import ContactSide, _chain
 from tests.solver.parts import DR, ELASTIC, PERFECT, PLANE_STRESS, R, coordinates, joint_parts
 

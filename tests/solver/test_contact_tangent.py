@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from archord.geometry.quarter_joint import Cells
+from archord.geometry.joint_mesh import Cells
 from tests.solver.parts import (
     DR,
     ELASTIC,

@@ -1,0 +1,68 @@
+"""Half of a whole pin in a whole ring: the joint that Persson (1964) solved, with the material around the hole finite.
+
+Pin (radius R) and hole (radius R + dR, smaller than R for an interference fit) have their common centre at the origin,
+and the symmetry axis is x = 0. The ring's outer edge is held. gmsh works in units of R.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.geometry.fenicsx import gmsh_to_mesh
+from archord.geometry.joint_mesh import Cells, Facets, JointMesh, on_circle, tag_and_size
+
+
+def half_ring(
+    comm: MPI.Comm,
+    radius: float,
+    clearance: float,
+    outer_radius: float,
+    element_size: float,
+    growth: float,
+    core_radius: float,
+    *,
+    partitioner=None,
+) -> JointMesh:
+    """Mesh the half joint with second-order curved triangles, ``element_size`` long on both arcs.
+
+    Away from the arcs they grow by ``growth`` per unit of distance, to a third of ``core_radius`` at the pin's centre.
+    Lengths share one unit. Collective over ``comm``; rank 0 meshes.
+    """
+    hole, outer, size, core = (1 + clearance / radius, *(v / radius for v in (outer_radius, element_size, core_radius)))
+    n_edges = max(2, math.ceil(math.pi / 2 / size))
+
+    def build(gmsh) -> None:
+        geo = gmsh.model.geo
+        centre = geo.addPoint(0, 0, 0)
+
+        def half_circle(r: float) -> tuple[int, int, list[int]]:
+            """Bottom and top points and the two arcs from bottom to top."""
+            bottom, side, top = (geo.addPoint(*xy, 0) for xy in ((0, -r), (r, 0), (0, r)))
+            return bottom, top, [geo.addCircleArc(bottom, centre, side), geo.addCircleArc(side, centre, top)]
+
+        faces: dict[Cells, int] = {}
+        curves: dict[Facets, list[int]] = {facet: [] for facet in Facets}
+        bottom, top, pin_arcs = half_circle(1.0)
+        axis = [geo.addLine(top, centre), geo.addLine(centre, bottom)]
+        faces[Cells.PIN] = geo.addPlaneSurface([geo.addCurveLoop([*pin_arcs, *axis])])
+        bottom, top, hole_arcs = half_circle(hole)
+        low, high, edge = half_circle(outer)
+        below, above = geo.addLine(low, bottom), geo.addLine(top, high)
+        loop = [*hole_arcs, above, *(-arc for arc in reversed(edge)), below]
+        faces[Cells.BLOCK] = geo.addPlaneSurface([geo.addCurveLoop(loop)])
+        curves[Facets.PIN_ARC], curves[Facets.HOLE_ARC] = pin_arcs, hole_arcs
+        curves[Facets.BLOCK_HELD], curves[Facets.SYMMETRY] = edge, [*axis, below, above]
+        for arc in (*pin_arcs, *hole_arcs):
+            geo.mesh.setTransfiniteCurve(arc, n_edges + 1)
+        from_arcs = f"{size!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
+        from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
+        tag_and_size(gmsh, faces, curves, f"Min({from_arcs}, {from_core} + 1e9 * Step(Sqrt(x*x + y*y) - 1))")
+
+    def exact(x: np.ndarray, tag: int) -> np.ndarray:
+        radii = {Facets.PIN_ARC: 1.0, Facets.HOLE_ARC: hole, Facets.BLOCK_HELD: outer}
+        return on_circle(x, (0.0, 0.0), radii[Facets(tag)]) if tag in radii else x
+
+    return JointMesh(*gmsh_to_mesh(comm, build, exact, scale=radius, partitioner=partitioner))
