@@ -126,9 +126,7 @@ class _Progress:
     def attempt(self, load: float, iterations: int) -> None:
         """Show a solve that ended."""
         if self._task is not None:
-            self._bar.update(
-                self._task, description=f"delta/dR {load / self.scene.joint.dR:.4g}, {iterations} iterations"
-            )
+            self._bar.update(self._task, description=f"load {load / self.scene.target:.4g}, {iterations} iterations")
 
     def step(self, m) -> None:
         """Show an accepted output step."""

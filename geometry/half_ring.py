@@ -59,7 +59,7 @@ def half_ring(
             geo.mesh.setTransfiniteCurve(arc, n_edges + 1)
         from_arcs = f"{size!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
         from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
-        tag_and_size(gmsh, faces, curves, f"Min({from_arcs}, {from_core} + 1e9 * Step(Sqrt(x*x + y*y) - 1))")
+        tag_and_size(gmsh, faces, curves, f"Min({from_arcs}, {from_core})")
 
     def exact(x: np.ndarray, tag: int) -> np.ndarray:
         radii = {Facets.PIN_ARC: 1.0, Facets.HOLE_ARC: hole, Facets.BLOCK_HELD: outer}

@@ -59,8 +59,10 @@ class Newton:
 
 
 class Equilibrium:
-    """Equilibrium of ``bulk`` and, if given, ``contact`` under ``supports``; ``rigid_rate`` moves a rigid pin with the
-    load."""
+    """Equilibrium of ``bulk`` and, if given, ``contact`` under ``supports``.
+
+    ``rigid_rate`` moves a rigid pin with the load; ``applied`` are nodal forces ``(n_owned, 2)`` per unit of it.
+    """
 
     def __init__(
         self,
@@ -70,6 +72,7 @@ class Equilibrium:
         contact: Contact | None = None,
         rigid_rate: Array | None = None,
         *,
+        applied: Array | None = None,
         tolerance: float = 1e-10,
         max_iterations: int = 25,
         timer: Timer | None = None,
@@ -77,7 +80,7 @@ class Equilibrium:
         self.V, self.bulk, self.contact = V, bulk, contact
         self.comm = V.mesh.comm
         self.supports = supports
-        self.rigid_rate = rigid_rate
+        self.rigid_rate, self.applied = rigid_rate, applied
         self.tolerance, self.max_iterations = tolerance, max_iterations
         self.timer = timer or Timer()
         self.interrupt = Interrupt()
@@ -202,6 +205,8 @@ class Equilibrium:
                     self.contact.rigid_motion = self.load * self.rigid_rate
                 self._pattern_grew = self.contact.evaluate(u)
                 self.contact.add_force(self._force.array.reshape(-1, 2))
+        if self.applied is not None:
+            self._force.array[:] -= self.load * self.applied.ravel()
         self._reaction = np.where(self._free_owned, 0.0, self._force.array_r).reshape(-1, 2)
         noise = 0.0 if self.contact is None else self.contact.round_off()
         totals = np.array([(self._reaction**2).sum(), noise**2, self.interrupt.received > 0])

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import ufl
 from dolfinx import fem
+from dolfinx.la import InsertMode
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import RigidCircle
+from archord.geometry.half_ring import half_ring
 from archord.geometry.joint_mesh import Cells, Facets, JointMesh
 from archord.geometry.quarter_joint import quarter_joint
 from archord.solver.bulk import Body, Bulk
@@ -31,16 +34,7 @@ class Joint:
         self.timer = timer or Timer()
         geometry, analysis = scene.joint, scene.analysis
         with self.timer("mesh"):
-            self.model: JointMesh = quarter_joint(
-                comm,
-                geometry.radius,
-                geometry.dR,
-                geometry.W,
-                geometry.h,
-                geometry.growth,
-                rigid_pin=scene.pin.rigid,
-                partitioner=partitioner,
-            )
+            self.model = self._mesh(partitioner)
         with self.timer("setup"):
             self.V = fem.functionspace(self.model.mesh, ("Lagrange", 2, (2,)))
             solids = {Cells.PIN: scene.pin.solid, Cells.BLOCK: scene.block}
@@ -65,10 +59,30 @@ class Joint:
                 self._supports(),
                 self.contact,
                 None if rigid is None else np.array([0.0, -1.0]),
+                applied=self._core_force() if scene.force_controlled else None,
                 tolerance=analysis.tolerance,
                 max_iterations=analysis.max_iterations,
                 timer=self.timer,
             )
+
+    def _mesh(self, partitioner) -> JointMesh:
+        g = self.scene.joint
+        sizes = (g.radius, g.dR, g.W, g.h, g.growth)
+        if g.model == "ring":
+            return half_ring(self.comm, *sizes, self.scene.load.core_radius * g.radius, partitioner=partitioner)
+        return quarter_joint(self.comm, *sizes, rigid_pin=self.scene.pin.rigid, partitioner=partitioner)
+
+    def _core_force(self) -> Array:
+        """Downward nodal forces ``(n_owned, 2)`` of half a unit force, spread over the core as ``1 - (r/core)^2``."""
+        core = self.scene.load.core_radius * self.scene.joint.radius
+        x, v = ufl.SpatialCoordinate(self.model.mesh), ufl.TestFunction(self.V)
+        bump = ufl.max_value(1 - ufl.dot(x, x) / core**2, 0)
+        dx = ufl.dx(subdomain_data=self.model.cells, subdomain_id=int(Cells.PIN), metadata={"quadrature_degree": 6})
+        total = self.comm.allreduce(fem.assemble_scalar(fem.form(bump * dx)))
+        vector = fem.assemble_vector(fem.form(-bump / (2 * total) * v[1] * dx))
+        vector.scatter_reverse(InsertMode.add)
+        self._core = -2 * vector.array[: 2 * self.V.dofmap.index_map.size_local].reshape(-1, 2)
+        return -self._core / 2
 
     def _supports(self) -> list[Support]:
         supports = [
@@ -76,26 +90,40 @@ class Joint:
             Support("block", 0, self._nodes(Facets.BLOCK_HELD)),
             Support("block", 1, self._nodes(Facets.BLOCK_HELD)),
         ]
-        if not self.scene.pin.rigid:
+        if not (self.scene.pin.rigid or self.scene.force_controlled):
             supports.append(Support("pin", 1, self._nodes(Facets.PIN_TOP), -1.0))
         return supports
 
     def _nodes(self, tag: Facets) -> np.ndarray:
         return fem.locate_dofs_topological(self.V, 1, self.model.facets.find(tag))
 
-    def rigid_translation(self, delta: float) -> Array:
-        """Nodal displacements ``(n, 2)`` of this rank with the pin moved down by ``delta`` and the block at rest."""
+    def rigid_translation(self, load: float) -> Array:
+        """A first guess: nodal displacements ``(n, 2)`` of this rank with the pin moved down, the block at rest.
+
+        By the load, if that is a displacement; by about what a force would press it, if the load is one.
+        """
+        scene = self.scene
         u = np.zeros((self.equilibrium.n_local, 2))
-        if not self.scene.pin.rigid:
-            cells = self.model.cells.find(Cells.PIN)
-            u[np.unique(self.V.dofmap.list[cells]), 1] = -delta
+        if not scene.pin.rigid:
+            shift = max(scene.joint.dR, 0.0) + load / scene.E_star if scene.force_controlled else load
+            u[np.unique(self.V.dofmap.list[self.model.cells.find(Cells.PIN)]), 1] = -shift
         return u
+
+    def delta(self) -> float:
+        """Displacement of the pin from first touch: prescribed, or the mean over the core where the force acts."""
+        if not self.scene.force_controlled:
+            return self.equilibrium.load
+        u = self.equilibrium.displacement()[: self.equilibrium.n_owned]
+        return self.comm.allreduce(-float((self._core * u).sum())) - max(self.scene.joint.dR, 0.0)
 
     def forces(self) -> dict[str, float]:
         """Downward force of the whole joint at pin, contact and block's support, per unit thickness."""
         contact = -2 * self.contact.resultant()[1]
         block = 2 * self.equilibrium.reaction("block")[1]
-        pin = contact if self.scene.pin.rigid else -2 * self.equilibrium.reaction("pin")[1]
+        if self.scene.force_controlled:
+            pin = self.equilibrium.load
+        else:
+            pin = contact if self.scene.pin.rigid else -2 * self.equilibrium.reaction("pin")[1]
         return {"pin": pin, "contact": contact, "block": block}
 
     @property

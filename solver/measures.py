@@ -56,8 +56,8 @@ def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
     geometry = joint.scene.joint
     hole = geometry.radius + geometry.dR
     radius = {"pin": geometry.radius, "hole": hole}
-    touch, u = np.array([0.0, -hole]), joint.equilibrium.displacement()
-    profiles = {name: arc_profile(joint.contact, side, radius[name], touch, u) for name, side in joint.sides.items()}
+    lowest, u = np.array([0.0, -hole]), joint.equilibrium.displacement()
+    profiles = {name: arc_profile(joint.contact, side, radius[name], lowest, u) for name, side in joint.sides.items()}
     return {name: p for name, p in profiles.items() if p is not None}
 
 
@@ -76,7 +76,7 @@ def measure(
     eps = float(np.mean([semi_angle(p) for p in arcs]))
     return Measures(
         step=number,
-        delta=step.load,
+        delta=joint.delta(),
         P=P,
         p0=peak_pressure(arcs, eps),
         eps=eps,

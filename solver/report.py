@@ -131,7 +131,7 @@ def _model(joint: Joint) -> dict[str, Any]:
     return {
         "E_star": scene.E_star,
         "clearance": scene.joint.dR,
-        "delta": scene.delta,
+        "target": scene.target,
         "plastic": joint.bulk.plastic,
         "pin": "rigid" if scene.pin.rigid else "deformable",
         "contact_shares": [pair.share for pair in joint.contact.pairings],
@@ -140,7 +140,7 @@ def _model(joint: Joint) -> dict[str, Any]:
 
 def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
     said = []
-    if any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
+    if joint.scene.joint.model == "block" and any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc")
     touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
     if touching < _FEW_FACETS:

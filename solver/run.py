@@ -75,10 +75,10 @@ def solve_scene(
         with Interrupt() as joint.equilibrium.interrupt:
             march(
                 joint.equilibrium,
-                [scene.delta * k / n for k in range(1, n)] + [scene.delta],
+                [scene.target * k / n for k in range(1, n)] + [scene.target],
                 joint.rigid_translation,
                 max_cutbacks=scene.load.max_cutbacks,
-                substep_done=lambda load: work.add(load, joint.forces()["pin"]),
+                substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
                 target_done=target_done,
                 attempted=on_attempt,
             )

@@ -52,16 +52,29 @@ class Units(_Section):
         return {("mm", "MPa"): "N", ("m", "Pa"): "N"}.get((self.length, self.stress), f"{self.stress} {self.length}2")
 
 
+Model = Literal["block", "ring"]
+
+
 class JointGeometry(_Section):
     """The pin of radius ``R`` in a hole of radius ``R + dR``, and the mesh of both."""
 
-    radius: float = _key("radius R of the pin", "length", gt=0, example=10.0)
-    clearance: Positive | None = _key(
-        "radial clearance dR = hole radius - pin radius, 1e-6 to 0.5 times R", "length", default=None
+    model: Model = _key(
+        "block: the paper's quarter joint, pressed at the pin's horizontal diameter; ring: half a whole pin in a ring "
+        "held at its outer edge, loaded by a force at the pin's core (Persson's joint)",
+        default="block",
     )
-    relative_clearance: Positive | None = _key("dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005)
+
+    radius: float = _key("radius R of the pin", "length", gt=0, example=10.0)
+    clearance: float | None = _key(
+        "radial clearance dR = hole radius - pin radius, 1e-6 to 0.5 times R; in a ring also negative (interference)",
+        "length",
+        default=None,
+    )
+    relative_clearance: float | None = _key("dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005)
     block_size: Positive | None = _key(
-        "width and depth of the block, at least the diameter of the hole; 100 R if absent", "length", default=None
+        "width and depth of the block or radius of the ring, at least the hole's diameter; 100 R if absent",
+        "length",
+        default=None,
     )
     element_size: Positive | None = _key(
         "edge length of the elements on both arcs, 1e-4 to 0.5 times R", "length", default=None
@@ -76,8 +89,10 @@ class JointGeometry(_Section):
         if (self.clearance is None) == (self.relative_clearance is None):
             raise ValueError("clearance|" + _one_of("relative_clearance", self.clearance))
         name = "clearance" if self.relative_clearance is None else "relative_clearance"
-        if not 1e-6 <= self.dR / self.radius <= 0.5:
+        if self.model == "block" and not 1e-6 <= self.dR / self.radius <= 0.5:
             raise ValueError(f"{name}|must be a clearance: between 1e-6 and 0.5 times the radius")
+        if not 1e-6 <= abs(self.dR) / self.radius <= 0.5:
+            raise ValueError(f"{name}|must be between 1e-6 and 0.5 times the radius, or minus that")
         if self.element_size is not None and self.relative_element_size is not None:
             raise ValueError("element_size|must not be given together with relative_element_size")
         if not 1e-4 <= self.h / self.radius <= 0.5:
@@ -175,8 +190,11 @@ class Analysis(_Section):
     max_iterations: int = _key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
 
 
+LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
+
+
 class Load(_Section):
-    """The displacement of the pin, from first touch, in equal output steps."""
+    """The displacement of the pin, from first touch, or the force on it, in equal output steps."""
 
     displacement: Positive | None = _key(
         "largest displacement delta of the pin, in clearances dR; at most R/2", default=None, example=2.0
@@ -184,18 +202,23 @@ class Load(_Section):
     displacement_absolute: Positive | None = _key(
         "largest displacement delta of the pin, instead of displacement", "length", default=None
     )
+    force: Positive | None = _key(
+        "largest force P on the whole pin per unit thickness, instead of a displacement; for a ring",
+        "force",
+        default=None,
+    )
+    relative_force: Positive | None = _key("P/(E* R), instead of force", default=None)
+    core_radius: float = _key("radius of the core over which the force is spread, over R", default=0.1, ge=0.01, le=0.5)
     steps: int = _key("equal output steps up to it", default=20, ge=1, le=100000)
     max_cutbacks: int = _key("times an output step may be halved before the run ends", default=10, ge=0, le=30)
 
     @model_validator(mode="after")
-    def _one_displacement(self) -> Load:
-        if (self.displacement is None) == (self.displacement_absolute is None):
-            fault = (
-                "is missing (or displacement_absolute)"
-                if self.displacement is None
-                else "excludes displacement_absolute"
-            )
-            raise ValueError(f"displacement|{fault}")
+    def _one_load(self) -> Load:
+        given = [name for name in LOADS if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise ValueError(f"{given[0]}|must not be given together with {given[1]}")
+        if not given:
+            raise ValueError(f"displacement|is missing (or {', '.join(LOADS[1:])})")
         return self
 
 
@@ -221,17 +244,33 @@ class Scene(_Section):
                 raise ValueError(f"{name}|must be between 1e-30 and 1e30; choose other units")
         if self.pin.E is not None and not _SOFTEST <= self.pin.E / self.block.E <= 1 / _SOFTEST:
             raise ValueError("pin.E|must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
-        if self.delta > 0.5 * self.joint.radius:
-            name = "displacement" if self.load.displacement_absolute is None else "displacement_absolute"
+        name = next(name for name in LOADS if getattr(self.load, name) is not None)
+        if (self.joint.model == "ring") != self.force_controlled:
+            wanted = (
+                "force or relative_force" if self.joint.model == "ring" else "displacement or displacement_absolute"
+            )
+            raise ValueError(f'load.{name}|does not load a joint whose model is "{self.joint.model}"; give {wanted}')
+        if self.joint.model == "ring" and self.pin.rigid:
+            raise ValueError('pin.rigid|must be false where joint.model is "ring"')
+        if self.force_controlled and self.target > 0.5 * self.E_star * self.joint.radius:
+            raise ValueError(f"load.{name}|must not exceed half E* R ({0.5 * self.E_star * self.joint.radius:g})")
+        if not self.force_controlled and self.target > 0.5 * self.joint.radius:
             raise ValueError(f"load.{name}|must not exceed half the radius ({0.5 * self.joint.radius:g})")
         return self
 
     @property
-    def delta(self) -> float:
-        """Largest displacement of the pin."""
-        if self.load.displacement_absolute is not None:
-            return self.load.displacement_absolute
-        return (self.load.displacement or 0.0) * self.joint.dR
+    def force_controlled(self) -> bool:
+        """Whether the load is a force."""
+        return self.load.force is not None or self.load.relative_force is not None
+
+    @property
+    def target(self) -> float:
+        """The load at the end: the displacement of the pin, or the force on it."""
+        load, joint = self.load, self.joint
+        scaled = {"displacement": joint.dR, "displacement_absolute": 1.0, "force": 1.0, "relative_force": 0.0}
+        if load.relative_force is not None:
+            scaled["relative_force"] = self.E_star * joint.radius
+        return next(value * scale for name, scale in scaled.items() if (value := getattr(load, name)) is not None)
 
     @property
     def E_star(self) -> float:

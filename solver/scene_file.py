@@ -9,12 +9,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from archord.solver.scene import Scene, SceneError
+from archord.solver.scene import LOADS, Scene, SceneError
 from archord.solver.scene_format import key_names, limits_in_words, toml_value
 
 ALTERNATIVES = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
-    "load": [("displacement", "displacement_absolute")],
+    "load": [LOADS],
 }
 
 

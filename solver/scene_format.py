@@ -46,7 +46,14 @@ def _unit(key: Any) -> str:
     return (key.json_schema_extra or {}).get("unit", "")
 
 
-_SHOWN = {"block_size": 1000.0, "clearance": 0.05, "element_size": 0.4, "displacement_absolute": 0.1}
+_SHOWN = {
+    "block_size": 1000.0,
+    "clearance": 0.05,
+    "element_size": 0.4,
+    "displacement_absolute": 0.1,
+    "force": 1000.0,
+    "relative_force": 0.01,
+}
 
 
 def example() -> str:

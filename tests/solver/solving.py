@@ -37,10 +37,10 @@ def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Sol
 
     march(
         joint.equilibrium,
-        [scene.delta * k / scene.load.steps for k in range(1, scene.load.steps + 1)],
+        [scene.target * k / scene.load.steps for k in range(1, scene.load.steps + 1)],
         joint.rigid_translation,
         max_cutbacks=scene.load.max_cutbacks,
-        substep_done=lambda load: work.add(load, joint.forces()["pin"]),
+        substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
         target_done=target_done,
     )
     return solution

@@ -27,7 +27,12 @@ def basic() -> dict:
         ("joint", "radius", True, "scene: joint.radius = true must be a number."),
         ("joint", "radius", float("nan"), "scene: joint.radius = NaN must be a finite number."),
         ("joint", "radius", float("inf"), "scene: joint.radius = Infinity must be a finite number."),
-        ("joint", "relative_clearance", 0.0, "scene: joint.relative_clearance = 0.0 must be greater than 0."),
+        (
+            "joint",
+            "relative_clearance",
+            0.0,
+            "= 0.0 must be a clearance: between 1e-6 and 0.5 times the radius.",
+        ),
         ("joint", "relative_clearance", 0.9, "must be a clearance: between 1e-6 and 0.5 times the radius."),
         ("joint", "clearance", 0.05, "= 0.05 must not be given together with relative_clearance."),
         ("joint", "element_size", 20.0, "must be between 1e-4 and 0.5 times the radius."),
@@ -108,11 +113,11 @@ def test_the_resolved_scene_is_the_same_scene():
         scene = parse_scene(basic() | change)
         again = parse_scene(tomllib.loads(resolved(scene)))
         for a, b in ((scene, again),):
-            assert (a.joint.dR, a.joint.h, a.joint.W, a.delta, a.E_star) == (
+            assert (a.joint.dR, a.joint.h, a.joint.W, a.target, a.E_star) == (
                 b.joint.dR,
                 b.joint.h,
                 b.joint.W,
-                b.delta,
+                b.target,
                 b.E_star,
             )
             assert (a.pin.solid, a.block, a.analysis, a.load) == (b.pin.solid, b.block, b.analysis, b.load)
