@@ -10,7 +10,7 @@ import numpy as np
 
 from archord.solver.history import read_history
 from archord.solver.run_folder import FILES
-from archord.solver.scene import SceneError
+from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import parse_scene
 from archord.solver.step_file import step_name
 
@@ -42,7 +42,7 @@ def draw(folder: str | Path, target: str | Path | None = None) -> Path:
         raise SceneError(f"{target}: cannot be written: {target.parent} is not a folder.")
     scene = parse_scene(tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8")), str(folder / "scene.toml"))
     figure, axes = plt.subplots(1, 3, figsize=(13, 4.2), layout="constrained", width_ratios=[1.0, 1.1, 1.1])
-    _zone(figure, axes[0], folder, scene, len(history["step"]))
+    draw_zone(figure, axes[0], folder, scene, len(history["step"]))
     _pressure(axes[1], folder, scene, history)
     axes[2].plot([0, *history["delta/dR"]], [0, *history["P/(E* R)"]], ".-", color="tab:blue")
     axes[2].set(xlabel="δ / ΔR", ylabel="P / (E* R)", title="force of the joint", xlim=(0, None), ylim=(0, None))
@@ -52,7 +52,7 @@ def draw(folder: str | Path, target: str | Path | None = None) -> Path:
     return target
 
 
-def _zone(figure, axes, folder: Path, scene, step: int) -> None:
+def draw_zone(figure, axes, folder: Path, scene: Scene, step: int) -> None:
     """PEEQ, or von Mises stress over E* of an elastic joint, on the deformed shape near the contact."""
     R = scene.joint.radius
     with h5py.File(folder / "fields.h5") as file:

@@ -1,0 +1,115 @@
+"""Where and when a joint yields first (Hu et al., figure 8), and the figure itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+
+from archord.benchmarks.figures import LABELS, MILD_YIELD, STYLES, Runs, Table, stacked
+from archord.benchmarks.paper_runs import PLANES, Plane, plastic
+from archord.geometry.basis import Array
+from archord.postprocess.law_joint import LawJoint
+from archord.postprocess.laws import find_law
+from archord.postprocess.picture import draw_zone
+from archord.postprocess.run_curve import RunCurve
+from archord.solver.step_file import step_name
+
+STAGES = (1.25, 1.6, 2.0)  # A, B and C in clearances: just after the paper's first yield, and on to its end
+_BODIES = {1: "pin", 2: "block"}
+
+
+@dataclass(frozen=True)
+class FirstYield:
+    """The first cell to yield: at which delta/dR, in which body, how deep below the contact (over R), at which angle."""
+
+    delta: float
+    body: str
+    depth: float
+    angle: float  # degrees from the contact axis
+
+    def __str__(self) -> str:
+        return f"δ/ΔR = {self.delta:.3f}, in the {self.body}, {self.depth:.3f} R below the contact at {self.angle:.0f}°"
+
+
+def first_yield(elastic: RunCurve, yield_stress: float, near: float = 3.0) -> FirstYield:
+    """From an elastic run: the cell within ``near`` R whose mean von Mises stress reaches ``yield_stress`` first.
+
+    The stress is interpolated linearly between the steps.
+    """
+    assert elastic.folder is not None
+    with h5py.File(elastic.folder / "fields.h5") as file:
+        corners = file["mesh/coordinates"][:, :2][file["mesh/cells"][:, :3]]
+        body = file["body"][()]
+        stress = np.array([file[f"von_mises/{step_name(k + 1)}"][()] for k in range(len(elastic.delta))])
+    centroid = corners.mean(axis=1)
+    stress = np.concatenate([np.zeros((1, stress.shape[1])), stress])
+    delta = np.concatenate([[0.0], elastic.delta])
+    above = stress >= yield_stress
+    step = np.where(above.any(axis=0), above.argmax(axis=0), len(delta) - 1)
+    cell = np.arange(stress.shape[1])
+    low, high = stress[step - 1, cell], stress[step, cell]
+    share = (yield_stress - low) / np.maximum(high - low, 1e-300)
+    when = np.where(above.any(axis=0), delta[step - 1] + share * (delta[step] - delta[step - 1]), np.inf)
+    when[np.linalg.norm(centroid, axis=1) > near * elastic.R] = np.inf
+    return _at(elastic, int(np.argmin(when)), float(when.min()), centroid, body)
+
+
+def _at(run: RunCurve, cell: int, delta: float, centroid: Array, body: Array) -> FirstYield:
+    x, y = centroid[cell]
+    name = _BODIES[int(body[cell])]
+    if name == "pin":
+        y = y + run.dR
+        depth = run.R - np.hypot(x, y)
+    else:
+        depth = np.hypot(x, y) - run.R - run.dR
+    return FirstYield(delta / run.dR, name, float(depth / run.R), float(np.degrees(np.arctan2(x, -y))))
+
+
+def first_yields(runs: Runs) -> dict[Plane, FirstYield]:
+    """First yield of the pair of figure 8 in both planes."""
+    stress = {plane: runs.curve(plastic(MILD_YIELD), plane).sigY for plane in PLANES}
+    return {plane: first_yield(runs.curve("elastic_0.1", plane), stress[plane] or np.inf) for plane in PLANES}
+
+
+def fig8(runs: Runs) -> tuple[Table, Callable]:
+    """Force over delta with the stages A, B, C, and the plastic zone at each of them."""
+    parts, elastic = [], {}
+    for plane in PLANES:
+        run = runs.curve(plastic(MILD_YIELD), plane)
+        elastic[plane] = runs.curve("elastic_0.1", plane)
+        parts.append(
+            {
+                "plane": plane,
+                "delta/dR": run.delta / run.dR,
+                "P/(E* dR)": run.P / (run.E_star * run.dR),
+                "elastic P/(E* dR)": elastic[plane].P / (run.E_star * run.dR),
+                "eq. 12": find_law("paper-plastic").force(LawJoint.from_scene(run.scene), run.delta)
+                / (run.E_star * run.dR),
+                "PEEQ max": run.peeq_max,
+            }
+        )
+
+    def draw(figure) -> None:
+        axes = figure.subplots(2, 4)
+        yields = first_yields(runs)
+        for row, (plane, part) in enumerate(zip(PLANES, parts, strict=True)):
+            run = runs.curve(plastic(MILD_YIELD), plane)
+            first = axes[row, 0]
+            first.plot(part["delta/dR"], part["P/(E* dR)"], "o", ms=3, label="ours", **STYLES[plane])
+            first.plot(part["delta/dR"], part["elastic P/(E* dR)"], "-", lw=1, color="gray", label="ours, elastic")
+            first.plot(part["delta/dR"], part["eq. 12"], "k-", lw=1, label="eqs 9, 12")
+            first.axvline(yields[plane].delta, color="k", ls=":", lw=1, label=f"first yield, {yields[plane].delta:.2f}")
+            first.set(xlabel="δ / ΔR", ylabel="P / (E* ΔR)", title=LABELS[plane])
+            first.legend(frameon=False, fontsize=8)
+            for name, stage, one in zip("ABC", STAGES, axes[row, 1:], strict=True):
+                step = int(np.argmin(np.abs(run.delta / run.dR - stage)))
+                first.plot(part["delta/dR"][step], part["P/(E* dR)"][step], "kx")
+                first.annotate(name, (part["delta/dR"][step], part["P/(E* dR)"][step]), (5, -8), textcoords="offset points")
+                assert run.folder is not None
+                draw_zone(figure, one, run.folder, run.scene, step + 1)
+                one.set_title(f"{name}: δ = {run.delta[step] / run.dR:.3g} ΔR")
+
+    return stacked(parts), draw
