@@ -1,0 +1,71 @@
+"""``archord fit``: the law of a joint, calibrated on runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def fit(
+    folders: Annotated[list[Path], typer.Argument(metavar="RUN...", help="run folders, one or more")],
+    load_range: Annotated[
+        tuple[float, float] | None,
+        typer.Option("--range", help="steps to fit: delta from ... to ..., in clearances [all]"),
+    ] = None,
+    confidence: Annotated[float, typer.Option("--confidence", help="level of the confidence intervals")] = 0.95,
+    residuals: Annotated[bool, typer.Option("--residuals", help="print the residual of every step")] = False,
+    json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write law, fits, residuals")] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="draw data, fits, residuals")
+    ] = None,
+    python: Annotated[
+        Path | None,
+        typer.Option("--python", metavar="FILE", help="write force(delta) as a module that needs only math"),
+    ] = None,
+) -> int:
+    """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields."""
+    import math
+
+    from rich.console import Console
+
+    from archord.postprocess import fit_report
+    from archord.postprocess.calibration import calibrate
+    from archord.postprocess.run_curve import read_run
+
+    calibration = calibrate([read_run(folder) for folder in folders], load_range or (0.0, math.inf), confidence)
+    law = calibration.law()
+    # written before anything is printed: a file that cannot be is one sentence alone
+    if json_file:
+        _write(json_file, fit_report.as_json(calibration))
+    if python:
+        _write(python, law.to_python())
+    if picture:
+        from archord.postprocess.fit_picture import draw_fit
+
+        draw_fit(calibration, picture)
+    console = Console(highlight=False, width=200)  # numbers that wrap are better than numbers cut off
+    tables = [fit_report.summary_table(calibration)]
+    tables += [fit_report.residual_table(curve) for curve in calibration.joint.curves if residuals]
+    for one in tables:
+        console.print(one)
+        print()
+    for note in fit_report.notes(calibration):
+        print(note)
+    threshold = "" if law.c is None else f", c = {law.c:.5f}"
+    low, high = law.fitted_range
+    print(f"law: k = {law.k:.5f}{threshold}, from P(delta), delta = {low:g} to {high:g} dR")
+    for file in (json_file, python, picture):
+        if file:
+            print(file)
+    return 0
+
+
+def _write(file: Path, text: str) -> None:
+    from archord.solver.scene import SceneError
+
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise SceneError(f"{file}: cannot be written: {error.strerror or error}.") from None

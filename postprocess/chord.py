@@ -1,0 +1,115 @@
+"""The contact pressure projected from the arc onto the chord from the deepest point to the edge of the contact.
+
+Hu et al., "A new model for elasto-plastic conformal contact between cylinders", eq. 15. A point at the angle ``phi``
+from the contact axis is projected along its radius onto the chord of length ``l = 2 R sin(eps/2)``, at
+
+    x = R cos(eps/2) [ tan(phi - eps/2) + tan(eps/2) ],    dx = R dphi cos(eps/2)/cos^2(phi - eps/2),
+
+and the pressure there carries the arc's vertical force, ``py dx = p cos(phi) R dphi``:
+
+    py = p cos(phi) cos^2(phi - eps/2)/cos(eps/2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from archord.geometry.basis import Array
+from archord.postprocess.arc_pressure import read_arcs
+from archord.postprocess.run_curve import read_run
+from archord.solver.scene import SceneError
+
+
+@dataclass(frozen=True)
+class ChordPressure:
+    """Vertical pressure on the chord of one half of the joint, at ``n`` points ordered from the contact axis.
+
+    ``x`` runs from 0 at the deepest point to ``l`` at the edge ``eps`` of the contact; points that carry pressure
+    beyond the edge have ``x > l``. ``weight`` is each point's share of the chord, so that ``sum(weight py)`` is the
+    force of the half.
+    """
+
+    x: Array  # (n,)
+    py: Array  # (n,) positive in compression
+    weight: Array  # (n,)
+    eps: float
+    R: float
+
+    @property
+    def length(self) -> float:
+        """Length ``l`` of the chord (eq. 5)."""
+        return 2 * self.R * float(np.sin(self.eps / 2))
+
+    @property
+    def x_over_l(self) -> Array:
+        """Chord coordinate ``x/l`` ``(n,)``."""
+        return self.x / self.length
+
+    @property
+    def resultant(self) -> float:
+        """Force per unit thickness of the whole joint, both halves."""
+        return 2 * float(self.weight @ self.py)
+
+
+def chord_coordinate(phi: ArrayLike, eps: float, R: float) -> Array:
+    """Chord coordinate ``x`` of the angle ``phi`` [rad], any shape; ``x(0) = 0`` and ``x(eps) = l``."""
+    return R * np.cos(eps / 2) * (np.tan(np.asarray(phi) - eps / 2) + np.tan(eps / 2))
+
+
+def arc_angle(x: ArrayLike, eps: float, R: float) -> Array:
+    """Angle ``phi`` [rad] that is projected to ``x``, any shape; the inverse of `chord_coordinate`."""
+    return eps / 2 + np.arctan(np.asarray(x) / (R * np.cos(eps / 2)) - np.tan(eps / 2))
+
+
+def chord_projection(
+    phi: ArrayLike, pressure: ArrayLike, eps: float, R: float, weight: ArrayLike | None = None
+) -> ChordPressure:
+    """Project ``pressure`` at the angles ``phi`` [rad] from the contact axis onto the chord of ``eps`` (eq. 15).
+
+    Arrays of one shape, in the order of the angle; ``weight`` is each point's share of arc length, by default that of
+    the trapezoidal rule. The resultant is that of the arc, ``2 sum(weight pressure cos(phi))``, but for round-off,
+    whatever ``eps`` is: points beyond it stay as long as they carry pressure, the others there are left out. Raises
+    ValueError for angles that do not rise within 0 to pi/2 or a contact angle that is not between 0 and pi.
+    """
+    angle, p = np.ravel(np.asarray(phi, float)), np.ravel(np.asarray(pressure, float))
+    if not 0 < eps < np.pi:
+        raise ValueError(f"the contact semi-angle is {eps:g}; it must be between 0 and pi.")
+    if len(angle) < 2 or len(angle) != len(p):
+        raise ValueError("phi and pressure must have the same length, two or more.")
+    if not (angle[0] >= 0 and angle[-1] <= np.pi / 2 * (1 + 1e-12) and (np.diff(angle) >= 0).all()):
+        raise ValueError("phi must rise from the contact axis, between 0 and pi/2.")
+    if weight is None:
+        gap = np.diff(angle) * R
+        measure = (np.append(gap, 0.0) + np.append(0.0, gap)) / 2
+    else:
+        measure = np.ravel(np.asarray(weight, float))
+        if len(measure) != len(angle):
+            raise ValueError("weight must have the length of phi.")
+    kept = (angle <= eps) | (p != 0)
+    angle, p, measure = angle[kept], p[kept], measure[kept]
+    stretch = np.cos(eps / 2) / np.cos(angle - eps / 2) ** 2
+    return ChordPressure(
+        chord_coordinate(angle, eps, R), p * np.cos(angle) / stretch, measure * stretch, float(eps), float(R)
+    )
+
+
+def read_chord_pressure(folder: str | Path, step: int | None = None, side: str | None = None) -> ChordPressure:
+    """Chord pressure on one ``side`` ("pin" or "hole"; the hole, if both are there) at a ``step`` of a run (the last).
+
+    ``R`` is the side's own radius (that of the hole is R + dR) and ``eps`` the step's in history.csv. Raises
+    `SceneError` where there is no run, no such step or side, or no contact angle.
+    """
+    run = read_run(folder)
+    number = len(run.delta) if step is None else step
+    arcs = read_arcs(run, number)
+    chosen = side or list(arcs)[-1]
+    if chosen not in arcs:
+        raise SceneError(f"{folder}: has no side {chosen!r}; its sides are {', '.join(arcs)}.")
+    arc, eps = arcs[chosen], float(run.eps[number - 1])
+    if not eps > 0:
+        raise SceneError(f"{folder}: has no contact angle at step {number}.")
+    return chord_projection(arc.angle, arc.pressure, eps, arc.radius, arc.weight)

@@ -1,0 +1,70 @@
+"""The curves of a run, P and p0 over delta, with the joint they belong to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from archord.geometry.basis import Array
+from archord.solver.history import read_history
+from archord.solver.scene import Scene, SceneError
+from archord.solver.scene_file import load_scene
+
+
+@dataclass(frozen=True)
+class RunCurve:
+    """Accepted steps of a run, in the scene's units: arrays ``(n,)`` over the steps."""
+
+    name: str
+    scene: Scene
+    delta: Array
+    P: Array
+    p0: Array
+    eps: Array
+    peeq_max: Array
+    folder: Path | None = None
+
+    @property
+    def E_star(self) -> float:
+        """Contact modulus."""
+        return self.scene.E_star
+
+    @property
+    def R(self) -> float:
+        """Radius of the pin."""
+        return self.scene.joint.radius
+
+    @property
+    def dR(self) -> float:
+        """Clearance."""
+        return self.scene.joint.dR
+
+    @property
+    def sigY(self) -> float | None:
+        """Yield stress of the weaker body; None if neither yields."""
+        given = [s.yield_stress for s in (self.scene.pin, self.scene.block) if s.yield_stress is not None]
+        return min(given, default=None)
+
+    @property
+    def plane(self) -> str:
+        """Plane of the analysis: "strain" or "stress"."""
+        return self.scene.analysis.plane
+
+
+def read_run(folder: str | Path) -> RunCurve:
+    """The curves in the run folder ``folder``. Raises `SceneError` if it is not one, or holds no accepted step."""
+    folder = Path(folder)
+    for name in ("scene.toml", "history.csv"):
+        if not (folder / name).is_file():
+            raise SceneError(f"{folder}: is not a run folder: {name} is missing.")
+    scene = load_scene(folder / "scene.toml")
+    try:
+        history = read_history(folder / "history.csv")
+        delta, P, p0, eps, peeq = [np.array(history[name]) for name in ("delta", "P", "p0", "eps", "peeq_max")]
+    except (ValueError, IndexError, KeyError, OSError):
+        raise SceneError(f"{folder / 'history.csv'}: cannot be read as the history of a run.") from None
+    if not len(delta):
+        raise SceneError(f"{folder}: holds no accepted step.")
+    return RunCurve(str(folder), scene, delta, P, p0, eps, peeq, folder)
