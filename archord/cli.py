@@ -15,6 +15,8 @@ from typing import Annotated
 import click
 import typer
 
+from archord import law_commands
+
 app = typer.Typer(
     name="archord",
     no_args_is_help=True,
@@ -151,3 +153,6 @@ def scene_format(
     else:
         print(scene.example() if example else scene.reference(), end="")
     return 0
+
+
+law_commands.register(app)
