@@ -15,7 +15,9 @@ from typing import Annotated
 import click
 import typer
 
+from archord import law_commands
 from archord.fit_commands import fit
+from archord.reproduce_commands import reproduce
 
 app = typer.Typer(
     name="archord",
@@ -136,6 +138,7 @@ def picture(
 
 
 app.command()(fit)
+app.command()(reproduce)
 
 
 @app.command("scene")
@@ -156,3 +159,6 @@ def scene_format(
     else:
         print(scene.example() if example else scene.reference(), end="")
     return 0
+
+
+law_commands.register(app)

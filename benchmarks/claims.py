@@ -89,8 +89,8 @@ def peak_pressure(runs: Runs) -> Claim:
         ratio = run.p0 * run.R / (run.E_star * run.delta)
         deviations[plane] = float(np.abs(0.85 / ratio - 1)[run.delta >= 0.2 * run.dR].max())
         said[plane] = (
-            f"k = {fit.value:.4f} ± {fit.error:.4f} over 0.1 to 2 dR; p0 R/(E* delta) goes from {ratio[0]:.3f} at 0.1 dR "
-            f"over {ratio.min():.3f} to {ratio[-1]:.3f} at 2 dR; k = 0.85 is off by up to {deviations[plane]:.1%} "
+            f"k = {fit.value:.4f} ± {fit.error:.4f} over 0.1 to 2 dR; p0 R/(E* delta) goes from {ratio[0]:.3f} at 0.1 "
+            f"dR over {ratio.min():.3f} to {ratio[-1]:.3f} at 2 dR; k = 0.85 is off by up to {deviations[plane]:.1%} "
             "from 0.2 dR on"
         )
     text = "p0 = k E* delta/R with k = 0.85 over a broad range; Johnson's only at small delta"
@@ -107,8 +107,8 @@ def elastic_force(runs: Runs) -> Claim:
         at = int(np.argmin(np.abs(delta - 0.5)))
         deviations[plane] = float(np.abs(off["paper"])[delta >= 0.2].max())
         said[plane] = (
-            f"eq. 9 is off by {off['paper'][-1]:+.1%} at 2 dR and by up to {deviations[plane]:.1%} from 0.2 dR on; at 0.5 "
-            f"dR Johnson by {off['johnson'][at]:+.0%}, Radzimovsky as printed by {off['radzimovsky'][at]:+.0%}"
+            f"eq. 9 is off by {off['paper'][-1]:+.1%} at 2 dR and by up to {deviations[plane]:.1%} from 0.2 dR on; at "
+            f"0.5 dR Johnson by {off['johnson'][at]:+.0%}, Radzimovsky as printed by {off['radzimovsky'][at]:+.0%}"
         )
     text = "eq. 9 matches up to 2 dR; Johnson and Radzimovsky fail past 0.5 dR, with limits of 1.71 and 2.41 E* dR"
     limits = "; the limits are 1.7007 and, as printed, 4.478 E* dR (2.41 only with d = 2.18 sqrt(R* P/E*))"
@@ -184,7 +184,9 @@ def force_over_angle(runs: Runs) -> Claim:
             f"0.15 < tan(eps/2) < 0.4: eq. 9 off by up to {np.abs(law[low]).max():.0%}, Persson by up to "
             f"{np.abs(exact[low]).max():.1%}; plastic: eq. 12 at the same angle off by up to {worst:+.0%}"
         )
-    text = "P over eps: eq. 9 agrees with Persson for tan(eps/2) < 0.4; in the plastic range Persson fails, eq. 12 does not"
+    text = (
+        "P over eps: eq. 9 agrees with Persson for tan(eps/2) < 0.4; eq. 12 holds in the plastic range, Persson fails"
+    )
     return Claim("C7", "9", text, said["strain"], said["stress"], _verdict(deviations))
 
 

@@ -152,7 +152,9 @@ def fig3(runs: Runs) -> tuple[Table, Callable]:
         axes = figure.subplots()
         for part in parts:
             style = STYLES[part["plane"]]
-            axes.plot(part["delta/dR"], part["p0 R/(E* dR)"], "o", ms=4, label=f"ours, {LABELS[part['plane']]}", **style)
+            axes.plot(
+                part["delta/dR"], part["p0 R/(E* dR)"], "o", ms=4, label=f"ours, {LABELS[part['plane']]}", **style
+            )
         axes.plot(parts[0]["delta/dR"], parts[0]["Winkler, k = 0.85"], "k-", label="Winkler, k = 0.85 (eq. 6)")
         axes.plot(parts[0]["delta/dR"], parts[0]["Johnson"], "k:", label="Johnson")
         axes.set(xlabel="δ / ΔR", ylabel="$p_0$ R / (E* ΔR)", title="peak pressure")
@@ -215,7 +217,9 @@ def fig5(runs: Runs) -> tuple[Table, Callable]:
     rows = stacked(profiles).columns
     for plane, delta, mean in curves:
         for d, m in zip(delta, mean, strict=True):
-            for heading, value in zip(rows, (plane, "P/(A sigY) over delta/dR", float(d), float(m), "", ""), strict=True):
+            for heading, value in zip(
+                rows, (plane, "P/(A sigY) over delta/dR", float(d), float(m), "", ""), strict=True
+            ):
                 rows[heading].append(value)  # type: ignore[union-attr]
 
     def draw(figure) -> None:

@@ -23,7 +23,7 @@ _BODIES = {1: "pin", 2: "block"}
 
 @dataclass(frozen=True)
 class FirstYield:
-    """The first cell to yield: at which delta/dR, in which body, how deep below the contact (over R), at which angle."""
+    """The first cell to yield: delta/dR, body, depth below the contact over R, angle."""
 
     delta: float
     body: str
@@ -31,6 +31,7 @@ class FirstYield:
     angle: float  # degrees from the contact axis
 
     def __str__(self) -> str:
+        """For a table."""
         return f"δ/ΔR = {self.delta:.3f}, in the {self.body}, {self.depth:.3f} R below the contact at {self.angle:.0f}°"
 
 
@@ -42,7 +43,7 @@ def first_yield(elastic: RunCurve, yield_stress: float, near: float = 3.0) -> Fi
     assert elastic.folder is not None
     with h5py.File(elastic.folder / "fields.h5") as file:
         corners = file["mesh/coordinates"][:, :2][file["mesh/cells"][:, :3]]
-        body = file["body"][()]
+        body = file["mesh/body"][()]
         stress = np.array([file[f"von_mises/{step_name(k + 1)}"][()] for k in range(len(elastic.delta))])
     centroid = corners.mean(axis=1)
     stress = np.concatenate([np.zeros((1, stress.shape[1])), stress])
@@ -107,7 +108,9 @@ def fig8(runs: Runs) -> tuple[Table, Callable]:
             for name, stage, one in zip("ABC", STAGES, axes[row, 1:], strict=True):
                 step = int(np.argmin(np.abs(run.delta / run.dR - stage)))
                 first.plot(part["delta/dR"][step], part["P/(E* dR)"][step], "kx")
-                first.annotate(name, (part["delta/dR"][step], part["P/(E* dR)"][step]), (5, -8), textcoords="offset points")
+                first.annotate(
+                    name, (part["delta/dR"][step], part["P/(E* dR)"][step]), (5, -8), textcoords="offset points"
+                )
                 assert run.folder is not None
                 draw_zone(figure, one, run.folder, run.scene, step + 1)
                 one.set_title(f"{name}: δ = {run.delta[step] / run.dR:.3g} ΔR")

@@ -1,4 +1,4 @@
-"""The runs behind the paper's figures: which scenes in which planes and on which meshes; what is done is not done again.
+"""The runs behind the paper's figures: scenes, planes and meshes; what is done is not done again.
 
 Hu et al. give neither Poisson's ratio nor the ratio of the moduli: like bodies with nu = 0.3 are taken. The text names
 (dR/R, sigY/E*) = (0.5 %, 0.2 %) and (0.1 %, 0.1 %) and the ranges of figure 7; its other pairs are our choice within

@@ -91,22 +91,26 @@ def _report(runs: Runs, folder: Path) -> list[Path]:
     lines = [
         "# The claims of Hu et al., judged",
         "",
-        "Hu et al., *A new model for elasto-plastic conformal contact between cylinders*. Like bodies, nu = 0.3 (the paper "
-        "gives neither), block of 100 R, closest points on the deformed curves, small strains. In each plane E* = 1.",
+        "Hu et al., *A new model for elasto-plastic conformal contact between cylinders*. Like bodies, nu = 0.3 (the "
+        "paper gives neither), block of 100 R, closest points on the deformed curves, small strains. In each plane E* = 1.",
         "",
-        f"Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {errors[worst]:.2%} from 0.2 dR on ({worst}): the "
-        "discretisation error of the finer one, which all numbers come from, is below that.",
+        f"Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {errors[worst]:.2%} from 0.2 dR on ({worst}): "
+        "the discretisation error of the finer one, which all numbers come from, is below that.",
         "",
         "| claim | figure | the paper | ours, plane strain | ours, plane stress | verdict |",
         "|---|---|---|---|---|---|",
     ]
-    lines += [f"| {c.name} | {c.figure} | {c.text} | {c.strain} | {c.stress} | {c.verdict} |" for c in (f(runs) for f in CLAIMS)]
+    lines += [
+        f"| {c.name} | {c.figure} | {c.text} | {c.strain} | {c.stress} | {c.verdict} |"
+        for c in (f(runs) for f in CLAIMS)
+    ]
     lines += ["", *(f"![figure {name[3:]}]({name}.png)\n" for name in FIGURES)]
     text = "\n".join(lines) + "\n"
     (folder / "report.md").write_text(text, encoding="utf-8")
     body = MarkdownIt("commonmark").enable("table").render(text)
     style = "body{font:16px/1.5 sans-serif;max-width:75em;margin:2em auto}td,th{border:1px solid #ccc;padding:.4em}"
     style += "table{border-collapse:collapse}img{max-width:100%}"
-    html = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Hu et al.</title><style>{style}</style>{body}</html>\n'
+    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Hu et al.</title><style>{style}</style>'
+    html = f"{head}{body}</html>\n"
     (folder / "report.html").write_text(html, encoding="utf-8")
     return [folder / "report.md", folder / "report.html"]

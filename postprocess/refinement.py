@@ -54,7 +54,7 @@ def group(runs: list[RunCurve]) -> list[Refined]:
 def _without_mesh(scene: Scene) -> tuple:
     """Everything of a scene but its element size and its words."""
     joint = scene.joint
-    sizes = (joint.radius, joint.dR / joint.radius, joint.W / joint.radius, joint.growth, scene.delta / joint.dR)
+    sizes = (joint.radius, joint.dR / joint.radius, joint.W / joint.radius, joint.growth, scene.target)
     rounded = tuple(float(f"{size:.9g}") for size in sizes)
     return (*rounded, scene.load.steps, scene.pin.model_dump_json(), scene.block.model_dump_json(),
             scene.analysis.plane, scene.analysis.kinematics, scene.analysis.integration)  # fmt: skip

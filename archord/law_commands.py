@@ -1,0 +1,158 @@
+"""The commands ``archord laws`` and ``archord law``: closed-form laws of the joint, listed, tabulated and drawn."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from archord.postprocess.law import Law, Outside
+    from archord.postprocess.law_joint import LawJoint
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this file to ``app``."""
+    app.command()(laws)
+    app.command()(law)
+
+
+def laws(
+    markdown: Annotated[bool, typer.Option("--markdown", help="print all that is known of each, as Markdown")] = False,
+) -> int:
+    """List the closed-form laws: name, title, range and source."""
+    from archord.postprocess.law_tables import laws_as_markdown
+    from archord.postprocess.laws import LAWS
+
+    if markdown:
+        print(laws_as_markdown(), end="")
+        return 0
+    from rich.table import Table
+
+    table = Table("name", "law", "range", "source", show_lines=True)
+    for entry in LAWS.values():
+        table.add_row(entry.name, entry.title, entry.range, entry.source)
+    _console().print(table, markup=False)
+    return 0
+
+
+def law(
+    names: Annotated[list[str], typer.Argument(metavar="NAME...", help="laws, as archord laws lists them")],
+    scene: Annotated[Path | None, typer.Option(help="take the joint from this scene file")] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="override a key of the scene")
+    ] = None,
+    radius: Annotated[float | None, typer.Option(help="radius of the pin")] = None,
+    clearance: Annotated[float | None, typer.Option(help="radius of the hole less that of the pin")] = None,
+    E_star: Annotated[float | None, typer.Option("--E-star", help="contact modulus E*")] = None,
+    yield_stress: Annotated[float | None, typer.Option(help="yield stress")] = None,
+    length: Annotated[float | None, typer.Option(help="length of the joint, for the laws that need one")] = None,
+    k: Annotated[float, typer.Option("--k", help="Winkler's coefficient")] = 0.85,
+    dundurs_alpha: Annotated[
+        float | None, typer.Option(help="(E1' - E2')/(E1' + E2'), positive for the stiffer pin [0, or the scene's]")
+    ] = None,
+    by_load: Annotated[
+        bool, typer.Option("--by-load", help="rows in equal loads, as for laws that give no displacement")
+    ] = False,
+    to: Annotated[float, typer.Option(help="last row: delta in clearances, or P in E* dR")] = 2.0,
+    points: Annotated[int, typer.Option(help="rows, in equal steps from zero")] = 20,
+    extrapolate: Annotated[
+        bool, typer.Option("--extrapolate", help="evaluate formulas outside the range of the law")
+    ] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="outside the range of a law is an error")] = False,
+    plot: Annotated[Path | None, typer.Option(help="draw the laws into this file instead of a table")] = None,
+) -> int:
+    """Print a table of closed-form laws, or draw them against each other."""
+    import math
+
+    from archord.postprocess.laws import find_law
+    from archord.solver.scene import SceneError
+
+    chosen = [find_law(name) for name in dict.fromkeys(names)]
+    if not (math.isfinite(to) and to > 0):
+        raise SceneError(f"--to {to:g}: must be a positive number.")
+    if not 1 <= points <= 100000:
+        raise SceneError(f"--points {points}: must be between 1 and 100000.")
+    if strict and extrapolate:
+        raise SceneError("--strict: must not be given together with --extrapolate.")
+    given = {
+        "radius": radius,
+        "clearance": clearance,
+        "E_star": E_star,
+        "yield_stress": yield_stress,
+        "length": length,
+        "dundurs_alpha": dundurs_alpha,
+    }
+    joint, units = _joint(scene, overrides or [], given, k)
+    rows = "load" if by_load or not all(entry.gives_displacement for entry in chosen) else "displacement"
+    outside: Outside = "raise" if strict else "extrapolate" if extrapolate else "nan"
+    if plot is not None:
+        from archord.postprocess.law_picture import draw_laws
+
+        print(_warned(draw_laws, chosen, joint, plot, rows, to, outside))
+        return 0
+    _warned(_print_table, chosen, joint, rows, to, points, outside, units)
+    return 0
+
+
+def _joint(
+    scene: Path | None, overrides: list[str], given: dict[str, float | None], k: float
+) -> tuple[LawJoint, dict[str, str]]:
+    """The joint of the scene, or of the options, which come before it; and the names of the units."""
+    import dataclasses
+
+    from archord.postprocess.law_joint import LawJoint
+    from archord.solver.scene import SceneError
+
+    values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    if scene is not None:
+        from archord.solver.scene_file import load_scene
+
+        loaded = load_scene(scene, overrides)
+        units = {"length": loaded.units.length, "stress": loaded.units.stress, "force": loaded.units.force}
+        return dataclasses.replace(LawJoint.from_scene(loaded, k=k), **values), units
+    if overrides:
+        raise SceneError("--set: changes a scene; give one with --scene.")
+    missing = [f"--{name.replace('_', '-')}" for name in ("radius", "clearance", "E_star") if name not in values]
+    if missing:
+        raise SceneError(f"{', '.join(missing)}: missing; give radius, clearance and E* of the joint, or a --scene.")
+    return LawJoint(**values, k=k), {}
+
+
+def _warned(function: Any, *arguments: Any) -> Any:
+    """Call ``function`` and print each warning about a range once, as one sentence on stderr."""
+    import warnings
+
+    from archord.postprocess.law_joint import LawRangeWarning
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", LawRangeWarning)
+        result = function(*arguments)
+    for message in dict.fromkeys(str(w.message) for w in caught):
+        print(f"archord: warning: {message}.", file=sys.stderr)
+    return result
+
+
+def _print_table(
+    chosen: list[Law], joint: LawJoint, rows: str, to: float, points: int, outside: Outside, units: dict[str, str]
+) -> None:
+    from rich.table import Column, Table
+
+    from archord.postprocess.law_tables import law_columns
+
+    for i, entry in enumerate(chosen):
+        columns = law_columns(entry, joint, rows, to, points, outside, units)
+        table = Table(*(Column(name, justify="right") for name in columns), box=None, pad_edge=False)
+        for values in zip(*columns.values(), strict=True):
+            table.add_row(*(f"{value:.6g}" for value in values))
+        print(f"{'' if i == 0 else chr(10)}{entry.name}: {entry.title}")
+        _console().print(table, markup=False)
+
+
+def _console() -> Any:
+    """A console as wide as its text where nobody watches, so that pipes get whole rows."""
+    from rich.console import Console
+
+    return Console(highlight=False, width=None if sys.stdout.isatty() else 160)
