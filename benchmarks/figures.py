@@ -94,10 +94,10 @@ def fig2(runs: Runs) -> tuple[Table, Callable]:
         for fraction in (0.5, 1.0, 1.5, 2.0):
             step = int(np.argmin(np.abs(run.delta / run.dR - fraction))) + 1
             eps, x, py = chord_profile(run, step)
-            phi = arc_angle(x, eps, 1.0)
+            phi = arc_angle(2 * np.sin(eps / 2) * x, eps, 1.0)
             stretch = np.cos(eps / 2) / np.cos(phi - eps / 2) ** 2
             persson = persson_pressure(joint, np.array(run.P[step - 1]), np.array(eps), phi) * np.cos(phi) / stretch
-            p0 = run.p0[step - 1] * np.cos(eps / 2)
+            p0 = run.p0[step - 1]
             inside = x < 1
             shape = np.where(inside, 1 - x**2, 0.0)
             parts.append(
@@ -105,7 +105,7 @@ def fig2(runs: Runs) -> tuple[Table, Callable]:
                     "plane": plane,
                     "delta/dR": fraction,
                     "x/l": x,
-                    "py/py(0)": py / p0,
+                    "py/p0": py / p0,
                     "Persson": persson / p0,
                     "parabola": shape,
                     "ellipse": np.sqrt(shape),
@@ -118,9 +118,9 @@ def fig2(runs: Runs) -> tuple[Table, Callable]:
         axes.plot(x, 1 - x**2, "k-", label="parabola (eq. 3)")
         axes.plot(x, np.sqrt(1 - x**2), "k:", label="Hertz's ellipse (eq. 2)")
         for i, part in enumerate(p for p in parts if p["plane"] == "strain"):
-            axes.plot(part["x/l"], part["py/py(0)"], "o", ms=3, color=f"C{i}", label=f"ours, δ = {part['delta/dR']} ΔR")
+            axes.plot(part["x/l"], part["py/p0"], "o", ms=3, color=f"C{i}", label=f"ours, δ = {part['delta/dR']} ΔR")
             axes.plot(part["x/l"], part["Persson"], "-", lw=1, color=f"C{i}")
-        axes.set(xlabel="x / l", ylabel="$p_y$ / $p_y$(0)", title="chord pressure (lines: Persson)", xlim=(0, 1.1))
+        axes.set(xlabel="x / l", ylabel="$p_y$ / $p_0$", title="chord pressure (lines: Persson)", xlim=(0, 1.1))
 
     return stacked(parts), draw
 

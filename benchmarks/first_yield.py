@@ -10,7 +10,6 @@ import numpy as np
 
 from archord.benchmarks.figures import LABELS, MILD_YIELD, STYLES, Runs, Table, stacked
 from archord.benchmarks.paper_runs import PLANES, Plane, plastic
-from archord.geometry.basis import Array
 from archord.postprocess.law_joint import LawJoint
 from archord.postprocess.laws import find_law
 from archord.postprocess.picture import draw_zone
@@ -35,10 +34,12 @@ class FirstYield:
         return f"δ/ΔR = {self.delta:.3f}, in the {self.body}, {self.depth:.3f} R below the contact at {self.angle:.0f}°"
 
 
-def first_yield(elastic: RunCurve, yield_stress: float, near: float = 3.0) -> FirstYield:
-    """From an elastic run: the cell within ``near`` R whose mean von Mises stress reaches ``yield_stress`` first.
+def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.0) -> FirstYield:
+    """From an elastic run: the cell no deeper than ``near_contact`` R whose von Mises stress reaches ``yield_stress``
+    first.
 
-    The stress is interpolated linearly between the steps.
+    The stress is the cell's mean, interpolated linearly between the steps. The pressed diameter of the pin and the held
+    corner of the block can yield before the contact does: a depth of less than R leaves the first out.
     """
     assert elastic.folder is not None
     with h5py.File(elastic.folder / "fields.h5") as file:
@@ -54,25 +55,22 @@ def first_yield(elastic: RunCurve, yield_stress: float, near: float = 3.0) -> Fi
     low, high = stress[step - 1, cell], stress[step, cell]
     share = (yield_stress - low) / np.maximum(high - low, 1e-300)
     when = np.where(above.any(axis=0), delta[step - 1] + share * (delta[step] - delta[step - 1]), np.inf)
-    when[np.linalg.norm(centroid, axis=1) > near * elastic.R] = np.inf
-    return _at(elastic, int(np.argmin(when)), float(when.min()), centroid, body)
+    pin = body == 1
+    below = np.linalg.norm(centroid + np.where(pin[:, None], [0.0, elastic.dR], 0.0), axis=1)
+    depth = np.where(pin, elastic.R - below, below - elastic.R - elastic.dR) / elastic.R
+    corner = np.degrees(np.arctan2(centroid[:, 0], -centroid[:, 1])) > 85
+    when[(depth > near_contact) | (corner if near_contact < 1 else False)] = np.inf
+    cell = int(np.argmin(when))
+    angle = float(np.degrees(np.arctan2(centroid[cell, 0], -centroid[cell, 1])))
+    return FirstYield(float(when[cell]) / elastic.dR, _BODIES[int(body[cell])], float(depth[cell]), angle)
 
 
-def _at(run: RunCurve, cell: int, delta: float, centroid: Array, body: Array) -> FirstYield:
-    x, y = centroid[cell]
-    name = _BODIES[int(body[cell])]
-    if name == "pin":
-        y = y + run.dR
-        depth = run.R - np.hypot(x, y)
-    else:
-        depth = np.hypot(x, y) - run.R - run.dR
-    return FirstYield(delta / run.dR, name, float(depth / run.R), float(np.degrees(np.arctan2(x, -y))))
-
-
-def first_yields(runs: Runs) -> dict[Plane, FirstYield]:
-    """First yield of the pair of figure 8 in both planes."""
+def first_yields(runs: Runs, near_contact: float = 2.0) -> dict[Plane, FirstYield]:
+    """First yield of the pair of figure 8 in both planes, see `first_yield`."""
     stress = {plane: runs.curve(plastic(MILD_YIELD), plane).sigY for plane in PLANES}
-    return {plane: first_yield(runs.curve("elastic_0.1", plane), stress[plane] or np.inf) for plane in PLANES}
+    return {
+        plane: first_yield(runs.curve("elastic_0.1", plane), stress[plane] or np.inf, near_contact) for plane in PLANES
+    }
 
 
 def fig8(runs: Runs) -> tuple[Table, Callable]:

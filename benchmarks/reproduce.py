@@ -92,10 +92,10 @@ def _report(runs: Runs, folder: Path) -> list[Path]:
         "# The claims of Hu et al., judged",
         "",
         "Hu et al., *A new model for elasto-plastic conformal contact between cylinders*. Like bodies, nu = 0.3 (the "
-        "paper gives neither), block of 100 R, closest points on the deformed curves, small strains. In each plane E* = 1.",
+        "paper gives neither), block of 100 R, closest points on the deformed curves, small strains; E* = 1.",
         "",
-        f"Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {errors[worst]:.2%} from 0.2 dR on ({worst}): "
-        "the discretisation error of the finer one, which all numbers come from, is below that.",
+        f"Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {errors[worst]:.2%} from 0.2 dR on "
+        f"({worst}): the discretisation error of the finer one, which all numbers come from, is below that.",
         "",
         "| claim | figure | the paper | ours, plane strain | ours, plane stress | verdict |",
         "|---|---|---|---|---|---|",
