@@ -45,6 +45,7 @@ def _logarithmic(
     make: Callable[[LawJoint], log.Logarithm],
     limit: Callable[[LawJoint], float] | None = None,
     needs: tuple[str, ...] = (),
+    hertz_pressure: bool = False,
 ) -> Law:
     return Law(
         name,
@@ -59,8 +60,9 @@ def _logarithmic(
         force_at=lambda joint, delta: make(joint).force(delta),
         stiffness_at=lambda joint, delta: make(joint).stiffness(delta),
         displacement_of=lambda joint, P: make(joint).displacement(P),
-        peak_of=hertz.hertz_pressure,
-        angle_of=hertz.hertz_angle,
+        pressure_limit=hertz.hertz_load_limit if hertz_pressure else None,
+        peak_of=hertz.hertz_pressure if hertz_pressure else None,
+        angle_of=hertz.hertz_angle if hertz_pressure else None,
     )
 
 
@@ -141,8 +143,9 @@ _ALL = [
         f"{_RISING}: P <= (4 pi/e^2) E* dR = 1.7007 E* dR, delta <= 0.5413 dR",
         f"Johnson 1985, Contact Mechanics, sections 4.2 and 5.6; {_HU}, eq. 16",
         "Hertz's line contact between pin and hole as half-spaces, so good for contacts small against R. p0 and eps "
-        "are those of Hertz; eq. 7 of the paper, as printed, has a factor of 2 that Hertz's pressure lacks.",
+        "are those of Hertz, in his range; the factor of 2 in eq. 7 as printed would need a diameter for R*.",
         log.johnson,
+        hertz_pressure=True,
     ),
     _logarithmic(
         "radzimovsky",
@@ -153,6 +156,7 @@ _ALL = [
         "d is neither the width nor the half-width of the contact: 1.6 belongs to Roark's K_D of diameters. The public "
         "multibody code of the first author of the 2018 review has the same d.",
         log.radzimovsky,
+        hertz_pressure=True,
     ),
     _logarithmic(
         "radzimovsky-width",
@@ -163,6 +167,7 @@ _ALL = [
         "d is the full width of Hertz's contact, 4 (R* P/(pi E*))^(1/2) = 2.257 (R* P/E*)^(1/2), to 0.3 %. Differs "
         "from Johnson by 2/3 + 1 - 2 ln 2 = 0.280 in the bracket. Roark's form is quoted from memory of the handbook.",
         partial(log.radzimovsky, width=log.ROARK_WIDTH),
+        hertz_pressure=True,
     ),
     _logarithmic(
         "radzimovsky-2.41",
@@ -172,6 +177,7 @@ _ALL = [
         f"{_HU}, the limit of 2.41 E* dR below eq. 9",
         "The coefficient is 4 e^(-1/6)/sqrt(2.41), from the limit; no reading of d we know gives it.",
         partial(log.radzimovsky, width=log.IMPLIED_WIDTH),
+        hertz_pressure=True,
     ),
     _logarithmic(
         "esdu-78035",
