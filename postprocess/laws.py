@@ -186,9 +186,10 @@ _ALL = [
         "s = (1 - nu^2)/(pi E), F = P L",
         f"{_RISING}: P <= 4 pi E* dR = 12.57 E* dR, delta <= 4 dR",
         "ESDU Item 78035 (Tribology Series, 1978), as quoted by Flores and Ambrosio 2004 and later reviews",
-        f"Johnson's law with + 1 for - 1; the length cancels. Form {_SECOND_HAND}: quoted from memory of the reviews, "
-        "and a public multibody code writes pi (s1 + s2) for the factor, with (1 - nu^2)/E for s. The form with L^3 in "
-        "the logarithm that is sometimes given under this name is dubowsky-freudenstein.",
+        f"Johnson's law with + 1 for - 1; the length cancels. Form {_SECOND_HAND}: quoted from memory of the reviews. A "
+        "public multibody code has one more factor of pi before the bracket, so the displacement is uncertain by that; "
+        "ours is the form that tends to half-spaces, P/(pi E*) ln(1/P), for small loads. The form with L^3 in the "
+        "logarithm that is sometimes given under this name is dubowsky-freudenstein.",
         log.esdu,
     ),
     _logarithmic(
@@ -198,7 +199,7 @@ _ALL = [
         "contact no wider than the joint is long: P <= (pi/16) E* L^2/R*; formula ends at P = pi E* L^2/R*",
         "Dubowsky and Freudenstein 1971, as quoted by Flores and Ambrosio 2004 (m = 3)",
         "Two half-spaces under Hertz's pressure along a strip of length L (Lundberg 1939), which we confirmed by "
-        f"quadrature. Form {_SECOND_HAND}.",
+        f"quadrature, the pi in s included. Form {_SECOND_HAND}.",
         log.dubowsky_freudenstein,
         _slender,
         ("length",),
