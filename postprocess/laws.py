@@ -126,8 +126,8 @@ _ALL = [
         "Liu, Zhang and Yang",
         "P = (pi/2) E* delta sqrt(delta/(2 (dR + delta))); p0 = E* delta/(2 R)",
         "delta <= 2 dR, dR <= 0.1 R: ours, as for the law of Hu et al., whose geometry it shares",
-        "Liu, Zhang and Yang 2007, Mechanism and Machine Theory 42, 183, by way of the review of Skrinjar, Slavic and "
-        "Boltezar 2018 and the public code of its first author",
+        "Liu, Zhang and Yang 2007, Mechanism and Machine Theory 42, 183; form as in the public multibody code of the "
+        "first author of Skrinjar, Slavic and Boltezar 2018",
         f"An ellipse of pressure over the chord. Form {_SECOND_HAND}; p0 follows from the form.",
         limit=_deepest,
         unfit=_thick,
@@ -186,8 +186,8 @@ _ALL = [
         "s = (1 - nu^2)/(pi E), F = P L",
         f"{_RISING}: P <= 4 pi E* dR = 12.57 E* dR, delta <= 4 dR",
         "ESDU Item 78035 (Tribology Series, 1978), as quoted by Flores and Ambrosio 2004 and later reviews",
-        f"Johnson's law with + 1 for - 1; the length cancels. Form {_SECOND_HAND}: quoted from memory of the reviews. A "
-        "public multibody code has one more factor of pi before the bracket, so the displacement is uncertain by that; "
+        f"Johnson's law with + 1 for - 1; the length cancels. Form {_SECOND_HAND}: quoted from memory of the reviews. "
+        "A public multibody code has a factor of pi more before the bracket, so the displacement is uncertain by that; "
         "ours is the form that tends to half-spaces, P/(pi E*) ln(1/P), for small loads. The form with L^3 in the "
         "logarithm that is sometimes given under this name is dubowsky-freudenstein.",
         log.esdu,
