@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -52,6 +52,7 @@ class Law:
     limit: _Load  # largest displacement of the range; largest load of a law without displacements
     end: _Load = lambda joint: math.inf  # likewise, where the formula ends
     unfit: Callable[[LawJoint], str] = lambda joint: ""  # why the law does not hold for the whole joint
+    pressure_limit: _Load | None = None  # largest load for which pressure and angle hold, if smaller than the range's
     needs: tuple[str, ...] = ()
     force_at: _Function | None = None
     stiffness_at: _Function | None = None
@@ -68,16 +69,16 @@ class Law:
 
     def force(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside = "nan") -> Array:
         """``P(delta)``."""
-        return self.at_displacement(joint, delta, outside).load
+        return self._at_displacement(joint, delta, outside).load
 
     def displacement(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside = "nan") -> Array:
         """``delta(P)``, the inverse of `force`."""
         self._require_displacement()
-        return self.at_load(joint, load, outside).delta
+        return self._at_load(joint, load, outside).delta
 
     def stiffness(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside = "nan") -> Array:
         """``dP/d(delta)``; infinite at a load limit."""
-        return self.at_displacement(joint, delta, outside).stiffness
+        return self._at_displacement(joint, delta, outside).stiffness
 
     def peak_pressure(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside = "nan") -> Array:
         """``p0(P)``."""
@@ -93,13 +94,36 @@ class Law:
 
     def at_displacement(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside = "nan") -> LawState:
         """All quantities at displacements ``delta``."""
+        return self._with_pressure(joint, self._at_displacement(joint, delta, outside), outside)
+
+    def at_load(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside = "nan") -> LawState:
+        """All quantities at loads ``load``; displacement and stiffness are nan for a law without."""
+        return self._with_pressure(joint, self._at_load(joint, load, outside), outside)
+
+    def _with_pressure(self, joint: LawJoint, state: LawState, outside: Outside) -> LawState:
+        """``state``, with pressure and angle taken out beyond their own range."""
+        limit = math.inf if self.pressure_limit is None else self.pressure_limit(joint)
+        beyond = state.load > limit * (1 + _ROUND_OFF)
+        if not beyond.any():
+            return state
+        unit = joint.E_star * joint.clearance
+        said = (
+            f"{self.name}: p0 and eps are Hertz's, for P up to {limit / unit:.4g} E* dR, where the half-width of the "
+            f"contact is R/2; asked for {_span(state.load[beyond] / unit)} E* dR"
+        )
+        _tell(said, outside)
+        if outside == "extrapolate":
+            return state
+        p0, eps = (np.where(beyond, np.nan, x) for x in (state.peak_pressure, state.angle))
+        return replace(state, peak_pressure=p0, angle=eps)
+
+    def _at_displacement(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside) -> LawState:
         self._require_displacement()
         self._require(joint)
         given = np.asarray(delta, dtype=float)
         return self._state(joint, self._inside(joint, given, self.limit(joint), self.end(joint), "delta", outside))
 
-    def at_load(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside = "nan") -> LawState:
-        """All quantities at loads ``load``; displacement and stiffness are nan for a law without."""
+    def _at_load(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside) -> LawState:
         self._require(joint)
         P = np.asarray(load, dtype=float)
         limit, end = self.limit(joint), self.end(joint)
@@ -153,10 +177,8 @@ class Law:
             return x
         stray = reason or f"{what} = {_span(x[beyond] / unit)} {named} is outside 0 to {limit / unit:.4g} {named}"
         said = f"{self.name}: {stray} (range: {self.range})"
-        if outside == "raise":
-            raise LawRangeError(f"{said}.")
+        _tell(said, outside)
         keep = (x >= 0) & (x <= end * shift) if outside == "extrapolate" else ~beyond & (not reason)
-        warnings.warn(LawRangeWarning(said), stacklevel=4)
         return np.where(keep, x, np.nan)
 
     def _require(self, joint: LawJoint) -> None:
@@ -167,6 +189,12 @@ class Law:
     def _require_displacement(self) -> None:
         if self.force_at is None:
             raise SceneError(f"{self.name}: this law gives no displacement, only pressure and angle of a load.")
+
+
+def _tell(said: str, outside: Outside) -> None:
+    if outside == "raise":
+        raise LawRangeError(f"{said}.")
+    warnings.warn(LawRangeWarning(said), stacklevel=5)
 
 
 def _span(x: Array) -> str:

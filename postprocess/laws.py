@@ -45,6 +45,7 @@ def _logarithmic(
     make: Callable[[LawJoint], log.Logarithm],
     limit: Callable[[LawJoint], float] | None = None,
     needs: tuple[str, ...] = (),
+    hertz_pressure: bool = False,
 ) -> Law:
     return Law(
         name,
@@ -59,8 +60,9 @@ def _logarithmic(
         force_at=lambda joint, delta: make(joint).force(delta),
         stiffness_at=lambda joint, delta: make(joint).stiffness(delta),
         displacement_of=lambda joint, P: make(joint).displacement(P),
-        peak_of=hertz.hertz_pressure,
-        angle_of=hertz.hertz_angle,
+        pressure_limit=hertz.hertz_load_limit if hertz_pressure else None,
+        peak_of=hertz.hertz_pressure if hertz_pressure else None,
+        angle_of=hertz.hertz_angle if hertz_pressure else None,
     )
 
 
@@ -124,8 +126,8 @@ _ALL = [
         "Liu, Zhang and Yang",
         "P = (pi/2) E* delta sqrt(delta/(2 (dR + delta))); p0 = E* delta/(2 R)",
         "delta <= 2 dR, dR <= 0.1 R: ours, as for the law of Hu et al., whose geometry it shares",
-        "Liu, Zhang and Yang 2007, Mechanism and Machine Theory 42, 183, by way of the review of Skrinjar, Slavic and "
-        "Boltezar 2018 and the public code of its first author",
+        "Liu, Zhang and Yang 2007, Mechanism and Machine Theory 42, 183; form as in the public multibody code of the "
+        "first author of Skrinjar, Slavic and Boltezar 2018",
         f"An ellipse of pressure over the chord. Form {_SECOND_HAND}; p0 follows from the form.",
         limit=_deepest,
         unfit=_thick,
@@ -141,8 +143,9 @@ _ALL = [
         f"{_RISING}: P <= (4 pi/e^2) E* dR = 1.7007 E* dR, delta <= 0.5413 dR",
         f"Johnson 1985, Contact Mechanics, sections 4.2 and 5.6; {_HU}, eq. 16",
         "Hertz's line contact between pin and hole as half-spaces, so good for contacts small against R. p0 and eps "
-        "are those of Hertz; eq. 7 of the paper, as printed, has a factor of 2 that Hertz's pressure lacks.",
+        "are those of Hertz, in his range; the factor of 2 in eq. 7 as printed would need a diameter for R*.",
         log.johnson,
+        hertz_pressure=True,
     ),
     _logarithmic(
         "radzimovsky",
@@ -153,6 +156,7 @@ _ALL = [
         "d is neither the width nor the half-width of the contact: 1.6 belongs to Roark's K_D of diameters. The public "
         "multibody code of the first author of the 2018 review has the same d.",
         log.radzimovsky,
+        hertz_pressure=True,
     ),
     _logarithmic(
         "radzimovsky-width",
@@ -163,6 +167,7 @@ _ALL = [
         "d is the full width of Hertz's contact, 4 (R* P/(pi E*))^(1/2) = 2.257 (R* P/E*)^(1/2), to 0.3 %. Differs "
         "from Johnson by 2/3 + 1 - 2 ln 2 = 0.280 in the bracket. Roark's form is quoted from memory of the handbook.",
         partial(log.radzimovsky, width=log.ROARK_WIDTH),
+        hertz_pressure=True,
     ),
     _logarithmic(
         "radzimovsky-2.41",
@@ -172,6 +177,7 @@ _ALL = [
         f"{_HU}, the limit of 2.41 E* dR below eq. 9",
         "The coefficient is 4 e^(-1/6)/sqrt(2.41), from the limit; no reading of d we know gives it.",
         partial(log.radzimovsky, width=log.IMPLIED_WIDTH),
+        hertz_pressure=True,
     ),
     _logarithmic(
         "esdu-78035",
@@ -180,9 +186,10 @@ _ALL = [
         "s = (1 - nu^2)/(pi E), F = P L",
         f"{_RISING}: P <= 4 pi E* dR = 12.57 E* dR, delta <= 4 dR",
         "ESDU Item 78035 (Tribology Series, 1978), as quoted by Flores and Ambrosio 2004 and later reviews",
-        f"Johnson's law with + 1 for - 1; the length cancels. Form {_SECOND_HAND}: quoted from memory of the reviews, "
-        "and a public multibody code writes pi (s1 + s2) for the factor, with (1 - nu^2)/E for s. The form with L^3 in "
-        "the logarithm that is sometimes given under this name is dubowsky-freudenstein.",
+        f"Johnson's law with + 1 for - 1; the length cancels. Form {_SECOND_HAND}: quoted from memory of the reviews. "
+        "A public multibody code has a factor of pi more before the bracket, so the displacement is uncertain by that; "
+        "ours is the form that tends to half-spaces, P/(pi E*) ln(1/P), for small loads. The form with L^3 in the "
+        "logarithm that is sometimes given under this name is dubowsky-freudenstein.",
         log.esdu,
     ),
     _logarithmic(
@@ -192,7 +199,7 @@ _ALL = [
         "contact no wider than the joint is long: P <= (pi/16) E* L^2/R*; formula ends at P = pi E* L^2/R*",
         "Dubowsky and Freudenstein 1971, as quoted by Flores and Ambrosio 2004 (m = 3)",
         "Two half-spaces under Hertz's pressure along a strip of length L (Lundberg 1939), which we confirmed by "
-        f"quadrature. Form {_SECOND_HAND}.",
+        f"quadrature, the pi in s included. Form {_SECOND_HAND}.",
         log.dubowsky_freudenstein,
         _slender,
         ("length",),

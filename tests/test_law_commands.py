@@ -1,0 +1,106 @@
+"""The commands ``archord laws`` and ``archord law``: tables, pictures, sentences."""
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from archord.cli import run
+from archord.postprocess.law_joint import LawJoint
+from archord.postprocess.laws import LAWS
+
+SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")
+JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="only rank 0 prints")
+
+
+def table(text: str) -> dict[str, np.ndarray]:
+    """Columns of the table below the title."""
+    rows = [line.split() for line in text.splitlines()[2:] if line.strip()]
+    heads = text.splitlines()[1].replace("P/(E* R)", "P/E*R").replace("P/(E* dR)", "P/E*dR").split()
+    return dict(zip(heads, np.array(rows, float).T, strict=True))
+
+
+def test_laws_lists_every_law(capsys):
+    assert run(["laws"]) == 0
+    printed = capsys.readouterr().out
+    assert all(f" {name} " in printed for name in LAWS)
+
+
+def test_law_prints_its_numbers(capsys):
+    assert run(["law", "paper-plastic", *JOINT, "--yield-stress", "230", "--points", "4", "--to", "1"]) == 0
+    columns = table(capsys.readouterr().out)
+    joint = LawJoint(10, 0.05, 115385, yield_stress=230)
+    assert columns["delta/dR"] == pytest.approx([0.25, 0.5, 0.75, 1])
+    assert columns["P"] == pytest.approx(LAWS["paper-plastic"].force(joint, columns["delta"]), rel=1e-5)
+    assert columns["P/E*R"] == pytest.approx(columns["P"] / 1153850, rel=1e-5)
+    stiffness = LAWS["paper-plastic"].stiffness(joint, columns["delta"])
+    assert columns["dP/ddelta"] == pytest.approx(stiffness, rel=1e-5)
+    assert columns["p0"].max() == 230
+
+
+def test_law_of_a_scene_has_its_units_and_options_come_first(capsys):
+    assert run(["law", "paper", "--scene", SCENE, "--points", "1"]) == 0
+    first = capsys.readouterr().out
+    assert "delta [mm]" in first
+    assert "P [N/mm]" in first
+    assert run(["law", "paper", "--scene", SCENE, "--points", "1", "--clearance", "0.1"]) == 0
+    assert capsys.readouterr().out != first
+
+
+def test_laws_without_displacement_are_tabulated_over_the_load(capsys):
+    assert run(["law", "persson", "winkler", *JOINT, "--points", "2", "--to", "1"]) == 0
+    persson, winkler = capsys.readouterr().out.split("\n\n")
+    assert table(persson)["P/E*dR"] == pytest.approx([0.5, 1])
+    assert table(winkler)["P/E*dR"] == pytest.approx([0.5, 1])
+    assert table(persson)["eps/deg"] == pytest.approx([39.6376, 50.4236], rel=1e-5)
+
+
+def test_outside_the_range_rows_are_nan_and_one_warning(capsys):
+    assert run(["law", "johnson", *JOINT, "--points", "4", "--to", "2"]) == 0
+    result = capsys.readouterr()
+    assert np.isnan(table(result.out)["P"][1:]).all()
+    assert "johnson: delta = 1 to 2 dR is outside 0 to 0.5413 dR" in result.err
+    assert run(["law", "johnson", *JOINT, "--to", "2", "--strict"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["law", "jonson", *JOINT], "jonson: is not a known law; did you mean johnson?"),
+        (["law", "johnson", "--radius", "1"], "--clearance, --E-star: missing"),
+        (["law", "johnson", *JOINT, "--clearance", "-1"], "clearance = -1 must be a positive number."),
+        (["law", "paper-plastic", *JOINT], "paper-plastic: this law needs yield_stress."),
+        (["law", "paper", *JOINT, "--to", "-2"], "--to -2: must be a positive number."),
+        (["law", "paper", *JOINT, "--points", "0"], "--points 0: must be between 1 and 100000."),
+        (["law", "paper", *JOINT, "--set", "joint.radius=1"], "--set: changes a scene"),
+        (["law", "paper", "--scene", "nowhere.toml"], "nowhere.toml: cannot be read"),
+        (["law", "paper", *JOINT, "--plot", "laws.xyz"], "laws.xyz: must end in one of "),
+    ],
+)
+def test_bad_input_is_one_sentence(capsys, arguments, said):
+    assert run(arguments) == 2
+    result = capsys.readouterr()
+    assert result.err.startswith(said)
+    assert len(result.err.splitlines()) == 1
+    assert result.out == ""
+
+
+def test_law_draws(tmp_path, capsys):
+    target = tmp_path / "laws.svg"
+    assert run(["law", "paper", "johnson", "persson", *JOINT, "--plot", str(target)]) == 0
+    assert capsys.readouterr().out == f"{target}\n"
+    text = target.read_text()
+    assert text.count("<svg") == 1
+
+
+def test_a_table_needs_no_plotting():
+    """Nor dolfinx."""
+    import subprocess
+
+    code = f"import sys; from archord.cli import run; run(['law', 'paper', *{JOINT}]); print(*sys.modules)"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert {"matplotlib", "dolfinx", "petsc4py"}.isdisjoint(result.stdout.split())
