@@ -20,7 +20,7 @@ def summary_table(calibration: Calibration) -> Table:
     for heading in (
         "run",
         "fit to",
-        "",
+        "of",
         "value",
         "s.e.",
         "mesh",
