@@ -61,6 +61,13 @@ class CurveFit:
         every = np.concatenate([r.relative for r in self.residuals])
         return float(every[np.abs(every).argmax()])
 
+    @property
+    def serial_correlation(self) -> float:
+        """Correlation of residuals of neighbouring steps: about 0 for noise, near 1 where the law has another shape."""
+        rows = [part.law - part.data for part in self.residuals]
+        squares = sum(float(r @ r) for r in rows)
+        return sum(float(r[1:] @ r[:-1]) for r in rows) / squares if squares else 0.0
+
 
 @dataclass(frozen=True)
 class Fits:

@@ -11,7 +11,7 @@ from archord.solver.scene import SceneError
 
 
 def draw_fit(calibration: Calibration, target: str | Path) -> Path:
-    """Draw the fit to all scenes as ``target``; returns the file. Raises `SceneError` if it cannot be written."""
+    """Draw the fit to all scenes as ``target``; returns the file. Raises `SceneError` for an unknown format."""
     import matplotlib
 
     matplotlib.use("agg")
@@ -28,8 +28,6 @@ def draw_fit(calibration: Calibration, target: str | Path) -> Path:
         _curve(axes[1], fits, fits.p0, "p0 R / (E* ΔR)", "peak pressure")
         _residuals(axes[2], fits.P, fits.p0)
         figure.savefig(target, dpi=110)
-    except OSError as error:
-        raise SceneError(f"{target}: cannot be written: {error.strerror or error}.") from None
     finally:
         plt.close(figure)
     return target

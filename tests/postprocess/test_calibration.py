@@ -121,6 +121,15 @@ def test_beyond_yield_p0_tells_nothing_of_k():
     assert found.P.k.value == pytest.approx(0.83, rel=1e-6)
 
 
+def test_serial_correlation_tells_noise_from_a_wrong_shape():
+    """White noise: near -1/n. A curve of another shape: near 1."""
+    noise = np.mean([fit_curve("P", group([curve(0.83, noise=0.01, seed=s)])).serial_correlation for s in range(40)])
+    assert noise == pytest.approx(0, abs=0.15)
+    run = curve(0.83)
+    bent = replace(run, P=run.P * (1 - 0.1 * LOADS))
+    assert fit_curve("P", group([bent])).serial_correlation > 0.7
+
+
 def test_a_mesh_error_of_first_order_is_found_and_carried():
     """Data off by 2 h/R: the fit to the finer run is off by as much, says so, and covers the truth."""
     fine, coarse = (curve(0.83 * (1 + 2 * h), h=h, name=f"h{h}") for h in (0.02, 0.05))

@@ -68,7 +68,7 @@ def test_a_runs_chord_carries_its_force(runs, name):
             chord = read_chord_pressure(runs[name], step, side)
             assert chord.resultant == pytest.approx(arc.resultant, rel=1e-8)
             radius = {"pin": run.R, "hole": run.R + run.dR}[side]
-            assert chord.R == pytest.approx(radius, rel=1e-14)
+            assert radius == pytest.approx(chord.R, rel=1e-14)
             assert chord.eps == run.eps[step - 1]
             sides[side] = chord.resultant / P - 1
         assert set(sides) == {"pin", "hole"}
