@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -36,15 +37,18 @@ def fit(
 
     calibration = calibrate([read_run(folder) for folder in folders], load_range or (0.0, math.inf), confidence)
     law = calibration.law()
-    # written before anything is printed: a file that cannot be is one sentence alone
-    if json_file:
-        _write(json_file, fit_report.as_json(calibration))
-    if python:
-        _write(python, law.to_python())
+    # checked and written before anything is printed: a file that cannot be written is one sentence alone
+    files = [file for file in (json_file, python, picture) if file]
+    for file in files:
+        _check_writable(file)
     if picture:
         from archord.postprocess.fit_picture import draw_fit
 
         draw_fit(calibration, picture)
+    if json_file:
+        json_file.write_text(fit_report.as_json(calibration), encoding="utf-8")
+    if python:
+        python.write_text(law.to_python(), encoding="utf-8")
     console = Console(highlight=False, width=200)  # numbers that wrap are better than numbers cut off
     tables = [fit_report.summary_table(calibration)]
     tables += [fit_report.residual_table(curve) for curve in calibration.joint.curves if residuals]
@@ -56,16 +60,15 @@ def fit(
     threshold = "" if law.c is None else f", c = {law.c:.5f}"
     low, high = law.fitted_range
     print(f"law: k = {law.k:.5f}{threshold}, from P(delta), delta = {low:g} to {high:g} dR")
-    for file in (json_file, python, picture):
-        if file:
-            print(file)
+    for file in files:
+        print(file)
     return 0
 
 
-def _write(file: Path, text: str) -> None:
+def _check_writable(file: Path) -> None:
     from archord.solver.scene import SceneError
 
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise SceneError(f"{file}: cannot be written: {error.strerror or error}.") from None
+    if not file.parent.is_dir():
+        raise SceneError(f"{file}: cannot be written: {file.parent} is not a folder.")
+    if file.is_dir() or not os.access(file if file.exists() else file.parent, os.W_OK):
+        raise SceneError(f"{file}: cannot be written: it is a folder, or may not be written.")

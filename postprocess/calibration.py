@@ -61,6 +61,13 @@ class CurveFit:
         every = np.concatenate([r.relative for r in self.residuals])
         return float(every[np.abs(every).argmax()])
 
+    @property
+    def serial_correlation(self) -> float:
+        """Correlation of residuals of neighbouring steps: about 0 for noise, near 1 where the law has another shape."""
+        rows = [part.law - part.data for part in self.residuals]
+        squares = sum(float(r @ r) for r in rows)
+        return sum(float(r[1:] @ r[:-1]) for r in rows) / squares if squares else 0.0
+
 
 @dataclass(frozen=True)
 class Fits:
@@ -91,7 +98,8 @@ class Calibration:
         """The law for the joint of ``run`` (by default the first), with k and c from P(delta) of all scenes."""
         run = run or self.joint.runs[0]
         k, c = self.joint.P.k, self.joint.P.c
-        assert k is not None
+        if k is None:
+            raise SceneError(f"{run.name}: P(delta) does not determine k; widen --range.")
         plastic = c is not None and run.sigY is not None
         loads = np.concatenate([r.load for r in self.joint.P.residuals])
         return FittedLaw(
@@ -160,8 +168,8 @@ def _elastic_pair(run: RunCurve) -> tuple[float, float, float]:
 
 
 def _fits(groups: list[Refined], load_range: tuple[float, float], confidence: float, finer: str | None = None) -> Fits:
-    force = _fit_curve("P", groups, load_range, confidence)
-    peak = _fit_curve("p0", groups, load_range, confidence)
+    force = fit_curve("P", groups, load_range, confidence)
+    peak = fit_curve("p0", groups, load_range, confidence)
     plateau = _fit_plateau(force, groups, load_range, confidence)
     return Fits(tuple(g.run for g in groups), force, peak, plateau, finer)
 
@@ -171,8 +179,8 @@ def _scale(quantity: str, run: RunCurve) -> float:
     return {"P": run.E_star * run.dR, "p0": run.E_star * run.dR / run.R}.get(quantity) or run.sigY or 1.0
 
 
-def _law(quantity: str, run: RunCurve, delta: Array, k: float, c: float | None) -> Array:
-    """Dimensionless prediction ``(n,)``; elastic if ``c`` is None or the run has no yield stress."""
+def dimensionless_law(quantity: str, run: RunCurve, delta: Array, k: float, c: float | None) -> Array:
+    """``P/(E* dR)`` or ``p0 R/(E* dR)`` of ``run``'s joint ``(n,)``; elastic if ``c`` or its yield stress is None."""
     if quantity == "P":
         elastic = elastic_force(delta, k, run.E_star, run.R, run.dR)
         plastic = plastic_force(delta, k, c, run.E_star, run.R, run.dR, run.sigY) if c and run.sigY else elastic
@@ -185,15 +193,23 @@ def _law(quantity: str, run: RunCurve, delta: Array, k: float, c: float | None) 
 def _selected(run: RunCurve, load_range: tuple[float, float]) -> Array:
     load, slack = run.delta / run.dR, 1e-9
     chosen = (load >= load_range[0] * (1 - slack)) & (load <= load_range[1] * (1 + slack))
+    chosen &= (run.P > 0) & (run.p0 > 0)
     if not chosen.any():
         raise SceneError(
-            f"{run.name}: has no step from {load_range[0]:g} to {load_range[1]:g} clearances; "
+            f"{run.name}: has no step with contact from {load_range[0]:g} to {load_range[1]:g} clearances; "
             f"its {len(load)} steps are from {load.min():g} to {load.max():g}."
         )
     return chosen
 
 
-def _fit_curve(quantity: str, groups: list[Refined], load_range: tuple[float, float], confidence: float) -> CurveFit:
+def fit_curve(
+    quantity: str, groups: list[Refined], load_range: tuple[float, float] = (0.0, np.inf), confidence: float = 0.95
+) -> CurveFit:
+    """Fit ``k``, and ``c`` where two steps or more lie on the plateau, to the curve "P" or "p0" of all ``groups``.
+
+    Where some scenes have a second mesh, the fit is repeated with their data extrapolated to vanishing element size;
+    the change of a parameter is its discretisation error. Raises `SceneError` where too few steps are in the range.
+    """
     runs = [g.run for g in groups]
     chosen = [_selected(run, load_range) for run in runs]
     deltas = [run.delta[rows] for run, rows in zip(runs, chosen, strict=True)]
@@ -207,10 +223,10 @@ def _fit_curve(quantity: str, groups: list[Refined], load_range: tuple[float, fl
 
     def predict(v: Array) -> Array:
         c = v[1] if len(v) > 1 else None
-        return np.concatenate([_law(quantity, r, d, v[0], c) for r, d in zip(runs, deltas, strict=True)])
+        return np.concatenate([dimensionless_law(quantity, r, d, v[0], c) for r, d in zip(runs, deltas, strict=True)])
 
     def solve(values: list[Array], parameters: int) -> LeastSquares:
-        k = float(np.median([v[0] / _law(quantity, r, d[:1], 1.0, None)[0]
+        k = float(np.median([v[0] / dimensionless_law(quantity, r, d[:1], 1.0, None)[0]
                              for r, d, v in zip(runs, deltas, values, strict=True)]))  # fmt: skip
         starts = [[k]] if parameters == 1 else [[k, c] for c in _STARTS_OF_C]
         try:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from archord.postprocess.calibration import Calibration, CurveFit
+import numpy as np
+
+from archord.postprocess.calibration import Calibration, CurveFit, Fits, dimensionless_law
 from archord.solver.scene import SceneError
 
 
 def draw_fit(calibration: Calibration, target: str | Path) -> Path:
-    """Draw the fit to all scenes as ``target``; returns the file. Raises `SceneError` if it cannot be written."""
+    """Draw the fit to all scenes as ``target``; returns the file. Raises `SceneError` for an unknown format."""
     import matplotlib
 
     matplotlib.use("agg")
@@ -22,27 +24,30 @@ def draw_fit(calibration: Calibration, target: str | Path) -> Path:
         if target.suffix[1:].lower() not in formats:
             raise SceneError(f"{target}: must end in one of {', '.join('.' + name for name in sorted(formats))}.")
         fits = calibration.joint
-        _curve(axes[0], fits.P, "P / (E* ΔR)", "force")
-        _curve(axes[1], fits.p0, "p0 R / (E* ΔR)", "peak pressure")
+        _curve(axes[0], fits, fits.P, "P / (E* ΔR)", "force")
+        _curve(axes[1], fits, fits.p0, "p0 R / (E* ΔR)", "peak pressure")
         _residuals(axes[2], fits.P, fits.p0)
         figure.savefig(target, dpi=110)
-    except OSError as error:
-        raise SceneError(f"{target}: cannot be written: {error.strerror or error}.") from None
     finally:
         plt.close(figure)
     return target
 
 
-def _curve(axes, fit: CurveFit, label: str, what: str) -> None:
-    for i, part in enumerate(fit.residuals):
+def _curve(axes, fits: Fits, fit: CurveFit, label: str, what: str) -> None:
+    for i, (run, part) in enumerate(zip(fits.runs, fit.residuals, strict=True)):
         axes.plot(part.load, part.data, "o", ms=4, mfc="none", color=f"C{i}", label=part.name)
-        axes.plot([0, *part.load], [0, *part.law], "-", lw=1.4, color=f"C{i}")
+        if fit.k:
+            load = np.linspace(0, part.load.max(), 400)
+            c = fit.c.value if fit.c else None
+            law = dimensionless_law(fit.quantity, run, load * run.dR, fit.k.value, c)
+            axes.plot(load, law, "-", lw=1.4, color=f"C{i}")
     found = [
         f"{name} = {estimate.value:.3f} ± {estimate.error:.3f}"
         for name, estimate in (("k", fit.k), ("c", fit.c))
         if estimate
     ]
-    axes.set(xlabel="δ / ΔR", ylabel=label, xlim=(0, None), ylim=(0, None), title=f"{what}: {', '.join(found)}")
+    axes.set(xlabel="δ / ΔR", ylabel=label, xlim=(0, None), ylim=(0, None))
+    axes.set_title(f"{what}: {', '.join(found)}", fontsize="medium")
     axes.legend(frameon=False, fontsize="small")
     axes.grid(alpha=0.3)
 

@@ -12,6 +12,8 @@ from rich.table import Table
 from archord.postprocess.calibration import Calibration, CurveFit, Fits
 from archord.postprocess.least_squares import Estimate
 
+_BENT = 0.5  # serial correlation that noise in ten steps or more hardly ever reaches
+
 
 def summary_table(calibration: Calibration) -> Table:
     """One row per fitted parameter: value, errors, interval, quality of the fit."""
@@ -20,7 +22,7 @@ def summary_table(calibration: Calibration) -> Table:
     for heading in (
         "run",
         "fit to",
-        "",
+        "of",
         "value",
         "s.e.",
         "mesh",
@@ -63,6 +65,13 @@ def notes(calibration: Calibration) -> list[str]:
     for fits in calibration.each:
         if fits.finer:
             said.append(f"mesh: {fits.runs[0].name} serves to estimate the discretisation error of {fits.finer}.")
+    bent = [fit for fit in joint.curves if fit.serial_correlation > _BENT]
+    if bent:
+        values = ", ".join(f"{fit.quantity} {fit.serial_correlation:.2f}" for fit in bent)
+        said.append(
+            f"s.e.: residuals of neighbouring steps are correlated ({values}): the law's shape differs from the runs', "
+            "and errors and intervals, which take residuals as independent, are too small."
+        )
     if any(r.sigY for r in joint.runs):
         if joint.P.c is None:
             said.append("c: too few steps past yield in the range; elastic law.")
@@ -109,6 +118,7 @@ def _curve(fit: CurveFit) -> dict[str, Any]:
         "flatness": fit.flatness,
         "rms_residual": fit.rms,
         "largest_residual": fit.largest,
+        "serial_correlation": fit.serial_correlation,
         "residuals": [
             {
                 "run": part.name,

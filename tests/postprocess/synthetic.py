@@ -1,0 +1,34 @@
+"""Runs that follow the plastic-Winkler law exactly, with noise on request; no solver involved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from archord.benchmarks.paper_joint import E, paper_joint
+from archord.postprocess.run_curve import RunCurve
+from archord.postprocess.winkler import elastic_force, onset, peak_pressure, plastic_force, plastic_peak_pressure
+
+LOADS = np.linspace(0.1, 2.0, 20)
+
+
+def curve(k, c=None, *, dR=0.005, sigY=None, R=1.0, modulus=1.0, noise=0.0, seed=0, h=0.05, name="run", analysis=None):
+    """Steps of a joint of radius ``R`` and E* = ``modulus``; ``dR`` and ``sigY`` are relative to these.
+
+    ``noise`` is the standard deviation of P/(E* dR) and of p0 R/(E* dR).
+    """
+    material = {"E": E * modulus} | ({"yield_stress": sigY * modulus} if sigY else {})
+    joint = {"radius": R, "clearance": dR * R, "element_size": h * R}
+    scene = paper_joint(joint=joint, pin=material, block=material, analysis=analysis or {})
+    E_star, gap = scene.E_star, dR * R
+    delta = LOADS * gap
+    if c is None:
+        P, p0, peeq = elastic_force(delta, k, E_star, R, gap), peak_pressure(delta, k, E_star, R), 0 * delta
+    else:
+        strength = sigY * modulus
+        P = plastic_force(delta, k, c, E_star, R, gap, strength)
+        p0 = plastic_peak_pressure(delta, k, c, E_star, R, strength)
+        peeq = np.maximum(delta - onset(k, c, E_star, R, strength), 0.0)
+    random = np.random.default_rng(seed)
+    P = P + noise * E_star * gap * random.standard_normal(len(P))
+    p0 = p0 + noise * E_star * gap / R * random.standard_normal(len(P))
+    return RunCurve(name, scene, delta, P, p0, np.ones(len(P)), peeq)

@@ -1,0 +1,106 @@
+"""The chord carries what the arc carries."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from archord.postprocess.arc_pressure import read_arcs
+from archord.postprocess.chord import arc_angle, chord_coordinate, chord_projection, read_chord_pressure
+from archord.postprocess.run_curve import read_run
+from archord.solver.scene import SceneError
+
+
+@pytest.mark.parametrize("eps", [0.01, 0.5, 1.2, np.pi / 2])
+def test_the_chord_integral_is_the_arc_integral(eps):
+    """2 int_0^l py dx over the straight chord, py from eq. 15 at the angle found for x, equals 2 int p cos(phi) R dphi
+    to 1e-8."""
+    R = 3.0
+
+    def p(phi):
+        return np.sqrt(np.maximum(eps - phi, 0)) * (1 + phi) + 0.2
+
+    def py(x):
+        phi = float(arc_angle(x, eps, R))
+        lower = chord_projection([0.0, phi], [0.0, p(phi)], eps, R)
+        return lower.py[-1]
+
+    arc = 2 * quad(lambda phi: p(phi) * np.cos(phi) * R, 0, eps, epsabs=0, epsrel=1e-11)[0]
+    chord = 2 * quad(py, 0, 2 * R * np.sin(eps / 2), epsabs=0, epsrel=1e-10, limit=400)[0]
+    assert chord == pytest.approx(arc, rel=1e-8)
+
+
+def test_the_projection_is_along_the_radius():
+    """The point of the chord at x lies on the ray at phi: the chord leaves the deepest point at eps/2 to the
+    horizontal."""
+    R, eps = 2.0, 1.1
+    phi = np.linspace(0, eps, 9)
+    x = chord_coordinate(phi, eps, R)
+    assert x[0] == 0
+    assert x[-1] == pytest.approx(2 * R * np.sin(eps / 2), rel=1e-14)
+    point = np.stack([x * np.cos(eps / 2), -R + x * np.sin(eps / 2)], axis=1)
+    np.testing.assert_allclose(np.arctan2(point[:, 0], -point[:, 1]), phi, atol=1e-14)
+    np.testing.assert_allclose(arc_angle(x, eps, R), phi, atol=1e-14)
+
+
+def test_resultants_agree_for_samples_of_any_spacing_and_edge():
+    """The default weights are the trapezoidal rule on the arc; points with pressure beyond the edge stay."""
+    random = np.random.default_rng(1)
+    phi = np.sort(random.uniform(0, 1.5, 40))
+    pressure = np.where(phi < 0.9, 1 - phi, 0.0)
+    arc = 2 * 4.0 * np.trapezoid(pressure * np.cos(phi), phi)
+    for eps in (0.3, 0.7, 1.4):
+        chord = chord_projection(phi, pressure, eps, 4.0)
+        assert chord.resultant == pytest.approx(arc, rel=1e-13)
+        assert chord.x_over_l.max() > 1 or eps > 0.9
+        assert (np.diff(chord.x) > 0).all()
+    assert len(chord_projection(phi, pressure, 0.7, 4.0).x) == (phi < 0.9).sum()
+
+
+@pytest.mark.parametrize("name", ["elastic", "plastic"])
+def test_a_runs_chord_carries_its_force(runs, name):
+    """Every step and side: chord = arc to 1e-8; the side's arc = P of history.csv to dR/R (undeformed arcs differ by
+    that); the mean of both sides is nearer than either where the joint is elastic."""
+    run = read_run(runs[name])
+    for step in range(1, len(run.delta) + 1):
+        P = run.P[step - 1]
+        sides = {}
+        for side, arc in read_arcs(run, step).items():
+            chord = read_chord_pressure(runs[name], step, side)
+            assert chord.resultant == pytest.approx(arc.resultant, rel=1e-8)
+            radius = {"pin": run.R, "hole": run.R + run.dR}[side]
+            assert radius == pytest.approx(chord.R, rel=1e-14)
+            assert chord.eps == run.eps[step - 1]
+            sides[side] = chord.resultant / P - 1
+        assert set(sides) == {"pin", "hole"}
+        assert max(map(abs, sides.values())) < 2 * run.dR / run.R
+    if name == "elastic":
+        assert sides["pin"] < 0 < sides["hole"]
+        assert abs(sides["pin"] + sides["hole"]) / 2 < 0.2 * max(map(abs, sides.values()))
+
+
+def test_the_last_step_of_the_hole_is_the_default(runs):
+    """Without step and side."""
+    default, named = read_chord_pressure(runs["elastic"]), read_chord_pressure(runs["elastic"], 6, "hole")
+    np.testing.assert_array_equal(default.py, named.py)
+
+
+@pytest.mark.parametrize(
+    ("step", "side", "said"),
+    [
+        (7, None, "has no step 7; its accepted steps are 1 to 6"),
+        (0, None, "no step 0"),
+        (1, "block", "no side 'block'"),
+    ],
+)
+def test_what_a_run_does_not_have(runs, step, side, said):
+    with pytest.raises(SceneError, match=said):
+        read_chord_pressure(runs["elastic"], step, side)
+
+
+@pytest.mark.parametrize(
+    ("phi", "pressure", "eps"),
+    [([0, 1], [1, 1], 0.0), ([1, 0], [1, 1], 1.0), ([0, 2], [1, 1], 1.0), ([0, 1], [1, 1, 1], 1.0), ([0], [1], 1.0)],
+)
+def test_arrays_that_are_no_arc(phi, pressure, eps):
+    with pytest.raises(ValueError, match="must"):
+        chord_projection(phi, pressure, eps, 1.0)

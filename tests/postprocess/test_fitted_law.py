@@ -1,0 +1,66 @@
+"""The exported law is the law."""
+
+import ast
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from archord.postprocess.fitted_law import FittedLaw
+from archord.postprocess.winkler import plastic_force
+from archord.solver.scene import SceneError
+
+ELASTIC = FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, fitted_range=(0.1, 2.0))
+PLASTIC = FittedLaw(
+    k=0.83 + 1e-16, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, c=1 / 3, sigY=230.7, c_error=0.02,
+    fitted_to=('a "quoted"\nrun """',),
+)  # fmt: skip
+DELTA = np.array([-0.1, 0.0, 1e-9, 0.003, 0.01, 0.02, 0.1, 1.0])
+
+
+@pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
+def test_json_gives_the_law_back(law):
+    """Every digit, also out of the file of ``archord fit --json``."""
+    assert FittedLaw.from_json(law.to_json()) == law
+    assert FittedLaw.from_json(json.dumps({"law": json.loads(law.to_json()), "each": []})) == law
+
+
+@pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
+def test_the_python_module_needs_only_math_and_gives_the_same_force(law, tmp_path):
+    """In an interpreter without site packages, to the last digits, whatever runs are called."""
+    source = law.to_python()
+    imports = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert [alias.name for node in imports for alias in node.names] == ["math"]
+    (tmp_path / "joint.py").write_text(source)
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from joint import force\n"
+    code += f"print([force(d) for d in {DELTA.tolist()}])"
+    printed = subprocess.run(
+        [sys.executable, "-I", "-S", "-c", code], capture_output=True, text=True, check=True
+    ).stdout
+    np.testing.assert_allclose(ast.literal_eval(printed), law.force(DELTA), rtol=1e-14, atol=0)
+
+
+def test_the_law_is_the_plastic_winkler_law_of_its_joint():
+    """`force` is eqs. 9 to 12 with its own numbers, and yields at its onset."""
+    forces = plastic_force(DELTA, PLASTIC.k, PLASTIC.c, 1.05e5, 10.0, 0.05, 230.7)
+    np.testing.assert_array_equal(PLASTIC.force(DELTA), forces)
+    assert PLASTIC.onset < DELTA[4]
+    assert PLASTIC.force(0.02) < FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.0).force(0.02)
+    assert ELASTIC.onset is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "not valid JSON"),
+        ("[1]", "must be a JSON object"),
+        ('{"k": 1}', "must be a JSON object"),
+        (ELASTIC.to_json().replace("0.83", "-0.83"), "k = -0.83 must be a number greater than 0"),
+        (ELASTIC.to_json().replace('"c": null', '"c": 1.0'), "c and sigY belong together"),
+    ],
+)
+def test_what_is_no_law(text, said):
+    with pytest.raises(SceneError, match=said):
+        FittedLaw.from_json(text)
