@@ -60,9 +60,9 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
     depth = np.where(pin, elastic.R - below, below - elastic.R - elastic.dR) / elastic.R
     corner = np.degrees(np.arctan2(centroid[:, 0], -centroid[:, 1])) > 85
     when[(depth > near_contact) | (corner if near_contact < 1 else False)] = np.inf
-    cell = int(np.argmin(when))
-    angle = float(np.degrees(np.arctan2(centroid[cell, 0], -centroid[cell, 1])))
-    return FirstYield(float(when[cell]) / elastic.dR, _BODIES[int(body[cell])], float(depth[cell]), angle)
+    first = int(np.argmin(when))
+    angle = float(np.degrees(np.arctan2(centroid[first, 0], -centroid[first, 1])))
+    return FirstYield(float(when[first]) / elastic.dR, _BODIES[int(body[first])], float(depth[first]), angle)
 
 
 def first_yields(runs: Runs, near_contact: float = 2.0) -> dict[Plane, FirstYield]:

@@ -1,0 +1,91 @@
+"""Persson's joint: a pin in a ring under a force at its core, against Persson (1964), Ciavarella and Decuzzi (2001)."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.benchmarks.persson import DR, UNLIKE, persson_joint, theory, unlike
+from archord.postprocess.law_joint import LawJoint
+from archord.postprocess.persson_law import persson_pressure
+from tests.solver.solving import solve
+
+LIKE = LawJoint(1.0, DR, 1.0)
+
+
+@pytest.mark.parametrize("load", [10.0, 2.0, 0.5, 0.1])
+def test_peak_pressure_and_angle_are_persson_s(load):
+    """p0 within 0.5 % and eps within 0.5 degrees on elements of 4 %R."""
+    solution = solve(persson_joint(load))
+    m, (eps, peak) = solution.steps[-1], theory(load)
+    assert pytest.approx(DR / load, rel=1e-9) == m.P
+    assert m.p0 / m.P == pytest.approx(peak, rel=5e-3)
+    assert np.degrees(m.eps) == pytest.approx(np.degrees(eps), abs=0.5)
+    assert m.force_balance < 1e-8
+
+
+def test_the_pressure_profile_is_persson_s():
+    """Facet means over the whole contact at E* dR/P = 0.5, within 0.5 % of the peak but for the facet at the edge."""
+    solution = solve(persson_joint(0.5, 0.02))
+    m, (eps, _) = solution.steps[-1], theory(0.5)
+    for arc in solution.profiles[-1].values():
+        inside = np.flatnonzero(arc.angle.max(axis=1) < eps)[:-1]
+        exact = persson_pressure(LIKE, np.array(m.P), np.array(eps), arc.angle)
+        mean = (arc.weight * exact).sum(axis=1) / arc.weight.sum(axis=1)
+        ours = arc.facet_force / arc.weight.sum(axis=1)
+        np.testing.assert_allclose(ours[inside], mean[inside], rtol=0, atol=5e-3 * m.p0)
+
+
+def test_the_mesh_error_of_the_peak_falls_with_its_order():
+    """At least the second order against the limit of the same ring; the small contact shows it best."""
+    peaks = [solve(persson_joint(10.0, h)).steps[-1].p0 for h in (0.08, 0.04, 0.01)]
+    assert abs(peaks[1] - peaks[2]) < abs(peaks[0] - peaks[2]) / 4
+
+
+def test_the_ring_is_large_enough():
+    """Held at 100 R instead of infinity, p0 is off by (R/100 R)^2 times a small number; a quarter of it at 200 R."""
+    _, peak = theory(0.5)
+    error = [
+        abs(m.p0 / m.P / peak - 1)
+        for size in (10.0, 30.0)
+        for m in [solve(persson_joint(0.5, joint={"block_size": size})).steps[-1]]
+    ]
+    assert error[0] < 50 / 10.0**2 * 0.02
+    assert error[1] < error[0] / 4
+
+
+@pytest.mark.parametrize("load", [-0.05, -0.2])
+def test_an_interference_fit_opens_as_persson_s(load):
+    """dR < 0: contact beyond 90 degrees; p0 within 0.5 % and eps within 0.5 degrees."""
+    solution = solve(persson_joint(load, steps=4))
+    m, (eps, peak) = solution.steps[-1], theory(load)
+    assert m.p0 / m.P == pytest.approx(peak, rel=5e-3)
+    assert np.degrees(m.eps) == pytest.approx(np.degrees(eps), abs=0.5)
+
+
+@pytest.mark.parametrize("bodies", [UNLIKE, UNLIKE[::-1]])
+def test_unlike_bodies_follow_ciavarella_and_decuzzi(bodies):
+    """Shear moduli 3 and 1 with Dundurs' beta = 0: the stiffer pin has the smaller angle."""
+    (mu1, nu1), (mu2, nu2) = bodies
+    assert mu1 * (1 - 2 * nu2) == pytest.approx(mu2 * (1 - 2 * nu1))
+    sections, alpha = unlike(*bodies)
+    m, (eps, peak) = solve(persson_joint(0.5, **sections)).steps[-1], theory(0.5, alpha)
+    assert m.p0 / m.P == pytest.approx(peak, rel=5e-3)
+    assert np.degrees(m.eps) == pytest.approx(np.degrees(eps), abs=0.5)
+
+
+@pytest.mark.mpi
+def test_a_ring_does_not_depend_on_the_ranks(comm):
+    """Force control, core force and its displacement on several ranks as on one."""
+    one, several = (solve(persson_joint(0.5, 0.08), c).steps[-1] for c in (MPI.COMM_SELF, comm))
+    assert several.iterations == one.iterations
+    for name in ("P", "p0", "eps", "delta", "elastic_energy"):
+        assert getattr(several, name) == pytest.approx(getattr(one, name), rel=1e-9)
+
+
+def test_the_force_does_the_work_that_is_stored():
+    """Work of the force over the mean displacement of its core: the elastic energy, within the step error."""
+    errors = []
+    for steps in (8, 16):
+        m = solve(persson_joint(0.5, 0.08, steps)).steps[-1]
+        errors.append(abs(m.work / m.elastic_energy - 1))
+    assert errors[1] < 0.6 * errors[0] < 0.05
