@@ -15,6 +15,8 @@ from typing import Annotated
 import click
 import typer
 
+from archord.deck_commands import export_deck
+
 app = typer.Typer(
     name="archord",
     no_args_is_help=True,
@@ -131,6 +133,9 @@ def picture(
 
     print(draw(folder, output))
     return 0
+
+
+app.command("export-deck")(export_deck)
 
 
 @app.command("scene")

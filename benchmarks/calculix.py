@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from archord.benchmarks.deck import deck, loaded_nodes
+from archord.benchmarks.deck import deck, loaded_nodes, thickness
 from archord.benchmarks.deck_mesh import Array, PlaneMesh
 from archord.geometry.quarter_joint import Facets
 from archord.solver.scene import Scene, SceneError
@@ -53,18 +53,23 @@ class SecondOpinion:
         return float(self.forces[-1])
 
 
+def require_calculix() -> None:
+    """Raise `SceneError` if there is no ``ccx`` to run."""
+    if shutil.which("ccx") is None:
+        raise SceneError(
+            "CalculiX (ccx) is not installed here: run ARCHORD_TARGET=peers docker/run python3 -m "
+            "archord.benchmarks.peers, or install Debian's calculix-ccx."
+        )
+
+
 def run_calculix(scene: Scene, mesh: PlaneMesh, folder: Path, *, timeout: float = 1800) -> SecondOpinion:
     """Solve ``scene`` on ``mesh`` with CalculiX in ``folder``.
 
     Raises `SceneError` if there is no ``ccx``, RuntimeError if it does not reach the last step within ``timeout``
     seconds.
     """
-    if shutil.which("ccx") is None:
-        raise SceneError(
-            "CalculiX (ccx) is not installed here: run ARCHORD_TARGET=peers docker/run python3 -m "
-            "archord.benchmarks.peers, or install Debian's calculix-ccx."
-        )
-    (folder / "joint.inp").write_text(deck(scene, mesh), encoding="ascii", errors="replace")
+    require_calculix()
+    (folder / "joint.inp").write_text(deck(scene, mesh), encoding="utf-8")
     start = perf_counter()
     try:
         done = subprocess.run(["ccx", "joint"], cwd=folder, capture_output=True, text=True, timeout=timeout)
@@ -72,7 +77,7 @@ def run_calculix(scene: Scene, mesh: PlaneMesh, folder: Path, *, timeout: float 
         raise RuntimeError(f"CalculiX did not finish within {timeout:g} s") from None
     seconds = perf_counter() - start
     printed = read_printed((folder / "joint.dat").read_text()) if (folder / "joint.dat").exists() else []
-    pin, block = (step_forces(printed, name) for name in (loaded_nodes(scene), "BLOCK_TOP"))
+    pin, block = (step_forces(printed, name, thickness(scene)) for name in (loaded_nodes(scene), "BLOCK_TOP"))
     if len(pin) != scene.load.steps:
         errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
         raise RuntimeError(f"CalculiX ended after step {len(pin)} of {scene.load.steps}: {'; '.join(errors)}")
@@ -110,16 +115,16 @@ def read_printed(text: str) -> list[PrintedBlock]:
     return blocks
 
 
-def step_forces(printed: list[PrintedBlock], name: str) -> Array:
+def step_forces(printed: list[PrintedBlock], name: str, thick: float) -> Array:
     """Downward force ``(steps,)`` of the whole joint on the node set ``name`` at the end of each step.
 
-    Steps last one unit of time. CalculiX prints increments too, and sometimes the end of a step twice: the last counts.
+    Per unit thickness, of a model that is ``thick``. Steps last one unit of time. CalculiX prints increments too, and sometimes the end of a step twice: the last counts.
     """
     forces: dict[int, float] = {}
     for block in printed:
         step = round(block.time)
         if block.quantity == "total force" and block.name == name and abs(block.time - step) < 1e-4:
-            forces[step] = -2 * float(block.rows[0, 1])
+            forces[step] = -2 * float(block.rows[0, 1]) / thick
     return np.array([forces[k] for k in sorted(forces)])
 
 

@@ -1,6 +1,6 @@
 """The joint as an input deck for CalculiX, and but for the output requests for Abaqus: for a second opinion.
 
-The deck is the half model of docs/theory.md in unit thickness: plane elements, small strains, bodies PIN and BLOCK,
+The deck is the half model of docs/theory.md, in unit thickness or a thin slice in plane stress: plane elements, small strains, bodies PIN and BLOCK,
 frictionless contact between PIN_ARC and HOLE_ARC on the deformed curves by a stiff linear penalty, one ``*STEP`` per
 output step. Its forces are half the joint's. A rigid pin is meshed and moved as a whole.
 """
@@ -8,14 +8,16 @@ output step. Its forces are half the joint's. A rigid pin is meshed and moved as
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
-from archord.benchmarks.deck_mesh import Ints, PlaneMesh
+from archord.benchmarks.deck_mesh import Elements, Ints, PlaneMesh, deck_mesh
 from archord.geometry.quarter_joint import Cells, Facets
-from archord.solver.scene import Pin, Scene, Solid
+from archord.solver.scene import Pin, Scene, SceneError, Solid
 
 PENETRATION = 1e-4  # in clearances, under a pressure E* dR/R
+SLICE = 0.1  # thickness of a slice in plane stress, in element sizes
 _SHAPES = {3: "3", 6: "6"}
 
 
@@ -26,6 +28,15 @@ def contact_stiffness(scene: Scene) -> float:
     smaller by that much: P is too small by 3e-4 (by 3e-3 at a tenth of the slope).
     """
     return scene.E_star / (PENETRATION * scene.joint.radius)
+
+
+def thickness(scene: Scene) -> float:
+    """Thickness of the deck's model, by which its forces are to be divided.
+
+    One in plane strain. CalculiX makes bricks of plane elements, with faces free to move in plane stress; a thick one
+    resists, by shear, a thickness strain that varies in the plane. Only thin against the elements it is plane stress.
+    """
+    return 1.0 if scene.analysis.plane == "strain" else SLICE * scene.joint.h
 
 
 def loaded_nodes(scene: Scene) -> str:
@@ -39,10 +50,23 @@ def deck(scene: Scene, mesh: PlaneMesh) -> str:
     return "\n".join(lines) + "\n"
 
 
+def write_deck(scene: Scene, path: Path, elements: Elements, *, force: bool = False) -> None:
+    """Mesh ``scene`` and write its deck to ``path``. Raises `SceneError` if that is not possible, or overwrites a file
+    without ``force``."""
+    if path.exists() and not path.is_dir() and not force:
+        raise SceneError(f"{path}: is there already; choose another file with -o, or overwrite it with --force.")
+    if not path.parent.is_dir():
+        raise SceneError(f"{path}: cannot be written: {path.parent} is not a folder.")
+    try:
+        path.write_text(deck(scene, deck_mesh(scene, elements)), encoding="utf-8")
+    except OSError as error:
+        raise SceneError(f"{path}: cannot be written: {error.strerror}.") from None
+
+
 def _mesh_lines(scene: Scene, mesh: PlaneMesh) -> Iterator[str]:
     units = scene.units
     yield "*HEADING"
-    yield f"archord: half a pin joint; {units.length}, {units.stress}; forces, per unit thickness, are half the joint's"
+    yield f"archord: half a pin joint; {units.length}, {units.stress}; thickness {_number(thickness(scene))}"
     yield "*NODE, NSET=ALL_NODES"
     yield from (f"{i}, {_number(x)}, {_number(y)}" for i, (x, y) in enumerate(mesh.x, 1))
     name = ("CPE" if scene.analysis.plane == "strain" else "CPS") + _SHAPES[mesh.elements.shape[1]]
@@ -61,7 +85,7 @@ def _mesh_lines(scene: Scene, mesh: PlaneMesh) -> Iterator[str]:
 def _model_lines(scene: Scene) -> Iterator[str]:
     for body, solid in ((Cells.PIN, scene.block if scene.pin.rigid else scene.pin), (Cells.BLOCK, scene.block)):
         yield from _material(body.name, solid)
-        yield from (f"*SOLID SECTION, ELSET={body.name}, MATERIAL={body.name}", "1.")
+        yield from (f"*SOLID SECTION, ELSET={body.name}, MATERIAL={body.name}", _number(thickness(scene)))
     yield from ("*SURFACE INTERACTION, NAME=CONTACT", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR")
     yield _number(contact_stiffness(scene))
     yield "*CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE"

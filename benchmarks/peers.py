@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
 
-from archord.benchmarks.calculix import SecondOpinion, run_calculix
+from archord.benchmarks.calculix import SecondOpinion, require_calculix, run_calculix
 from archord.benchmarks.deck_mesh import Elements, deck_mesh
 from archord.benchmarks.paper_joint import paper_joint
 from archord.solver.measures import Measures
@@ -66,6 +66,7 @@ def row(name: str, scene: Scene, elements: Elements, m: Measures, seconds: float
 def main() -> int:
     """Solve the cases with both and print the table; returns the exit code."""
     try:
+        require_calculix()
         print("| " + " | ".join(_HEADINGS) + " |\n|" + "---|" * len(_HEADINGS), flush=True)
         for name, scene in cases():
             m, seconds = ours(scene)
