@@ -62,14 +62,17 @@ def require_calculix() -> None:
         )
 
 
-def run_calculix(scene: Scene, mesh: PlaneMesh, folder: Path, *, timeout: float = 1800) -> SecondOpinion:
-    """Solve ``scene`` on ``mesh`` with CalculiX in ``folder``.
+def run_calculix(
+    scene: Scene, mesh: PlaneMesh, folder: Path, *, thick: float | None = None, timeout: float = 1800
+) -> SecondOpinion:
+    """Solve ``scene`` on ``mesh`` with CalculiX in ``folder``, in a model of the deck's thickness, or ``thick``.
 
     Raises `SceneError` if there is no ``ccx``, RuntimeError if it does not reach the last step within ``timeout``
     seconds.
     """
     require_calculix()
-    (folder / "joint.inp").write_text(deck(scene, mesh), encoding="utf-8")
+    thick = thickness(scene) if thick is None else thick
+    (folder / "joint.inp").write_text(deck(scene, mesh, thick), encoding="utf-8")
     start = perf_counter()
     try:
         done = subprocess.run(["ccx", "joint"], cwd=folder, capture_output=True, text=True, timeout=timeout)
@@ -77,7 +80,7 @@ def run_calculix(scene: Scene, mesh: PlaneMesh, folder: Path, *, timeout: float 
         raise RuntimeError(f"CalculiX did not finish within {timeout:g} s") from None
     seconds = perf_counter() - start
     printed = read_printed((folder / "joint.dat").read_text()) if (folder / "joint.dat").exists() else []
-    pin, block = (step_forces(printed, name, thickness(scene)) for name in (loaded_nodes(scene), "BLOCK_TOP"))
+    pin, block = (step_forces(printed, name, thick) for name in (loaded_nodes(scene), "BLOCK_TOP"))
     if len(pin) != scene.load.steps:
         errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
         raise RuntimeError(f"CalculiX ended after step {len(pin)} of {scene.load.steps}: {'; '.join(errors)}")
@@ -118,7 +121,8 @@ def read_printed(text: str) -> list[PrintedBlock]:
 def step_forces(printed: list[PrintedBlock], name: str, thick: float) -> Array:
     """Downward force ``(steps,)`` of the whole joint on the node set ``name`` at the end of each step.
 
-    Per unit thickness, of a model that is ``thick``. Steps last one unit of time. CalculiX prints increments too, and sometimes the end of a step twice: the last counts.
+    Per unit thickness, of a model that is ``thick``. Steps last one unit of time. CalculiX prints increments too, and
+    sometimes the end of a step twice: the last counts.
     """
     forces: dict[int, float] = {}
     for block in printed:

@@ -1,8 +1,9 @@
 """The joint as an input deck for CalculiX, and but for the output requests for Abaqus: for a second opinion.
 
-The deck is the half model of docs/theory.md, in unit thickness or a thin slice in plane stress: plane elements, small strains, bodies PIN and BLOCK,
-frictionless contact between PIN_ARC and HOLE_ARC on the deformed curves by a stiff linear penalty, one ``*STEP`` per
-output step. Its forces are half the joint's. A rigid pin is meshed and moved as a whole.
+The deck is the half model of docs/theory.md, in unit thickness or, in plane stress, a thin slice: plane elements, small
+strains, bodies PIN and BLOCK, frictionless contact between PIN_ARC and HOLE_ARC on the deformed curves by a stiff
+linear penalty, one ``*STEP`` per output step. Its forces are half the joint's. A rigid pin is meshed and moved as a
+whole.
 """
 
 from __future__ import annotations
@@ -44,9 +45,11 @@ def loaded_nodes(scene: Scene) -> str:
     return "PIN_NODES" if scene.pin.rigid else "PIN_TOP"
 
 
-def deck(scene: Scene, mesh: PlaneMesh) -> str:
-    """The input deck of ``scene`` on ``mesh``, which holds both bodies even if the pin is rigid."""
-    lines = [*_mesh_lines(scene, mesh), *_model_lines(scene), *_step_lines(scene)]
+def deck(scene: Scene, mesh: PlaneMesh, thick: float | None = None) -> str:
+    """The input deck of ``scene`` on ``mesh``, which holds both bodies even if the pin is rigid; ``thick`` replaces
+    `thickness`."""
+    thick = thickness(scene) if thick is None else thick
+    lines = [*_mesh_lines(scene, mesh, thick), *_model_lines(scene, thick), *_step_lines(scene)]
     return "\n".join(lines) + "\n"
 
 
@@ -63,10 +66,10 @@ def write_deck(scene: Scene, path: Path, elements: Elements, *, force: bool = Fa
         raise SceneError(f"{path}: cannot be written: {error.strerror}.") from None
 
 
-def _mesh_lines(scene: Scene, mesh: PlaneMesh) -> Iterator[str]:
+def _mesh_lines(scene: Scene, mesh: PlaneMesh, thick: float) -> Iterator[str]:
     units = scene.units
     yield "*HEADING"
-    yield f"archord: half a pin joint; {units.length}, {units.stress}; thickness {_number(thickness(scene))}"
+    yield f"archord: half a pin joint; {units.length}, {units.stress}; thickness {_number(thick)}"
     yield "*NODE, NSET=ALL_NODES"
     yield from (f"{i}, {_number(x)}, {_number(y)}" for i, (x, y) in enumerate(mesh.x, 1))
     name = ("CPE" if scene.analysis.plane == "strain" else "CPS") + _SHAPES[mesh.elements.shape[1]]
@@ -82,10 +85,10 @@ def _mesh_lines(scene: Scene, mesh: PlaneMesh) -> Iterator[str]:
         yield from (f"{e + 1}, S{edge + 1}" for e, edge in mesh.edges[tag])
 
 
-def _model_lines(scene: Scene) -> Iterator[str]:
+def _model_lines(scene: Scene, thick: float) -> Iterator[str]:
     for body, solid in ((Cells.PIN, scene.block if scene.pin.rigid else scene.pin), (Cells.BLOCK, scene.block)):
         yield from _material(body.name, solid)
-        yield from (f"*SOLID SECTION, ELSET={body.name}, MATERIAL={body.name}", _number(thickness(scene)))
+        yield from (f"*SOLID SECTION, ELSET={body.name}, MATERIAL={body.name}", _number(thick))
     yield from ("*SURFACE INTERACTION, NAME=CONTACT", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR")
     yield _number(contact_stiffness(scene))
     yield "*CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE"
