@@ -18,6 +18,7 @@ import typer
 from archord import law_commands
 from archord.fit_commands import fit
 from archord.reproduce_commands import reproduce
+from archord.deck_commands import export_deck
 
 app = typer.Typer(
     name="archord",
@@ -139,6 +140,7 @@ def picture(
 
 app.command()(fit)
 app.command()(reproduce)
+app.command("export-deck")(export_deck)
 
 
 @app.command("scene")

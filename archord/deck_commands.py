@@ -1,0 +1,43 @@
+"""The command ``archord export-deck``: the joint as an input deck for another solver."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class Elements(StrEnum):
+    """Elements of a deck: archord's own second-order triangles, or each of them cut into four."""
+
+    QUADRATIC = "quadratic"
+    LINEAR = "linear"
+
+
+def export_deck(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="deck to write [<scene name>.inp]")] = None,
+    elements: Annotated[
+        Elements, typer.Option(help="six-node triangles, archord's own mesh, or each cut into four of three nodes")
+    ] = Elements.QUADRATIC,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="override a key of the scene; may be repeated"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite the deck if it is there")] = False,
+) -> int:
+    """Write a scene as an input deck for CalculiX or Abaqus."""
+    from archord.cli import launcher_rank
+    from archord.solver.scene_file import load_scene
+
+    checked = load_scene(scene, overrides or [])
+    if launcher_rank() != 0:
+        return 0
+    from archord.benchmarks.deck import write_deck
+
+    path = output or Path(f"{scene.stem}.inp")
+    write_deck(checked, path, elements.value, force=force)
+    print(path)
+    return 0

@@ -1,0 +1,141 @@
+"""What CalculiX prints, read; and, where it is installed, CalculiX beside archord."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from archord.benchmarks.calculix import (
+    axis_pressure,
+    plastic_strain,
+    read_contact_pressure,
+    read_printed,
+    run_calculix,
+    step_forces,
+)
+from archord.benchmarks.deck import contact_stiffness
+from archord.benchmarks.deck_mesh import deck_mesh
+from archord.benchmarks.paper_joint import paper_joint
+from archord.geometry.joint_mesh import Facets
+from archord.solver.run import solve_scene
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="CalculiX runs beside one rank")
+
+# Written by CalculiX 2.20 for the scene below, quadratic elements; the .frd from its displacements on.
+REFERENCE = Path(__file__).parents[1] / "reference"
+JOINT = {"element_size": 0.4, "block_size": 4.0, "growth": 1.0}
+
+
+@pytest.fixture(scope="module")
+def printed():
+    return read_printed((REFERENCE / "calculix.dat").read_text())
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return deck_mesh(paper_joint(0.4, 2, 0.002, joint=JOINT), "quadratic")
+
+
+def test_tables_have_their_names_times_and_rows(printed, mesh):
+    """Two reactions a step, then PEEQ at nine points of every element."""
+    names = [(b.quantity, b.name, b.time) for b in printed]
+    reactions = [("total force", name, t) for t in (1.0, 2.0) for name in ("PIN_TOP", "BLOCK_TOP")]
+    assert names == [*reactions, *(("equivalent plastic strain", name, 2.0) for name in ("PIN", "BLOCK"))]
+    assert {b.rows.shape for b in printed[:4]} == {(1, 3)}
+    assert sum(len(b.rows) for b in printed[4:]) == 9 * len(mesh.elements)
+
+
+def test_forces_are_the_whole_joints_and_balance(printed):
+    """Twice the printed reaction, downward positive; pin and block opposite; growing with the steps."""
+    pin, block = step_forces(printed, "PIN_TOP", 1.0), step_forces(printed, "BLOCK_TOP", 1.0)
+    line = next(line for line in (REFERENCE / "calculix.dat").read_text().splitlines() if "E-03" in line)
+    assert pin[0] == -2 * float(line.split()[1])
+    np.testing.assert_allclose(pin, -block, rtol=1e-6)
+    np.testing.assert_allclose(step_forces(printed, "PIN_TOP", 0.1), 10 * pin)
+    assert 0 < pin[0] < pin[1]
+
+
+def test_of_increments_the_end_of_the_step_counts():
+    """Cut steps print in between, and CalculiX may print the end twice; three-digit exponents have no E."""
+    text = "".join(
+        f"\n total force (fx,fy,fz) for set TOP and time  {time}\n\n   1.0-101 {force} -2.5E-20\n"
+        for time, force in (("0.2500000E+00", -9.0), ("0.9999990E+00", -1.0), ("0.1000000E+01", -2.0), ("2.0", -3.0))
+    )
+    assert step_forces(read_printed(text), "TOP", 1.0).tolist() == [4.0, 6.0]
+    assert step_forces(read_printed(text), "BOTTOM", 1.0).size == 0
+    assert read_printed(text)[0].rows[0, 0] == 1e-101
+
+
+def test_uniform_plastic_strain_integrates_to_the_area(printed, mesh):
+    """PEEQ 1 everywhere gives twice the area of the half model; an elastic run has none; the largest is one of them."""
+    ones = [type(b)(b.quantity, b.name, b.time, np.c_[b.rows[:, :2], np.ones(len(b.rows))]) for b in printed[4:]]
+    assert plastic_strain(ones, mesh) == pytest.approx((1.0, 2 * mesh.areas().sum()))
+    assert plastic_strain(printed[:4], mesh) == (0.0, 0.0)
+    largest, integral = plastic_strain(printed, mesh)
+    assert largest == max(b.rows[:, 2].max() for b in printed[4:])
+    assert 0 < integral < largest * 2 * mesh.areas().sum()
+
+
+def test_contact_pressure_is_the_penetration_times_the_slope(mesh):
+    """On the pin's arc, where CalculiX writes the gap three columns before; zero elsewhere."""
+    text = (REFERENCE / "calculix.frd").read_text()
+    pressure = read_contact_pressure(text, len(mesh.x))
+    arc = np.unique(mesh.edge_nodes(Facets.PIN_ARC))
+    pressed = np.flatnonzero(pressure)
+    assert 3 <= len(pressed) <= len(arc)
+    assert set(pressed) <= set(arc)
+    contact = text[text.index("CONTACT") :].splitlines()
+    gap = {int(line[3:13]) - 1: float(line[13:25]) for line in contact if line.startswith(" -1")}
+    slope = contact_stiffness(paper_joint(0.4, 2, 0.002, joint=JOINT))
+    np.testing.assert_allclose(pressure[pressed], [-slope * gap[n] for n in pressed], rtol=1e-5)
+
+
+def test_the_axis_pressure_of_an_even_parabola_is_its_top(mesh):
+    """Exactly, whatever its curvature; without pressure there is none."""
+    scene = paper_joint(0.04, 1)
+    fine = deck_mesh(scene, "quadratic")
+    angle = np.arctan2(fine.x[:, 0], -fine.x[:, 1] - scene.joint.dR)
+    assert axis_pressure(scene, fine, 3.0 - 0.5 * angle**2) == pytest.approx(3.0)
+    assert np.isnan(axis_pressure(scene, fine, np.zeros(len(fine.x))))
+
+
+def test_without_calculix_the_sentence_says_how_to_get_it(tmp_path):
+    """Exit code 2, one line."""
+    environment = os.environ | {"PATH": str(tmp_path)}
+    command = [sys.executable, "-m", "archord.benchmarks.peers"]
+    result = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert result.returncode == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert "ARCHORD_TARGET=peers docker/run" in result.stderr
+    assert result.stdout == ""
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed (image target peers)")
+@pytest.mark.parametrize(
+    ("elements", "yield_stress", "pin", "plane", "tolerance"),
+    [
+        ("quadratic", None, {}, "stress", 2e-3),
+        ("quadratic", 0.002, {}, "strain", 2e-3),
+        ("linear", 0.002, {}, "strain", 3e-2),
+        ("quadratic", None, {"rigid": True}, "strain", 2e-3),
+    ],
+)
+def test_calculix_agrees(tmp_path, elements, yield_stress, pin, plane, tolerance):
+    """The force of the joint, on the same coarse mesh."""
+    sections = {"joint": {"block_size": 10.0}, "analysis": {"plane": plane}} | ({"pin": pin} if pin else {})
+    scene = paper_joint(0.08, 4, yield_stress, **sections)
+    opinion = run_calculix(scene, deck_mesh(scene, elements), tmp_path)
+    (tmp_path / "run").mkdir()
+    last = solve_scene(scene, tmp_path / "run").steps[-1]
+    assert opinion.force_balance < 1e-3
+    assert pytest.approx(last.P, rel=tolerance) == opinion.P
+    if elements == "quadratic":
+        assert opinion.p0 == pytest.approx(last.p0, rel=0.02)
+    if yield_stress:
+        assert opinion.peeq_integral == pytest.approx(last.peeq_integral, rel=10 * tolerance)

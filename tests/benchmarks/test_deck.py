@@ -1,0 +1,246 @@
+"""The input deck, read back by a small parser of keyword blocks: what another solver is told of the joint."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from archord.benchmarks.deck import contact_stiffness, deck
+from archord.benchmarks.deck_mesh import deck_mesh
+from archord.benchmarks.paper_joint import paper_joint
+from archord.geometry.joint_mesh import Cells, Facets
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="decks are written by one rank")
+
+W, DR, STEPS = 4.0, 0.005, 3
+COARSE = {"element_size": 0.2, "block_size": W, "growth": 0.5}
+KINDS = ["quadratic", "linear"]
+
+
+def scene(yield_stress=0.002, **sections):
+    return paper_joint(0.2, STEPS, yield_stress, **({"joint": COARSE} | sections))
+
+
+def blocks(text):
+    """Keyword lines with their data: ``(keyword, parameters, rows)``."""
+    found = []
+    for line in text.splitlines():
+        words = [word.strip() for word in line.split(",")]
+        if line.startswith("*"):
+            parameters = dict(word.split("=") for word in words[1:] if "=" in word)
+            found.append((words[0], parameters, []))
+        else:
+            found[-1][2].append(words)
+    return found
+
+
+def read(text):
+    """Nodes ``{label: (x, y)}``, elements ``{label: nodes}`` and bodies, node sets, and surfaces of the deck."""
+    nodes, elements, bodies, sets, surfaces = {}, {}, {}, {}, {}
+    for keyword, parameters, rows in blocks(text):
+        if keyword == "*NODE":
+            nodes |= {int(label): (float(x), float(y)) for label, x, y in rows}
+        elif keyword == "*ELEMENT":
+            elements |= {int(row[0]): [int(n) for n in row[1:]] for row in rows}
+            bodies |= {int(row[0]): parameters["ELSET"] for row in rows}
+        elif keyword == "*NSET":
+            sets[parameters["NSET"]] = {int(n) for row in rows for n in row}
+        elif keyword == "*SURFACE":
+            surfaces[parameters["NAME"]] = [(int(e), int(side[1:])) for e, side in rows]
+    return nodes, elements, bodies, sets, surfaces
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def written(request):
+    return request.param, deck(scene(), deck_mesh(scene(), request.param))
+
+
+def test_counts(written):
+    """Two separate discs by Euler's formula: vertices - edges + faces = 1 each, and every node in some element."""
+    kind, text = written
+    nodes, elements, bodies, _, _ = read(text)
+    assert {n for e in elements.values() for n in e} == set(nodes)
+    assert {len(e) for e in elements.values()} == {6 if kind == "quadratic" else 3}
+    corners = {n for e in elements.values() for n in e[:3]}
+    edges = {frozenset((e[i], e[(i + 1) % 3])) for e in elements.values() for i in range(3)}
+    assert len(corners) - len(edges) + len(elements) == 2
+    assert len(nodes) == len(corners) + (len(edges) if kind == "quadratic" else 0)
+    assert set(bodies.values()) == {"PIN", "BLOCK"}
+
+
+def test_linear_elements_are_quarters_of_the_quadratic_ones():
+    """The same nodes, four times the elements, and the same area up to the arcs' segments."""
+    quadratic, linear = (deck_mesh(scene(), kind) for kind in KINDS)
+    np.testing.assert_array_equal(quadratic.x, linear.x)
+    assert len(linear.elements) == 4 * len(quadratic.elements)
+    for body in Cells:
+        a, b = (m.areas()[m.bodies == body].sum() for m in (quadratic, linear))
+        assert a == pytest.approx(b, rel=5e-3)
+
+
+def test_elements_turn_counterclockwise_and_fill_the_bodies(written):
+    """Positive corners' area each; with parabolic edges the bodies' exact areas to O(h^4)."""
+    kind, text = written
+    nodes, elements, _, _, _ = read(text)
+    for element in elements.values():
+        (x0, y0), (x1, y1), (x2, y2) = (nodes[n] for n in element[:3])
+        assert (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0) > 0
+    mesh = deck_mesh(scene(), kind)
+    exact = {Cells.PIN: math.pi / 4, Cells.BLOCK: W**2 - math.pi / 4 * (1 + DR) ** 2}
+    tolerance = 1e-4 if kind == "quadratic" else 5e-3
+    for body, area in exact.items():
+        assert mesh.areas()[mesh.bodies == body].sum() == pytest.approx(area, rel=tolerance)
+
+
+def test_midpoints_belong_to_their_edges():
+    """Node 4 between 1 and 2, 5 between 2 and 3, 6 between 3 and 1: nearer to the middle than the arc's height."""
+    nodes, elements, _, _, _ = read(deck(scene(), deck_mesh(scene(), "quadratic")))
+    for element in elements.values():
+        x = np.array([nodes[n] for n in element])
+        edge = np.linalg.norm(np.roll(x[:3], -1, axis=0) - x[:3], axis=1)
+        apart = np.linalg.norm((x[:3] + np.roll(x[:3], -1, axis=0)) / 2 - x[3:], axis=1)
+        assert np.all(apart < 0.05 * edge)
+
+
+def test_arc_nodes_lie_on_their_circles(written):
+    """All of them, to the digits that the format holds: the clearance is a small difference of large numbers."""
+    nodes, _, _, sets, _ = read(written[1])
+    for name, radius, centre in (("PIN_ARC", 1.0, -DR), ("HOLE_ARC", 1 + DR, 0.0)):
+        x = np.array([nodes[n] for n in sets[name]]) - [0, centre]
+        np.testing.assert_allclose(np.linalg.norm(x, axis=1), radius, rtol=0, atol=2e-14)
+
+
+def test_surfaces_cover_the_arcs(written):
+    """Sides chain from the axis to the top without gap, over exactly the arc's nodes, on elements of their body."""
+    kind, text = written
+    nodes, elements, bodies, sets, surfaces = read(text)
+    for name, body, radius in (("PIN_ARC", "PIN", 1.0), ("HOLE_ARC", "BLOCK", 1 + DR)):
+        sides, listed = [], set()
+        for label, side in surfaces[f"{name}_SURFACE"]:
+            assert bodies[label] == body
+            element = elements[label]
+            ends = element[side - 1], element[side % 3]
+            sides.append(ends)
+            listed |= {*ends, *([element[side + 2]] if kind == "quadratic" else [])}
+        assert listed == sets[name]
+        chords = sum(math.dist(nodes[a], nodes[b]) for a, b in sides)
+        assert chords == pytest.approx(2 * len(sides) * radius * math.sin(math.pi / 4 / len(sides)), rel=1e-7)
+        ends = [n for side in sides for n in side]
+        assert sorted(nodes[n][0] for n in set(ends) if ends.count(n) == 1) == pytest.approx([0, radius], abs=1e-14)
+
+
+def test_sets_lie_where_their_names_say(written):
+    """Supports and loaded edge, on both bodies where both are cut."""
+    nodes, _, _, sets, _ = read(written[1])
+    assert [nodes[n][1] for n in sets["PIN_TOP"]] == pytest.approx([-DR] * len(sets["PIN_TOP"]), abs=1e-14)
+    assert [nodes[n][1] for n in sets["BLOCK_TOP"]] == pytest.approx([0.0] * len(sets["BLOCK_TOP"]), abs=1e-14)
+    assert sets["SYMMETRY"] & sets["PIN_NODES"]
+    assert sets["SYMMETRY"] - sets["PIN_NODES"]
+    x = np.array(list(nodes.values()))
+    on_axis = {n for n in nodes if abs(nodes[n][0]) < 1e-12}
+    assert sets["SYMMETRY"] == on_axis
+    assert x[:, 0].max() == pytest.approx(W)
+
+
+def test_steps_push_the_pin_down_in_equal_parts(written):
+    """One step each, the last at delta; reactions of pin and block in all of them."""
+    found = blocks(written[1])
+    first = next(i for i, block in enumerate(found) if block[0] == "*STEP")
+    assert found[first - 1][2] == [["SYMMETRY", "1", "1"], ["BLOCK_TOP", "1", "2"]]
+    loads = [rows for keyword, _, rows in found[first:] if keyword == "*BOUNDARY"]
+    assert [row[0][:3] for row in loads] == [["PIN_TOP", "2", "2"]] * STEPS
+    assert [float(row[0][3]) for row in loads] == pytest.approx([-2 * DR * k / STEPS for k in (1, 2, 3)])
+    printed = [parameters["NSET"] for keyword, parameters, _ in found if keyword == "*NODE PRINT"]
+    assert printed == ["PIN_TOP", "BLOCK_TOP"] * STEPS
+
+
+@pytest.mark.parametrize(("plane", "family"), [("strain", "CPE"), ("stress", "CPS")])
+def test_materials_and_elements_of_the_plane(plane, family):
+    """Each body its own constants; a hardening curve with the slope H; an elastic body has no *PLASTIC."""
+    data = scene(None, block={"yield_stress": 0.003, "hardening": 0.1}, analysis={"plane": plane})
+    found = blocks(deck(data, deck_mesh(data, "linear")))
+    assert {p["TYPE"] for keyword, p, _ in found if keyword == "*ELEMENT"} == {family + "3"}
+    sections = [float(rows[0][0]) for keyword, _, rows in found if keyword == "*SOLID SECTION"]
+    assert sections == [1.0 if plane == "strain" else pytest.approx(0.1 * data.joint.h)] * 2
+    plastic = [rows for keyword, _, rows in found if keyword == "*PLASTIC"]
+    assert len(plastic) == 1
+    (s0, a0), (s1, a1) = ((float(v) for v in row) for row in plastic[0])
+    assert (s0, a0) == (0.003, 0)
+    assert (s1 - s0) / (a1 - a0) == pytest.approx(0.1)
+    elastic = [[float(v) for v in rows[0]] for keyword, _, rows in found if keyword == "*ELASTIC"]
+    assert elastic == [[data.pin.E, 0.3], [data.block.E, 0.3]]
+
+
+def test_a_rigid_pin_moves_as_a_whole():
+    """All its nodes held sideways and pushed down."""
+    data = scene(None, pin={"rigid": True})
+    text = deck(data, deck_mesh(data, "linear"))
+    boundary = [row for keyword, _, rows in blocks(text) if keyword == "*BOUNDARY" for row in rows]
+    assert ["PIN_NODES", "1", "1"] in boundary
+    assert boundary[-1][:3] == ["PIN_NODES", "2", "2"]
+    _, elements, bodies, sets, _ = read(text)
+    assert sets["PIN_NODES"] == {n for e, nodes in elements.items() if bodies[e] == "PIN" for n in nodes}
+
+
+@pytest.mark.parametrize("unit", [1000.0, 1e-3])
+def test_the_deck_does_not_depend_on_the_unit_of_length(unit):
+    """Nodes scale to the digits of the format, and the penetration with them."""
+    scaled = scene(joint={k: unit * v for k, v in COARSE.items() if k != "growth"} | {
+        "radius": unit, "clearance": unit * DR, "growth": 0.5,
+    })  # fmt: skip
+    a, b = (read(deck(s, deck_mesh(s, "quadratic")))[0] for s in (scene(), scaled))
+    np.testing.assert_allclose(np.array(list(b.values())) / unit, list(a.values()), rtol=0, atol=1e-12)
+    assert contact_stiffness(scaled) * unit == pytest.approx(contact_stiffness(scene()))
+
+
+def test_lines_fit_into_what_calculix_reads(written):
+    """No number longer than 20 characters, no line of more than 16 entries."""
+    for line in written[1].splitlines()[2:]:
+        words = line.split(",")
+        assert len(words) <= 16
+        if not line.startswith("*"):
+            assert all(len(word.strip()) <= 20 for word in words)
+
+
+def test_the_command_writes_a_deck_and_bad_input_is_one_sentence(tmp_path):
+    """Named after the scene, refused where one is, exit code 2 for what cannot be."""
+    (tmp_path / "joint.toml").write_text(
+        "[joint]\nradius = 10.0\nclearance = 0.05\nrelative_element_size = 0.3\n[pin]\nrigid = true\n"
+        "[block]\nE = 1000.0\nnu = 0.3\n[load]\ndisplacement = 2.0\n"
+    )
+
+    def export(*arguments):
+        command = [sys.executable, "-m", "archord", "export-deck", *arguments]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+
+    first = export("joint.toml", "--elements", "linear", "--set", "load.steps=2")
+    assert (first.returncode, first.stdout, first.stderr) == (0, "joint.inp\n", "")
+    text = (tmp_path / "joint.inp").read_text()
+    assert text.count("*STEP") == 2
+    assert "TYPE=CPE3" in text
+    faults = [
+        (["joint.toml"], "joint.inp: is there already; choose another file with -o, or overwrite it with --force."),
+        (["joint.toml", "-o", "no/x.inp"], "no/x.inp: cannot be written: no is not a folder."),
+        (["joint.toml", "--set", "block.nu=2", "-o", "x.inp"], "--set block.nu=2: block.nu must be"),
+        (["none.toml"], "none.toml: cannot be read"),
+    ]
+    for arguments, said in faults:
+        result = export(*arguments)
+        assert result.returncode == 2
+        assert said in result.stderr
+        assert len(result.stderr.splitlines()) == 1
+    assert export("joint.toml", "--elements", "cubic").returncode == 2
+    assert sorted(os.listdir(tmp_path)) == ["joint.inp", "joint.toml"]
+    assert (tmp_path / "joint.inp").read_text() == text
+
+
+def test_facets_of_the_deck_are_those_of_the_solver():
+    """Every condition of docs/theory.md has its edges."""
+    mesh = deck_mesh(scene(), "quadratic")
+    assert set(mesh.edges) == set(Facets)
+    assert all(len(edges) for edges in mesh.edges.values())
