@@ -16,9 +16,9 @@ import click
 import typer
 
 from archord import law_commands
+from archord.deck_commands import export_deck
 from archord.fit_commands import fit
 from archord.reproduce_commands import reproduce
-from archord.deck_commands import export_deck
 
 app = typer.Typer(
     name="archord",

@@ -30,9 +30,12 @@ def export_deck(
 ) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
     from archord.cli import launcher_rank
+    from archord.solver.scene import SceneError
     from archord.solver.scene_file import load_scene
 
     checked = load_scene(scene, overrides or [])
+    if checked.joint.model != "block":
+        raise SceneError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
     if launcher_rank() != 0:
         return 0
     from archord.benchmarks.deck import write_deck

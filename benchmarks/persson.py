@@ -58,10 +58,12 @@ def theory(load: float, alpha: float = 0.0) -> tuple[float, float]:
     return float(eps), float(peak)
 
 
-def _row(name: str, load: float, element_size: float, steps: int = 1, alpha: float = 0.0, **sections: dict) -> str:
+def _row(
+    name: str, load: float, element_size: float, steps: int = 1, alpha: float = 0.0, bodies: dict[str, dict] | None = None
+) -> str:
     start = perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        m = solve_scene(persson_joint(load, element_size, steps, **sections), Path(folder)).steps[-1]
+        m = solve_scene(persson_joint(load, element_size, steps, **(bodies or {})), Path(folder)).steps[-1]
     eps, peak = theory(load, alpha)
     angle = f"{np.degrees(m.eps):.3f} | {np.degrees(eps):.3f} | {np.degrees(m.eps - eps):+.3f}"
     pressure = f"{m.p0 / m.P:.6f} | {peak:.6f} | {m.p0 / m.P / peak - 1:+.1e}"
@@ -79,7 +81,7 @@ def main() -> None:
         print(_row("interference", load, 0.04, 4), flush=True)
     for pin, block in (UNLIKE, UNLIKE[::-1]):
         bodies, alpha = unlike(pin, block)
-        print(_row(f"unlike, alpha = {alpha:+.3f}", 0.5, 0.04, alpha=alpha, **bodies), flush=True)
+        print(_row(f"unlike, alpha = {alpha:+.3f}", 0.5, 0.04, alpha=alpha, bodies=bodies), flush=True)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.postprocess.calibration import Calibration, CurveFit, Fits, dimensionless_law
+from archord.postprocess.calibration import Calibration, Fits
+from archord.postprocess.curve_fit import CurveFit, dimensionless_law
 from archord.solver.scene import SceneError
 
 

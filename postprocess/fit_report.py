@@ -9,7 +9,8 @@ from typing import Any
 
 from rich.table import Table
 
-from archord.postprocess.calibration import Calibration, CurveFit, Fits
+from archord.postprocess.calibration import Calibration, Fits
+from archord.postprocess.curve_fit import CurveFit
 from archord.postprocess.least_squares import Estimate
 
 _BENT = 0.5  # serial correlation that noise in ten steps or more hardly ever reaches
@@ -77,9 +78,9 @@ def notes(calibration: Calibration) -> list[str]:
             said.append("c: too few steps past yield in the range; elastic law.")
         elif joint.plateau and joint.plateau.flatness:
             low, high = joint.plateau.flatness
-            values = [v for part in joint.plateau.residuals for v in part.data]
+            levels = [v for part in joint.plateau.residuals for v in part.data]
             said.append(
-                f"plateau: p/sigY from {min(values):.3f} to {max(values):.3f} over its steps; "
+                f"plateau: p/sigY from {min(levels):.3f} to {max(levels):.3f} over its steps; "
                 f"median over peak {low:.2f} to {high:.2f} (flat: 1, parabola: 0.75)."
             )
     return said
@@ -139,7 +140,7 @@ def _add_rows(table: Table, fits: Fits, name: str) -> None:
             quality = ["", "", "", ""]
             if i == 0:
                 steps = sum(len(part.load) for part in fit.residuals)
-                r2 = "" if fit.quantity == "plateau" else f"{fit.r2:.5f}"
+                r2 = "" if fit.k is None else f"{fit.r2:.5f}"
                 quality = [r2, f"{100 * fit.rms:.2f} %", f"{100 * fit.largest:+.2f} %", str(steps)]
             table.add_row(name, fit.quantity, parameter, *_numbers(estimate), *quality)
             name = ""

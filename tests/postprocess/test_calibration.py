@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import linregress
 
 from archord.postprocess.arc_pressure import ArcPressure
-from archord.postprocess.calibration import calibrate, fit_curve
+from archord.postprocess.calibration import calibrate
+from archord.postprocess.curve_fit import fit_curve
 from archord.postprocess.plateau import median_pressure
 from archord.postprocess.refinement import group
 from archord.postprocess.run_curve import read_run
@@ -113,9 +114,10 @@ def test_before_yield_there_is_no_plateau_to_fit():
     assert found.law().onset is None
 
 
-def test_beyond_yield_p0_tells_nothing_of_k():
-    """All steps on the plateau: c from p0, but no k, while P gives both."""
-    found = calibrate([curve(0.83, 1.2, sigY=0.001)], (0.5, 2.0)).joint
+@pytest.mark.parametrize("first", [0.5, 0.2])
+def test_beyond_yield_p0_tells_nothing_of_k(first):
+    """All steps but one at most on the plateau: c from p0, but no k, while P gives both."""
+    found = calibrate([curve(0.83, 1.2, sigY=0.001)], (first, 2.0)).joint
     assert found.p0.k is None
     assert found.p0.c.value == pytest.approx(1.2, rel=1e-8)
     assert found.P.k.value == pytest.approx(0.83, rel=1e-6)

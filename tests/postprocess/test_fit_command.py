@@ -49,7 +49,7 @@ def test_two_meshes_give_a_mesh_error(runs, capsys):
         (["{elastic}", "--range", "3", "4"], "{elastic}: has no step with contact from 3 to 4 clearances;"),
         (["{elastic}", "{plastic}"], "{plastic}: analysis.plane = 'stress' does not fit"),
         (["{elastic}", "{elastic}"], "{elastic}: is the same scene on the same mesh as {elastic}; give one of them."),
-        (["{elastic}", "--json", "{empty}/no/x.json"], "{empty}/no/x.json: cannot be written: {empty}/no is not a folder."),
+        (["{elastic}", "--json", "{empty}/no/x"], "{empty}/no/x: cannot be written: {empty}/no is not a folder."),
         (["{elastic}", "--python", "{empty}"], "{empty}: cannot be written: it is a folder"),
         (["{elastic}", "--json", "{empty}/x.json", "--picture", "{empty}/x.xyz"], "{empty}/x.xyz: must end in one of "),
         (["{begun}"], "{begun}: holds no accepted step."),

@@ -1,0 +1,98 @@
+"""The paper's figures: what they need is solved once, what they show follows from the runs."""
+
+import csv
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.benchmarks import paper_runs
+from archord.benchmarks.claims import FAIR, GOOD, _grade
+from archord.benchmarks.figures import Runs
+from archord.benchmarks.first_yield import first_yield
+from archord.benchmarks.paper_runs import PAIRS, Case, cases, plastic
+from archord.benchmarks.reproduce import FIGURES, chosen, reproduce
+from archord.solver.scene import SceneError
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two figures on meshes too coarse for the paper."""
+    target = tmp_path_factory.mktemp("paper")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(paper_runs, "MESHES", {"coarse": 0.2, "fine": 0.1})
+        solved: list[str] = []
+        reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda case, P: solved.append(case.name))
+        assert sorted(solved) == sorted(c.name for c in cases(["elastic", plastic((0.5, 0.2))]))
+        again: list[str] = []
+        files = reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda case, P: again.append(case.name))
+        assert again == []
+        assert [f.name for f in files] == ["fig3.csv", "fig3.png", "fig5.csv", "fig5.png"]
+        yield target
+
+
+def rows(path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_figure_s_table_holds_the_runs(folder):
+    """Both planes, all steps, and the numbers of history.csv."""
+    table = rows(folder / "fig3.csv")
+    assert [r["plane"] for r in table] == ["strain"] * 20 + ["stress"] * 20
+    run = Runs(folder / "runs").curve("elastic", "strain")
+    ours = [float(r["p0 R/(E* delta)"]) for r in table[:20]]
+    np.testing.assert_allclose(ours, run.p0 * run.R / (run.E_star * run.delta), rtol=1e-8)
+    winkler = [float(r["Winkler, k = 0.85"]) / float(r["delta/dR"]) for r in table]
+    np.testing.assert_allclose(winkler, 0.85, rtol=1e-9)
+
+
+def test_plane_stress_is_capped_near_the_yield_stress_and_plane_strain_is_not(folder):
+    """The finding, on any mesh: p0/sigY at 2 dR."""
+    for plane, low, high in (("strain", 1.8, 2.1), ("stress", 1.0, 1.15)):
+        run = Runs(folder / "runs").curve(plastic((0.5, 0.2)), plane)
+        assert low < run.p0[-1] / run.sigY < high
+
+
+def test_an_interrupted_run_is_solved_again(folder):
+    """A run folder whose run.json does not say done is not taken."""
+    case = Case("elastic", "stress", "coarse")
+    report = folder / "runs" / case.name / "run.json"
+    said = report.read_text()
+    report.write_text(said.replace('"status": "done"', '"status": "interrupted"'))
+    assert not case.is_done(folder / "runs")
+    report.write_text(said)
+    assert case.is_done(folder / "runs")
+
+
+def test_first_yield_scales_with_the_yield_stress(folder):
+    """Half the yield stress is reached earlier, none at all never; near the contact it begins on the axis."""
+    run = Runs(folder / "runs").curve("elastic", "strain")
+    early, late = (first_yield(run, s, near_contact=0.5) for s in (0.001, 0.002))
+    assert 0 < early.delta < late.delta < 2
+    assert late.angle < 15
+    assert first_yield(run, 1.0).delta == np.inf
+
+
+def test_every_scene_of_the_paper_is_in_its_plane_with_unit_contact_modulus():
+    """E* = 1 in both planes, and the pairs are what their names say."""
+    for case in cases({scene for _, scenes, _ in FIGURES.values() for scene in scenes}):
+        scene = case.load()
+        assert scene.E_star == pytest.approx(1.0)
+        assert scene.analysis.plane == case.plane
+    for dR, sigma in PAIRS:
+        scene = Case(plastic((dR, sigma)), "strain").load()
+        assert (scene.joint.dR, scene.block.yield_stress) == pytest.approx((dR / 100, sigma / 100))
+
+
+def test_figures_are_chosen_by_name():
+    """All, some in the paper's order, or a sentence."""
+    assert chosen(["all"]) == list(FIGURES)
+    assert chosen(["fig9", "fig2"]) == ["fig2", "fig9"]
+    with pytest.raises(SceneError, match="fig6: is not a figure of the paper; figures are fig2, "):
+        chosen(["fig6"])
+
+
+def test_verdicts_follow_the_deviation():
+    """Within 5 %, within 15 %, beyond."""
+    assert [_grade(d) for d in (0.9 * GOOD, 0.9 * FAIR, 1.1 * FAIR)] == ["holds", "holds with a limit", "does not hold"]
