@@ -59,7 +59,12 @@ def theory(load: float, alpha: float = 0.0) -> tuple[float, float]:
 
 
 def _row(
-    name: str, load: float, element_size: float, steps: int = 1, alpha: float = 0.0, bodies: dict[str, dict] | None = None
+    name: str,
+    load: float,
+    element_size: float,
+    steps: int = 1,
+    alpha: float = 0.0,
+    bodies: dict[str, dict] | None = None,
 ) -> str:
     start = perf_counter()
     with tempfile.TemporaryDirectory() as folder:

@@ -95,7 +95,9 @@ def _check_compatible(runs: list[RunCurve]) -> None:
     first = runs[0]
     for run in runs:
         if run.scene.joint.model != "block":
-            raise SceneError(f'{run.name}: joint.model = "{run.scene.joint.model}" has no law to fit; only "block" has.')
+            raise SceneError(
+                f'{run.name}: joint.model = "{run.scene.joint.model}" has no law to fit; only "block" has.'
+            )
         for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
             if solid.hardening > 0:
                 raise SceneError(f"{run.name}: {body}.hardening = {solid.hardening:g} does not fit: the law is for "

@@ -1,0 +1,115 @@
+"""What moves the plastic law: ``python3 -m archord.benchmarks.finding``.
+
+The paper's joint with dR/R = 0.5 %, sigY/E* = 0.2 %, pressed by 2 dR, where its eqs 11, 12 give P/(E* R) = 0.00434: what
+plane, Poisson's ratio, ratio of the moduli, yielding body, clearance and kinematics make of it, and k and c of the
+plastic-Winkler law that fits each (threshold c sigY; the paper has k = 0.85, c = 1).
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from mpi4py import MPI
+
+from archord.benchmarks.paper_runs import PLANES, Plane
+from archord.postprocess.calibration import calibrate
+from archord.postprocess.run_curve import read_run
+from archord.postprocess.winkler import plastic_force
+from archord.solver.run import solve_scene
+from archord.solver.scene import Scene
+from archord.solver.scene_file import parse_scene
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A joint in units of R = E* = 1; ``ratio`` is E of the pin over that of the block (None: a rigid pin)."""
+
+    name: str
+    nu: float = 0.3
+    ratio: float | None = 1.0
+    yielding: tuple[str, ...] = ("pin", "block")
+    clearance: float = 0.005
+    yield_stress: float = 0.002
+    kinematics: str = "current"
+
+    def scene(self, plane: Plane, element_size: float, steps: int = 20) -> Scene:
+        """The scene in a plane."""
+        factor = 1 - self.nu**2 if plane == "strain" else 1.0
+        block = factor * (1 + (0.0 if self.ratio is None else 1 / self.ratio))
+        moduli = {"pin": None if self.ratio is None else self.ratio * block, "block": block}
+        bodies = {
+            name: {"rigid": True}
+            if E is None
+            else {"E": E, "nu": self.nu} | ({"yield_stress": self.yield_stress} if name in self.yielding else {})
+            for name, E in moduli.items()
+        }
+        return parse_scene(
+            {
+                "joint": {"radius": 1.0, "clearance": self.clearance, "relative_element_size": element_size},
+                **bodies,
+                "analysis": {"plane": plane, "kinematics": self.kinematics},
+                "load": {"displacement": 2.0, "steps": steps},
+            }
+        )
+
+
+VARIANTS = (
+    Variant("reference: like bodies, nu = 0.3"),
+    Variant("nu = 0", nu=0.0),
+    Variant("nu = 0.2", nu=0.2),
+    Variant("nu = 0.4", nu=0.4),
+    Variant("nu = 0.49", nu=0.49),
+    Variant("pin 3 times stiffer", ratio=3.0),
+    Variant("pin 10 times stiffer", ratio=10.0),
+    Variant("pin 3 times softer", ratio=1 / 3),
+    Variant("rigid pin", ratio=None, yielding=("block",)),
+    Variant("only the block yields", yielding=("block",)),
+    Variant("only the pin yields", yielding=("pin",)),
+    Variant("pin 10 times stiffer, only the block yields", ratio=10.0, yielding=("block",)),
+    Variant("reference kinematics", kinematics="reference"),
+    Variant("dR/R = 0.1 %, sigY/E* = 0.04 %", clearance=0.001, yield_stress=0.0004),
+    Variant("dR/R = 1 %, sigY/E* = 0.4 %", clearance=0.01, yield_stress=0.004),
+    Variant("sigY/E* = 0.1 %", yield_stress=0.001),
+    Variant("sigY/E* = 0.4 %", yield_stress=0.004),
+)
+HEADINGS = ("joint", "plane", "P(2 dR)/(E* R)", "over eq. 12", "p0/sigY", "k", "c", "R2 of P", "c of the plateau")
+
+
+def row(variant: Variant, plane: Plane, element_size: float) -> list[str]:
+    """Solve a variant and fit it: the entries below `HEADINGS`."""
+    with tempfile.TemporaryDirectory() as folder:
+        outcome = solve_scene(variant.scene(plane, element_size), Path(folder), MPI.COMM_SELF)
+        if outcome.status != "done":
+            return [variant.name, plane, outcome.message, *["-"] * 6]
+        fits = calibrate([read_run(folder)], (0.1, 2.0)).joint
+    last = outcome.steps[-1]
+    law = float(plastic_force(2 * variant.clearance, 0.85, 1.0, 1.0, 1.0, variant.clearance, variant.yield_stress))
+    k, c = (f"{e.value:.3f} ± {e.error:.3f}" if e else "-" for e in (fits.P.k, fits.P.c))
+    plateau = fits.plateau.c if fits.plateau else None
+    numbers = [f"{last.P:.6f}", f"{last.P / law:.3f}", f"{last.p0 / variant.yield_stress:.3f}", k, c]
+    return [variant.name, plane, *numbers, f"{fits.P.r2:.4f}", f"{plateau.value:.3f}" if plateau else "-"]
+
+
+def main() -> None:
+    """Solve all variants in both planes, ranks side by side, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--element-size", type=float, default=0.04, help="on the arcs, over R [0.04]")
+    element_size = parser.parse_args().element_size
+    comm = MPI.COMM_WORLD
+    jobs = [(variant, plane) for plane in PLANES for variant in VARIANTS]
+    mine = {i: row(*jobs[i], element_size) for i in range(comm.rank, len(jobs), comm.size)}
+    gathered = comm.gather(mine)
+    if gathered is None:
+        return
+    rows = {i: entries for part in gathered for i, entries in part.items()}
+    print("| " + " | ".join(HEADINGS) + " |")
+    print("|" + "---|" * len(HEADINGS))
+    for i in sorted(rows):
+        print("| " + " | ".join(rows[i]) + " |")
+
+
+if __name__ == "__main__":
+    main()
