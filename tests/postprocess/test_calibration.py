@@ -93,6 +93,13 @@ def test_runs_of_other_clearance_and_strength_share_one_law():
         np.testing.assert_allclose(found.law(run).force(run.delta), run.P, rtol=1e-7)
 
 
+@pytest.mark.parametrize("quantity", ["P", "p0"])
+def test_runs_of_other_clearance_and_modulus_weigh_alike(quantity):
+    """k = 0.8 at one clearance, 0.9 at ten times that: 0.85 together."""
+    runs = [curve(0.8, dR=0.001), curve(0.9, dR=0.01, modulus=50.0, R=3.0)]
+    assert fit_curve(quantity, group(runs)).k.value == pytest.approx(0.85, rel=1e-8)
+
+
 def test_the_range_selects_steps():
     """Only steps in the range are fitted, its ends included, and the law says so."""
     run = curve(0.83)
@@ -106,7 +113,7 @@ def test_the_range_selects_steps():
 def test_before_yield_there_is_no_plateau_to_fit():
     """A falling p0/delta alone is not taken for one: k only, an elastic law."""
     run = curve(0.83, 1.3, sigY=0.004)
-    bent = replace(run, p0=run.p0 * (1 - 0.2 * LOADS), P=run.P * (1 - 0.1 * LOADS))
+    bent = replace(run, p0=run.p0 * (1 - 0.45 * LOADS), P=run.P * (1 - 0.5 * LOADS))
     found = calibrate([bent], (0.1, 1.0))
     assert found.joint.P.c is None
     assert found.joint.p0.c is None
