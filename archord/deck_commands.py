@@ -33,10 +33,10 @@ def export_deck(
     from archord.solver.scene_file import load_scene
 
     checked = load_scene(scene, overrides or [])
+    from archord.benchmarks.deck import write_deck  # starts MPI: a rank that leaves without it stalls the others
+
     if launcher_rank() != 0:
         return 0
-    from archord.benchmarks.deck import write_deck
-
     path = output or Path(f"{scene.stem}.inp")
     write_deck(checked, path, elements.value, force=force)
     print(path)
