@@ -36,10 +36,10 @@ def export_deck(
     checked = load_scene(scene, overrides or [])
     if checked.joint.model != "block":
         raise SceneError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
+    from archord.benchmarks.deck import write_deck  # starts MPI: a rank that leaves without it stalls the others
+
     if launcher_rank() != 0:
         return 0
-    from archord.benchmarks.deck import write_deck
-
     path = output or Path(f"{scene.stem}.inp")
     write_deck(checked, path, elements.value, force=force)
     print(path)
