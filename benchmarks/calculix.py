@@ -83,7 +83,7 @@ def run_calculix(
     pin, block = (step_forces(printed, name, thick) for name in (loaded_nodes(scene), "BLOCK_TOP"))
     if len(pin) != scene.load.steps:
         errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
-        raise RuntimeError(f"CalculiX ended after step {len(pin)} of {scene.load.steps}: {'; '.join(errors)}")
+        raise RuntimeError("; ".join([f"CalculiX ended after step {len(pin)} of {scene.load.steps}", *errors]))
     pressure = read_contact_pressure((folder / "joint.frd").read_text(), len(mesh.x))
     largest, integral = plastic_strain(printed, mesh)
     return SecondOpinion(

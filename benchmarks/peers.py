@@ -48,8 +48,12 @@ def theirs(scene: Scene, elements: Elements, thick: float | None = None) -> tupl
 
 
 def row(name: str, scene: Scene, elements: Elements, m: Measures, seconds: float, thick: float | None = None) -> str:
-    """One line of the table."""
-    c, dofs = theirs(scene, elements, thick)
+    """One line of the table, which says so if CalculiX does not get to the end."""
+    try:
+        c, dofs = theirs(scene, elements, thick)
+    except RuntimeError as error:
+        cells = [name, elements, str(error)] + [""] * (len(_HEADINGS) - 3)
+        return "| " + " | ".join(cells) + " |"
     force, pressure, area = scene.E_star * scene.joint.radius, scene.E_star, scene.joint.radius**2
     plane = "CPE" if scene.analysis.plane == "strain" else "CPS"
     cells = [name, plane + ("6" if elements == "quadratic" else "3"), str(dofs)]
@@ -60,7 +64,7 @@ def row(name: str, scene: Scene, elements: Elements, m: Measures, seconds: float
         cells += [f"{m.peeq_integral / area:.4g}", f"{c.peeq_integral / area:.4g}"]
     else:
         cells += ["-"] * 4
-    return " | ".join(["", *cells, f"{seconds:.1f}", f"{c.seconds:.1f}", ""]).strip()
+    return "| " + " | ".join([*cells, f"{seconds:.1f}", f"{c.seconds:.1f}"]) + " |"
 
 
 def main() -> int:
