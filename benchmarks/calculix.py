@@ -80,7 +80,7 @@ def run_calculix(
         raise RuntimeError(f"CalculiX did not finish within {timeout:g} s") from None
     seconds = perf_counter() - start
     printed = read_printed((folder / "joint.dat").read_text()) if (folder / "joint.dat").exists() else []
-    pin, block = (step_forces(printed, name, thick) for name in (loaded_nodes(scene), "BLOCK_TOP"))
+    pin, block = (step_forces(printed, name, thick) for name in (loaded_nodes(scene), "BLOCK_HELD"))
     if len(pin) != scene.load.steps:
         errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
         raise RuntimeError("; ".join([f"CalculiX ended after step {len(pin)} of {scene.load.steps}", *errors]))

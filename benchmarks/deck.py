@@ -96,7 +96,7 @@ def _model_lines(scene: Scene, thick: float) -> Iterator[str]:
     yield "*BOUNDARY"
     if scene.pin.rigid:
         yield "PIN_NODES, 1, 1"
-    yield from ("SYMMETRY, 1, 1", "BLOCK_TOP, 1, 2")
+    yield from ("SYMMETRY, 1, 1", "BLOCK_HELD, 1, 2")
 
 
 def _step_lines(scene: Scene) -> Iterator[str]:
@@ -104,7 +104,7 @@ def _step_lines(scene: Scene) -> Iterator[str]:
     for k in range(1, n + 1):
         yield from ("*STEP, INC=1000", "*STATIC", "1., 1.", "*BOUNDARY")
         yield f"{loaded}, 2, 2, {_number(-scene.target * k / n)}"
-        for support in (loaded, "BLOCK_TOP"):
+        for support in (loaded, "BLOCK_HELD"):
             yield from (f"*NODE PRINT, NSET={support}, TOTALS=ONLY", "RF")
         if k == n:
             yield from ("*NODE FILE, OUTPUT=2D", "U", "*CONTACT FILE", "CSTR")

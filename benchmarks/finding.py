@@ -1,6 +1,6 @@
 """What moves the plastic law: ``python3 -m archord.benchmarks.finding``.
 
-The paper's joint with dR/R = 0.5 %, sigY/E* = 0.2 %, pressed by 2 dR, where its eqs 11, 12 give P/(E* R) = 0.00434: what
+The paper's joint with dR/R = 0.5 %, sigY/E* = 0.2 %, where its eqs 11, 12 give 0.00434 E* R at 2 dR: what
 plane, Poisson's ratio, ratio of the moduli, yielding body, clearance and kinematics make of it, and k and c of the
 plastic-Winkler law that fits each (threshold c sigY; the paper has k = 0.85, c = 1).
 """

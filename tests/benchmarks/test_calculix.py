@@ -45,7 +45,7 @@ def mesh():
 def test_tables_have_their_names_times_and_rows(printed, mesh):
     """Two reactions a step, then PEEQ at nine points of every element."""
     names = [(b.quantity, b.name, b.time) for b in printed]
-    reactions = [("total force", name, t) for t in (1.0, 2.0) for name in ("PIN_TOP", "BLOCK_TOP")]
+    reactions = [("total force", name, t) for t in (1.0, 2.0) for name in ("PIN_TOP", "BLOCK_HELD")]
     assert names == [*reactions, *(("equivalent plastic strain", name, 2.0) for name in ("PIN", "BLOCK"))]
     assert {b.rows.shape for b in printed[:4]} == {(1, 3)}
     assert sum(len(b.rows) for b in printed[4:]) == 9 * len(mesh.elements)
@@ -53,7 +53,7 @@ def test_tables_have_their_names_times_and_rows(printed, mesh):
 
 def test_forces_are_the_whole_joints_and_balance(printed):
     """Twice the printed reaction, downward positive; pin and block opposite; growing with the steps."""
-    pin, block = step_forces(printed, "PIN_TOP", 1.0), step_forces(printed, "BLOCK_TOP", 1.0)
+    pin, block = step_forces(printed, "PIN_TOP", 1.0), step_forces(printed, "BLOCK_HELD", 1.0)
     line = next(line for line in (REFERENCE / "calculix.dat").read_text().splitlines() if "E-03" in line)
     assert pin[0] == -2 * float(line.split()[1])
     np.testing.assert_allclose(pin, -block, rtol=1e-6)

@@ -138,7 +138,7 @@ def test_sets_lie_where_their_names_say(written):
     """Supports and loaded edge, on both bodies where both are cut."""
     nodes, _, _, sets, _ = read(written[1])
     assert [nodes[n][1] for n in sets["PIN_TOP"]] == pytest.approx([-DR] * len(sets["PIN_TOP"]), abs=1e-14)
-    assert [nodes[n][1] for n in sets["BLOCK_TOP"]] == pytest.approx([0.0] * len(sets["BLOCK_TOP"]), abs=1e-14)
+    assert [nodes[n][1] for n in sets["BLOCK_HELD"]] == pytest.approx([0.0] * len(sets["BLOCK_HELD"]), abs=1e-14)
     assert sets["SYMMETRY"] & sets["PIN_NODES"]
     assert sets["SYMMETRY"] - sets["PIN_NODES"]
     x = np.array(list(nodes.values()))
@@ -151,12 +151,12 @@ def test_steps_push_the_pin_down_in_equal_parts(written):
     """One step each, the last at delta; reactions of pin and block in all of them."""
     found = blocks(written[1])
     first = next(i for i, block in enumerate(found) if block[0] == "*STEP")
-    assert found[first - 1][2] == [["SYMMETRY", "1", "1"], ["BLOCK_TOP", "1", "2"]]
+    assert found[first - 1][2] == [["SYMMETRY", "1", "1"], ["BLOCK_HELD", "1", "2"]]
     loads = [rows for keyword, _, rows in found[first:] if keyword == "*BOUNDARY"]
     assert [row[0][:3] for row in loads] == [["PIN_TOP", "2", "2"]] * STEPS
     assert [float(row[0][3]) for row in loads] == pytest.approx([-2 * DR * k / STEPS for k in (1, 2, 3)])
     printed = [parameters["NSET"] for keyword, parameters, _ in found if keyword == "*NODE PRINT"]
-    assert printed == ["PIN_TOP", "BLOCK_TOP"] * STEPS
+    assert printed == ["PIN_TOP", "BLOCK_HELD"] * STEPS
 
 
 @pytest.mark.parametrize(("plane", "family"), [("strain", "CPE"), ("stress", "CPS")])

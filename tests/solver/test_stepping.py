@@ -43,7 +43,7 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
     from tests.solver.solving import MPI
 
     joint, accepted = Joint(problem, MPI.COMM_SELF), []
-    targets = [problem.delta * k / 10 for k in range(1, 11)]
+    targets = [problem.target * k / 10 for k in range(1, 11)]
     with pytest.raises(
         StepFailure, match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller"
     ):
