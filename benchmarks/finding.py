@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from mpi4py import MPI
 
 from archord.benchmarks.paper_runs import PLANES, Plane
@@ -73,24 +75,52 @@ VARIANTS = (
     Variant("dR/R = 0.1 %, sigY/E* = 0.04 %", clearance=0.001, yield_stress=0.0004),
     Variant("dR/R = 1 %, sigY/E* = 0.4 %", clearance=0.01, yield_stress=0.004),
     Variant("sigY/E* = 0.1 %", yield_stress=0.001),
+    Variant("sigY/E* = 0.15 %", yield_stress=0.0015),
+    Variant("sigY/E* = 0.3 %", yield_stress=0.003),
     Variant("sigY/E* = 0.4 %", yield_stress=0.004),
+    Variant("sigY/E* = 0.5 %", yield_stress=0.005),
 )
 HEADINGS = ("joint", "plane", "P(2 dR)/(E* R)", "over eq. 12", "p0/sigY", "k", "c", "R2 of P", "c of the plateau")
 
 
-def row(variant: Variant, plane: Plane, element_size: float) -> list[str]:
-    """Solve a variant and fit it: the entries below `HEADINGS`."""
+def row(variant: Variant, plane: Plane, element_size: float) -> tuple[list[str], tuple[float, float] | None]:
+    """Solve a variant and fit it: the entries below `HEADINGS`, and k and c where both could be fitted."""
     with tempfile.TemporaryDirectory() as folder:
         outcome = solve_scene(variant.scene(plane, element_size), Path(folder), MPI.COMM_SELF)
         if outcome.status != "done":
-            return [variant.name, plane, outcome.message, *["-"] * 6]
+            return [variant.name, plane, outcome.message, *["-"] * 6], None
         fits = calibrate([read_run(folder)], (0.1, 2.0)).joint
     last = outcome.steps[-1]
     law = float(plastic_force(2 * variant.clearance, 0.85, 1.0, 1.0, 1.0, variant.clearance, variant.yield_stress))
     k, c = (f"{e.value:.3f} ± {e.error:.3f}" if e else "-" for e in (fits.P.k, fits.P.c))
     plateau = fits.plateau.c if fits.plateau else None
     numbers = [f"{last.P:.6f}", f"{last.P / law:.3f}", f"{last.p0 / variant.yield_stress:.3f}", k, c]
-    return [variant.name, plane, *numbers, f"{fits.P.r2:.4f}", f"{plateau.value:.3f}" if plateau else "-"]
+    entries = [variant.name, plane, *numbers, f"{fits.P.r2:.4f}", f"{plateau.value:.3f}" if plateau else "-"]
+    return entries, (fits.P.k.value, fits.P.c.value) if fits.P.k and fits.P.c else None
+
+
+def _trends(found: dict[tuple[Variant, Plane], tuple[float, float]]) -> Iterator[str]:
+    """k and c as powers of s = sigY R/(E* dR), and c as a line in nu, for otherwise like variants."""
+    like = VARIANTS[0]
+    for plane in PLANES:
+        series = {v: kc for (v, p), kc in found.items() if p == plane}
+        by_yield = {
+            v.yield_stress / v.clearance: kc
+            for v, kc in series.items()
+            if replace(v, name=like.name, yield_stress=like.yield_stress) == like
+        }
+        s, values = np.array(list(by_yield)), np.array(list(by_yield.values()))
+        for name, value in zip("kc", values.T, strict=True):
+            power, start = np.polyfit(np.log(s / 0.4), np.log(value), 1)
+            off = np.abs(np.exp(start) * (s / 0.4) ** power / value - 1).max()
+            law = f"{name} = {np.exp(start):.3f} (s/0.4)^{power:.3f}"
+            yield f"plane {plane}, like bodies, nu = 0.3: {law} within {off:.1%} for s = {s.min():g} to {s.max():g}"
+        by_nu = {v.nu: kc[1] for v, kc in series.items() if replace(v, name=like.name, nu=like.nu) == like}
+        nu, c = np.array(list(by_nu)), np.array(list(by_nu.values()))
+        slope, at_zero = np.polyfit(nu, c, 1)
+        off = np.abs((at_zero + slope * nu) / c - 1).max()
+        law = f"c = {at_zero:.3f} + {slope:.3f} nu"
+        yield f"plane {plane}, like bodies, s = 0.4: {law} within {off:.1%} for nu = {nu.min():g} to {nu.max():g}"
 
 
 def main() -> None:
@@ -104,11 +134,14 @@ def main() -> None:
     gathered = comm.gather(mine)
     if gathered is None:
         return
-    rows = {i: entries for part in gathered for i, entries in part.items()}
+    rows = {i: result for part in gathered for i, result in part.items()}
     print("| " + " | ".join(HEADINGS) + " |")
     print("|" + "---|" * len(HEADINGS))
     for i in sorted(rows):
-        print("| " + " | ".join(rows[i]) + " |")
+        print("| " + " | ".join(rows[i][0]) + " |")
+    print("\nWith s = sigY R/(E* dR):\n")
+    for line in _trends({jobs[i]: kc for i, (_, kc) in rows.items() if kc is not None}):
+        print(f"- {line}")
 
 
 if __name__ == "__main__":
