@@ -16,9 +16,10 @@ from archord.benchmarks.paper_runs import PAIRS, PLANES, Case, Plane, plastic
 from archord.geometry.basis import Array
 from archord.postprocess.arc_pressure import read_arcs
 from archord.postprocess.chord import ChordPressure, arc_angle, read_chord_pressure
+from archord.postprocess.hertz_laws import hertz_pressure
 from archord.postprocess.law_joint import LawJoint
 from archord.postprocess.laws import find_law
-from archord.postprocess.persson_law import persson_pressure
+from archord.postprocess.persson_law import persson_load, persson_pressure
 from archord.postprocess.run_curve import RunCurve, read_run
 
 STYLES: dict[str, dict] = {"strain": {"color": "tab:blue"}, "stress": {"color": "tab:red"}}
@@ -136,7 +137,7 @@ def fig3(runs: Runs) -> tuple[Table, Callable]:
         load = np.full(len(run.delta), np.nan)
         load[inside] = johnson.force(joint, run.delta[inside])
         hertz = np.full(len(run.delta), np.nan)
-        hertz[inside] = np.sqrt(load[inside] * joint.E_star / (np.pi * joint.relative_radius))
+        hertz[inside] = hertz_pressure(joint, load[inside])
         parts.append(
             {
                 "plane": plane,
@@ -280,9 +281,7 @@ def fig9(runs: Runs) -> tuple[Table, Callable]:
         for scene in ("elastic", plastic(FULL_YIELD)):
             run = runs.curve(scene, plane)
             joint, scale = LawJoint.from_scene(run.scene), run.E_star * run.dR
-            b2 = np.tan(run.eps / 2) ** 2
-            left = 2 - (np.log1p(b2) + 2 * b2**2)
-            persson = np.where(left > 0, 2 * np.pi * b2 * (1 + b2) / np.where(left > 0, left, 1.0), np.nan)
+            persson = persson_load(joint, run.eps) / scale
             delta = run.dR * (1 / np.cos(np.minimum(run.eps, 1.5)) - 1)  # eq. 5
             law = find_law("paper" if scene == "elastic" else "paper-plastic")
             values = np.full(len(delta), np.nan)
