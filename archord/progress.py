@@ -100,7 +100,7 @@ class _Progress:
                 TextColumn("{task.description}"),
                 TimeElapsedColumn(),
             )
-            self._task = self._bar.add_task("meshing", total=scene.load.steps)
+            self._task = self._bar.add_task("meshing", total=len(scene.targets))
 
     def __enter__(self) -> _Progress:
         self._bar.__enter__()
@@ -126,7 +126,8 @@ class _Progress:
     def attempt(self, load: float, iterations: int) -> None:
         """Show a solve that ended."""
         if self._task is not None:
-            self._bar.update(self._task, description=f"load {load / self.scene.target:.4g}, {iterations} iterations")
+            name = "P" if self.scene.force_controlled else "delta"
+            self._bar.update(self._task, description=f"{name} = {load:.6g}, {iterations} iterations")
 
     def step(self, m) -> None:
         """Show an accepted output step."""

@@ -1,7 +1,8 @@
 """fields.xdmf and fields.h5: the joint's fields over the steps, for ParaView and pyvista.
 
 Displacements are nodal on the curved second-order mesh; stress measures, PEEQ and the contact are means over cells. The
-arrays are in the order of the mesh generator, whatever the number of ranks. Rank 0 writes.
+arrays are in the order of the mesh generator, whatever the number of ranks. Rank 0 writes. The time is delta where a
+displacement only grows, else the number of the step.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class FieldWriter:
         if joint.bulk.plastic:
             self.names.insert(1, "peeq")
         if joint.comm.rank == 0:
-            self._loads: list[float] = []
+            self._times: list[float] = []
             cells = np.searchsorted(self._nodes.unique, cells)[:, _VTK_ORDER]
             self._shape = len(coordinates), len(cells)
             shapes: dict[str, tuple[tuple[int, ...], str]] = {name: ((len(cells),), "f8") for name in self.names}
@@ -88,7 +89,7 @@ class FieldWriter:
         if joint.comm.rank == 0:
             arrays["displacement"] = np.pad(nodal, ((0, 0), (0, 1)))
             self._file.write(step, load, arrays)
-            self._loads.append(load)
+            self._times.append(load if joint.scene.monotonic and not joint.scene.force_controlled else float(step))
             self._write_xdmf()
 
     def _contact_on_cells(self) -> tuple[Array, Array]:
@@ -103,7 +104,7 @@ class FieldWriter:
         return share, pressure
 
     def _write_xdmf(self) -> None:
-        grids = [self._grid(k, load) for k, load in enumerate(self._loads, start=1)]
+        grids = [self._grid(k, time) for k, time in enumerate(self._times, start=1)]
         text = (
             '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
             '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
@@ -114,12 +115,12 @@ class FieldWriter:
         new.write_text(text, encoding="utf-8")
         os.replace(new, self.path)
 
-    def _grid(self, step: int, load: float) -> str:
+    def _grid(self, step: int, time: float) -> str:
         n_nodes, n_cells = self._shape
         at = step_name(step)
         cell = "".join(_attribute(n, "Scalar", "Cell", f"{n_cells}", f"{n}/{at}") for n in self.names)
         return (
-            f'<Grid Name="{escape(f"step {step}")}" GridType="Uniform">\n<Time Value="{load!r}"/>\n'
+            f'<Grid Name="{escape(f"step {step}")}" GridType="Uniform">\n<Time Value="{time!r}"/>\n'
             f'<Topology TopologyType="Triangle_6" NumberOfElements="{n_cells}">'
             f"{_data(f'{n_cells} 6', 'mesh/cells', 'Int', 8)}</Topology>\n"
             f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", "mesh/coordinates")}</Geometry>\n'

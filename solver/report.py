@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import platform
 import sys
@@ -32,6 +31,7 @@ class Report:
     def __init__(self, path: Path, joint: Joint, begun: float) -> None:
         self.path, self.joint, self.begun = path, joint, begun
         self.measures: list[Measures] = []
+        self._residual = 0.0
         self.content: dict[str, Any] = {
             "status": "running",
             "message": "",
@@ -52,8 +52,11 @@ class Report:
     def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
         """Note an accepted output step."""
         self.measures.append(m)
-        self.content["warnings"] += _warnings(self.joint, profiles, m, step.residuals[-1][-1])
-        self.content["steps"].append(asdict(m) | {"substeps": step.substeps, "residuals": step.residuals})
+        self._residual = max(self._residual, step.residual)
+        self.content["warnings"] += _warnings(self.joint, profiles, m, step.residual)
+        self.content["steps"].append(
+            asdict(m) | {"substeps": step.substeps, "residuals": [a.residuals for a in step.attempts]}
+        )
         self.write()
 
     def finish(self, status: str, message: str, failed: Step | None = None) -> None:
@@ -91,10 +94,11 @@ class Report:
         if not self.measures:
             return {}
         m = self.measures[-1]
+        work = max(abs(m.work) for m in self.measures)
         return {
             "force_balance": max(m.force_balance for m in self.measures),
-            "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / m.work if m.work else math.nan,
-            "newton_residual": max(s["residuals"][-1][-1] for s in self.content["steps"]),
+            "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / work if work else 0.0,
+            "newton_residual": self._residual,
         }
 
 
@@ -143,11 +147,11 @@ def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residu
     if joint.scene.joint.model == "block" and any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc")
     touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
-    if touching < _FEW_FACETS:
+    if m.P and touching < _FEW_FACETS:
         said.append(
             f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
         )
-    if m.delta > 0.1 * joint.scene.joint.radius:
+    if abs(m.delta) > 0.1 * joint.scene.joint.radius:
         said.append("delta exceeds 0.1 R, too much for small-strain theory")
     if residual > 1e-8:
         said.append(f"round-off limits the residual to {residual:.1e} of the reaction")

@@ -19,12 +19,12 @@ from archord.solver.report import Report
 from archord.solver.run_folder import FILES
 from archord.solver.scene import Scene
 from archord.solver.scene_file import resolved
-from archord.solver.stepping import Step, StepFailure, march
+from archord.solver.stepping import Position, Step, StepFailure, march
 from archord.solver.timer import Timer
 
 _UNSEEN = (
-    "no contact point is pressed, even at the largest delta: the contact is smaller than the mesh can see; reduce "
-    "joint.element_size or increase load.displacement"
+    "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
+    "reduce joint.element_size or increase the load"
 )
 
 
@@ -65,9 +65,8 @@ def solve_scene(
     on_start(joint)
     output = _Output(folder, joint, begun)
     work = Work()
-    n = scene.load.steps
 
-    def target_done(step: Step) -> None:
+    def target_done(step: Step, position: Position) -> None:
         on_step(output.add(step, work))
 
     status, message, failed, received = "done", "", None, 0
@@ -75,9 +74,9 @@ def solve_scene(
         with Interrupt() as joint.equilibrium.interrupt:
             march(
                 joint.equilibrium,
-                [scene.target * k / n for k in range(1, n)] + [scene.target],
+                scene.targets,
                 joint.rigid_translation,
-                max_cutbacks=scene.load.max_cutbacks,
+                rules=scene.stepping,
                 substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
                 target_done=target_done,
                 attempted=on_attempt,
@@ -86,7 +85,7 @@ def solve_scene(
         status, message, failed = "stopped", str(failure), failure.attempt
     except Interrupted as interrupted:
         status, message, received = "interrupted", f"{interrupted} after step {len(output.steps)}", interrupted.number
-    if status == "done" and not joint.contact.n_active():
+    if status == "done" and output.unseen():
         status, message = "stopped", _UNSEEN
     warnings = output.finish(status, message, failed)
     return Outcome(folder, status, message, output.steps, warnings, received)
@@ -99,7 +98,7 @@ class _Output:
         self.joint = joint
         self.steps: list[Measures] = []
         self._root = joint.comm.rank == 0
-        n = joint.scene.load.steps
+        n = len(joint.scene.targets)
         with joint.timer("output"):
             if self._root:
                 for name in FILES:
@@ -117,7 +116,8 @@ class _Output:
         with self.joint.timer("output"):
             profiles = arc_profiles(self.joint)
             seconds, self._last = perf_counter() - self._last, perf_counter()
-            m = measure(self.joint, len(self.steps) + 1, step, profiles, work, seconds)
+            largest = max((abs(m.P) for m in self.steps), default=0.0)
+            m = measure(self.joint, len(self.steps) + 1, step, profiles, work, seconds, largest)
             self.steps.append(m)
             self._fields.write(m.step, m.delta)
             if self._root:
@@ -125,6 +125,10 @@ class _Output:
                 self._history.add(m)
                 self._report.add(m, step, profiles)
         return m
+
+    def unseen(self) -> bool:
+        """Whether the pin was pressed into the hole but no contact point ever noticed."""
+        return max(m.delta for m in self.steps) > 0 and not any(m.P for m in self.steps)
 
     def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
         """Note how the run ended; returns the warnings on rank 0."""
