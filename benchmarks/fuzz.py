@@ -225,13 +225,17 @@ def main() -> int:
             failed += bool(case.faults)
             if case.faults or case.slow:
                 shutil.rmtree(keep / str(number), ignore_errors=True)
-                shutil.copytree(folder, keep / str(number), ignore=lambda _, names: [n for n in names if n == "fields.h5"])
+                shutil.copytree(
+                    folder, keep / str(number), ignore=lambda _, names: [n for n in names if n == "fields.h5"]
+                )
                 what = "; ".join(case.faults) or "slow"
                 print(f"case {number} ({case.base}, {case.kind}, {case.seconds:.1f} s): {what}", flush=True)
             shutil.rmtree(folder, ignore_errors=True)
             if sys.stderr.isatty():
                 print(f"\r{number + 1 - given.first} of {given.cases}", end="", file=sys.stderr)
-    print(f"{given.cases} cases, seed {given.seed}, in {time.perf_counter() - begun:.0f} s: {failed} failed; files in {keep}")
+    print(
+        f"{given.cases} cases, seed {given.seed}, in {time.perf_counter() - begun:.0f} s: {failed} failed; files in {keep}"
+    )
     for code, count in sorted(codes.items()):
         by_kind = ", ".join(f"{kind} {n}" for (kind, c), n in sorted(kinds.items()) if c == code)
         print(f"  exit code {code}: {count} ({by_kind})")

@@ -60,14 +60,13 @@ def mutate(rng: Random, text: str) -> tuple[str, bytes]:
 
 
 def _bytes(rng: Random, text: str) -> bytes:
-    raw = bytearray(text.encode())
+    raw = bytearray(text.encode() or b"\n")
     at, length = rng.randrange(len(raw) + 1), rng.choice((1, 1, 2, 5, 40))
     change = rng.randrange(12)
     if change == 0:
         for _ in range(length):
-            raw[rng.randrange(len(raw)) : at or None] = b"" if not raw else bytes([rng.randrange(256)])
-            raw = raw or bytearray(b"\n")
-    elif change == 1 and raw:
+            raw[rng.randrange(len(raw))] = rng.randrange(256)
+    elif change == 1:
         at = rng.randrange(len(raw))
         raw[at] ^= 1 << rng.randrange(8)
     elif change == 2:
@@ -87,7 +86,8 @@ def _bytes(rng: Random, text: str) -> bytes:
     elif change == 9:
         return rng.choice((b"", b"\n", rng.randbytes(2000), b"\x7fELF" + bytes(3000), b"[" * 20000, b"a." * 5000))
     elif change == 10:
-        return (text + rng.choice(("# " + "x" * 2_000_000, "\n" * 500_000, "".join(f"k{i} = 1\n" for i in range(3000))))).encode()
+        many = "".join(f"k{i} = 1\n" for i in range(3000))
+        return (text + rng.choice(("# " + "x" * 2_000_000, "\n" * 500_000, many))).encode()
     else:
         start = rng.randrange(len(raw) + 1)
         raw[at:at] = raw[start : start + 200]
@@ -127,7 +127,9 @@ def _structure(rng: Random, text: str) -> bytes:
     elif change == 1:
         data.pop(section, None)
     elif change == 2:
-        table[rng.choice((key + "s", key.upper(), "", " ", "ключ", "a.b", "__class__", "model_config", "x" * 3000))] = 1.0
+        table[rng.choice((key + "s", key.upper(), "", " ", "ключ", "a.b", "__class__", "model_config", "x" * 3000))] = (
+            1.0
+        )
     elif change == 3:
         data[rng.choice((section + "s", section.upper(), "", "mesh", "\u202e", "__init__"))] = data.pop(section, 1)
     elif change == 4:
