@@ -65,7 +65,7 @@ def scene_of(seed: int, number: int) -> tuple[str, str, bytes]:
 def run_case(seed: int, number: int, folder: Path, limit: float, ranks: int = 0) -> Case:
     """Solve case ``number`` in ``folder``, which is made for it, within ``limit`` seconds.
 
-    With ``ranks``, the command is run by mpirun; without, it is called in a forked process (`preload` makes that quick).
+    With ``ranks``, mpirun runs the command; without, it is called in a forked process (`preload` makes that quick).
     """
     base, kind, content = scene_of(seed, number)
     folder.mkdir(parents=True)
@@ -120,7 +120,7 @@ def _mpirun(folder: Path, ranks: int) -> int:
     launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
     command = [*launcher, sys.executable, "-m", "archord", *_command(folder)]
     with (folder / "stdout").open("wb") as out, (folder / "stderr").open("wb") as err:
-        return subprocess.Popen(command, stdout=out, stderr=err, preexec_fn=_limit_resources).pid  # noqa: PLW1509
+        return subprocess.Popen(command, stdout=out, stderr=err, preexec_fn=_limit_resources).pid
 
 
 def _wait(pid: int, limit: float) -> int:
@@ -234,7 +234,8 @@ def main() -> int:
             if sys.stderr.isatty():
                 print(f"\r{number + 1 - given.first} of {given.cases}", end="", file=sys.stderr)
     print(
-        f"{given.cases} cases, seed {given.seed}, in {time.perf_counter() - begun:.0f} s: {failed} failed; files in {keep}"
+        f"{given.cases} cases, seed {given.seed}, in {time.perf_counter() - begun:.0f} s: "
+        f"{failed} failed; files in {keep}"
     )
     for code, count in sorted(codes.items()):
         by_kind = ", ".join(f"{kind} {n}" for (kind, c), n in sorted(kinds.items()) if c == code)

@@ -234,6 +234,10 @@ def _values(rng: Random, text: str) -> bytes:
                 if isinstance(table.get(name), float):
                     table[name] *= scale
 
+    def rigid() -> None:
+        pin.clear()
+        pin["rigid"] = True
+
     changes: list[Callable[[], Any]] = [
         *(size, clearance, clearance, loading, loading, poisson, stiffness, strength, strength, units, modulus_units),
         lambda: joint.update(growth=rng.choice((0.0, 0.01, 0.9, 0.999999, 1.0, 1.000001, 1.1, 2.0, power(-6, 6)))),
@@ -249,7 +253,7 @@ def _values(rng: Random, text: str) -> bytes:
         lambda: analysis.update(plane=rng.choice(("strain", "stress"))),
         lambda: analysis.update(kinematics=rng.choice(("current", "reference"))),
         lambda: analysis.update(integration=rng.choice(("both", "pin", "block"))),
-        lambda: (pin.clear(), pin.update(rigid=True)),
+        rigid,
     ]
     for _ in range(rng.choice((1, 2, 3))):
         rng.choice(changes)()

@@ -106,7 +106,7 @@ class JointGeometry(_Section):
             raise ValueError(f"{name}|must be between 1e-4 and 0.5 times the radius")
         if 2 * (self.radius + self.dR) > self.W:
             raise ValueError("block_size|must be at least twice the radius of the hole")
-        if self.W > _WIDEST * self.radius:
+        if self.W / self.radius > _WIDEST:
             raise ValueError(f"block_size|must not exceed {_WIDEST:g} times the radius")
         if self.expected_cells > _MOST_CELLS:
             name = "relative_element_size" if self.element_size is None else "element_size"

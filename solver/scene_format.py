@@ -8,7 +8,6 @@ from typing import Any
 
 from archord.solver.scene import Scene
 
-
 TOP_LEVEL = ("format",)
 
 

@@ -4,6 +4,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import load_scene, parse_scene, resolved
@@ -148,3 +150,92 @@ def test_contact_modulus_of_plane_strain_and_stress():
     assert parse_scene(data).E_star == pytest.approx(105000 / 0.91, rel=1e-14)
     assert parse_scene(data | {"analysis": {"plane": "stress"}}).E_star == pytest.approx(105000, rel=1e-14)
     assert parse_scene(data | {"pin": {"rigid": True}}).E_star == pytest.approx(210000 / 0.91, rel=1e-14)
+
+
+@pytest.mark.parametrize("value", [2, 10**30])
+def test_a_scene_of_a_newer_format_is_refused_for_that_alone(value):
+    """Whatever else it holds, which may mean something there."""
+    with pytest.raises(SceneError) as caught:
+        parse_scene(basic() | {"format": value, "friction": {"mu": 0.1}})
+    assert str(caught.value) == (
+        f"scene: format = {value} is newer than this archord, which reads format 1; use a newer archord."
+    )
+
+
+@pytest.mark.parametrize("value", [1.0, True, "1", 0, -1, [1], {"a": 1}])
+def test_a_format_that_is_no_version_is_refused(value):
+    """A version is a whole number from 1."""
+    with pytest.raises(SceneError, match=r"^scene: format = .* must be a whole number, the version .*: 1\.$"):
+        parse_scene(basic() | {"format": value})
+
+
+def test_scenes_say_their_format_when_written():
+    """The resolved scene does; where it is not said it is 1."""
+    assert parse_scene(basic()) == parse_scene(basic() | {"format": 1})
+    assert tomllib.loads(resolved(parse_scene(basic())))["format"] == 1
+    assert tomllib.loads(example())["format"] == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"x = " + b"9" * 5000, "is not valid TOML"),
+        (b"x = " + b"[" * 20000, "are nested too deeply"),
+        (b"a." * 100000 + b"b = 1", "dotted parts"),
+        (b"['a'" + b" . 'a'" * 100000 + b"]", "dotted parts"),
+        (b"# " + b"x" * 1000000, "larger than 1 MB"),
+        (b"".join(b"k%d = 1\n" % i for i in range(3000)), r"has 2984 more faults like these\."),
+        (b"x" * 5000 + b" = 1", "is not a known key"),
+        (b'"a\\nb" = 1', r'"a\\nb" = 1 is not a known key'),
+        (b"date = 0000-00-00", "is not valid TOML"),
+    ],
+    ids=["digits", "brackets", "dots", "header", "comment", "keys", "long key", "two-line key", "date"],
+)
+def test_monstrous_files_are_refused_briefly(tmp_path, content, said):
+    """In time and in words."""
+    path = tmp_path / "scene.toml"
+    path.write_bytes(content)
+    with pytest.raises(SceneError, match=said) as caught:
+        load_scene(path)
+    assert all(line.startswith(str(path)) and len(line) < 400 for line in str(caught.value).splitlines())
+
+
+def test_a_byte_order_mark_and_carriage_returns_change_nothing(tmp_path):
+    """What editors on Windows leave."""
+    path = tmp_path / "scene.toml"
+    text = resolved(parse_scene(basic()))
+    path.write_bytes(text.replace("\n", "\r\n").encode("utf-8-sig"))
+    assert load_scene(path) == parse_scene(tomllib.loads(text))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    length=st.integers(-60, 60),
+    stress=st.integers(-60, 60),
+    clearance=st.floats(-7, 0),
+    size=st.floats(-5, 0),
+    growth=st.floats(0.01, 2),
+    soft=st.floats(-10, 10),
+    delta=st.floats(-3, 4),
+)
+def test_whether_a_scene_is_accepted_does_not_depend_on_its_units(length, stress, clearance, size, growth, soft, delta):
+    """Units scaled by powers of two, which round nothing: the same verdict, the same expected mesh."""
+
+    def accepted(L: float, S: float) -> tuple[bool, float]:
+        data = {
+            "joint": {
+                "radius": 10.0 * L,
+                "clearance": 10.0**clearance * L,
+                "element_size": 10.0**size * L,
+                "growth": growth,
+            },
+            "pin": {"E": S, "nu": 0.3, "yield_stress": 1e-3 * S},
+            "block": {"E": 10.0**soft * S, "nu": 0.2},
+            "load": {"displacement": 10.0**delta},
+        }
+        try:
+            return True, parse_scene(data).joint.expected_cells
+        except SceneError:
+            return False, 0.0
+
+    assert accepted(2.0**length, 2.0**stress) == accepted(1.0, 1.0)
