@@ -86,7 +86,7 @@ def measure(
         elastic_energy=2 * total[1],
         plastic_dissipation=2 * total[2],
         work=work.total,
-        force_balance=max(abs(f - P) for f in forces.values()) / abs(P),
+        force_balance=max(abs(f - P) for f in forces.values()) / abs(P) if P else 0.0,
         iterations=step.iterations,
         cutbacks=step.cutbacks,
         seconds=seconds,

@@ -17,9 +17,10 @@ _LINE = r"^[^\x00-\x1f]*$"
 _RANGE = 1e-30, 1e30  # of lengths and moduli; powers of them must not leave the range of numbers
 FORMAT = 1  # version of the scene format: rises when a scene gets a meaning that an older archord would get wrong
 _SOFTEST = 1e-8  # ratio of the moduli
+_WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
 _NU = -0.999, 0.499999  # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
 _WIDEST = 1e6  # block_size over R
-_MOST_CELLS = 2e6  # triangles: some 20 GB, and minutes for a mesh generator that is not parallel
+_MOST_CELLS = 1e6  # triangles: some 10 GB, and minutes for a mesh generator that is not parallel
 Positive = Annotated[float, Field(gt=0)]
 
 
@@ -270,6 +271,11 @@ class Scene(_Section):
         for name, size in sizes.items():
             if size is not None and not _RANGE[0] <= size <= _RANGE[1]:
                 raise ValueError(f"{name}|must be between 1e-30 and 1e30; choose other units")
+        for name, body in (("pin", self.pin), ("block", self.block)):
+            if body.E is not None and body.yield_stress is not None and body.yield_stress < _WEAKEST * body.E:
+                raise ValueError(f"{name}.yield_stress|must be at least {_WEAKEST:g} times {name}.E")
+            if body.E is not None and body.hardening > body.E / _WEAKEST:
+                raise ValueError(f"{name}.hardening|must not exceed {1 / _WEAKEST:g} times {name}.E")
         if self.pin.E is not None and not _SOFTEST <= self.pin.E / self.block.E <= 1 / _SOFTEST:
             raise ValueError("pin.E|must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
         name = next(name for name in LOADS if getattr(self.load, name) is not None)

@@ -44,6 +44,8 @@ def basic() -> dict:
         ("block", "rigid", True, "is not a known key"),
         ("block", "hardening", 1.0, "needs a yield_stress."),
         ("block", "yield_stress", 0.0, "must be greater than 0."),
+        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times block.E."),
+        ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
         ("pin", "rigid", True, "is not for a rigid pin."),
         ("load", "steps", 2.5, "must be a whole number."),
         ("load", "steps", 0, "must be at least 1 and at most 10000."),
@@ -150,6 +152,16 @@ def test_contact_modulus_of_plane_strain_and_stress():
     assert parse_scene(data).E_star == pytest.approx(105000 / 0.91, rel=1e-14)
     assert parse_scene(data | {"analysis": {"plane": "stress"}}).E_star == pytest.approx(105000, rel=1e-14)
     assert parse_scene(data | {"pin": {"rigid": True}}).E_star == pytest.approx(210000 / 0.91, rel=1e-14)
+
+
+def test_a_mesh_of_too_many_triangles_is_refused():
+    """With the key to change; the sizes that are used are far below."""
+    data = basic()
+    data["joint"] |= {"relative_element_size": 1e-4, "growth": 0.01}
+    with pytest.raises(SceneError, match=r"relative_element_size = 0.0001 with growth = 0.01 would make about .e\+06"):
+        parse_scene(data)
+    data["joint"] |= {"growth": 0.25}
+    assert parse_scene(data).joint.expected_cells < 1e6
 
 
 @pytest.mark.parametrize("value", [2, 10**30])
