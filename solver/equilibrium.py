@@ -18,6 +18,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.geometry.fenicsx import create_vector
+from archord.materials.elasticity import elastic_tangent
 from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact import Contact
 from archord.solver.interrupt import Interrupt, Interrupted
@@ -99,7 +100,8 @@ class Equilibrium:
         self._force = create_vector(index_map, 2)
         self._reaction = np.zeros((self.n_owned, 2))
         self._reaction_norm = self._noise = 0.0
-        stiffness = max(body.material.E for body in bulk.bodies)
+        materials = [body.material for body in bulk.bodies]
+        stiffness = max(float(elastic_tangent(m.E, m.nu, m.plane)[0, 0]) for m in materials)
         rate = max(float(np.max(np.abs(s.rate), initial=0.0)) for s in supports)
         rigid = 0.0 if rigid_rate is None else float(np.abs(rigid_rate).max())
         self._stiffest = stiffness * self.comm.allreduce(max(rate, rigid), op=MPI.MAX)
