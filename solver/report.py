@@ -70,7 +70,7 @@ class Report:
         """Replace run.json in one move, so that a reader never sees half of it."""
         self.content |= {"totals": self._totals(), "seconds": self._seconds(), "error_estimates": self._errors()}
         new = self.path.with_suffix(".json.new")
-        new.write_text(json.dumps(self.content, indent=1) + "\n", encoding="utf-8")
+        new.write_text(json.dumps(_finite(self.content), indent=1, allow_nan=False) + "\n", encoding="utf-8")
         os.replace(new, self.path)
 
     def _totals(self) -> dict[str, int]:
@@ -100,6 +100,15 @@ class Report:
             "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / work if work else 0.0,
             "newton_residual": self._residual,
         }
+
+
+def _finite(value: Any) -> Any:
+    """``value`` with null for numbers that are none, which JSON does not know (residuals of a solve that failed)."""
+    if isinstance(value, dict):
+        return {name: _finite(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _versions() -> dict[str, str]:
