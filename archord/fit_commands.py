@@ -23,7 +23,9 @@ def fit(
     ] = None,
     python: Annotated[
         Path | None,
-        typer.Option("--python", metavar="FILE", help="write force(delta) as a module that needs only math"),
+        typer.Option(
+            "--python", metavar="FILE", help="write force and stiffness over delta as a module that needs only math"
+        ),
     ] = None,
 ) -> int:
     """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields."""

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.postprocess.chord_laws import plastic_force, plastic_peak
 from archord.postprocess.least_squares import Estimate, LeastSquares, fit
 from archord.postprocess.refinement import Refined
 from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.winkler import elastic_force, onset, peak_pressure, plastic_force, plastic_peak_pressure
 from archord.solver.scene import SceneError
 
 _STARTS_OF_C = (0.7, 1.0, 1.5, 2.5)  # p0 has a kink at the onset: one start may miss the best side of it
@@ -123,7 +123,7 @@ class _Problem:
     def predict(self, free: tuple[str, ...], values: Array) -> list[Array]:
         """The law for each run; without ``c`` it is elastic, without ``k`` rigid up to the plateau."""
         given = dict(zip(free, values, strict=True))
-        k, c = given.get("k", np.inf), given.get("c")
+        k, c = given.get("k"), given.get("c")
         parts = zip(self.runs, self.chosen, strict=True)
         return [dimensionless_law(self.quantity, run, run.delta[rows], k, c) for run, rows in parts]
 
@@ -158,21 +158,21 @@ class _Problem:
         A falling slope alone is no plateau: that of an elastic p0(delta) falls too.
         """
         return sum(
-            int(((r.delta > onset(k, c, r.E_star, r.R, r.sigY)) & (r.peeq_max > 0))[rows].sum())
+            int(((r.delta > r.joint(k, c).first_yield) & (r.peeq_max > 0))[rows].sum())
             for r, rows in zip(self.runs, self.chosen, strict=True)
             if r.sigY
         )
 
 
-def dimensionless_law(quantity: str, run: RunCurve, delta: Array, k: float, c: float | None) -> Array:
-    """``P/(E* dR)`` or ``p0 R/(E* dR)`` of ``run``'s joint ``(n,)``; elastic if ``c`` or its yield stress is None."""
-    if quantity == "P":
-        elastic = elastic_force(delta, k, run.E_star, run.R, run.dR)
-        plastic = plastic_force(delta, k, c, run.E_star, run.R, run.dR, run.sigY) if c and run.sigY else elastic
-    else:
-        elastic = peak_pressure(delta, k, run.E_star, run.R)
-        plastic = plastic_peak_pressure(delta, k, c, run.E_star, run.R, run.sigY) if c and run.sigY else elastic
-    return plastic / _scale(quantity, run)
+def dimensionless_law(quantity: str, run: RunCurve, delta: Array, k: float | None, c: float | None) -> Array:
+    """``P/(E* dR)`` or ``p0 R/(E* dR)`` of ``run``'s joint ``(n,)``; elastic if ``c`` or its yield stress is None.
+
+    Without ``k`` p0 is at the plateau everywhere.
+    """
+    if k is None:
+        return np.full(delta.shape, (c or np.nan) * (run.sigY or np.nan)) / _scale(quantity, run)
+    law = plastic_force if quantity == "P" else plastic_peak
+    return law(run.joint(k, c), delta) / _scale(quantity, run)
 
 
 def selected(run: RunCurve, load_range: tuple[float, float]) -> Array:

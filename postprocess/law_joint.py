@@ -27,7 +27,8 @@ class LawJoint:
     """A pin of radius ``radius`` (R1) in a hole of radius R2 = R1 + ``clearance``, in any consistent units.
 
     ``E_star`` is the contact modulus of the plane, ``yield_stress`` that of the weaker body, ``k`` Winkler's
-    coefficient (0.85: Hu et al., eq. 6), ``length`` the length of the joint along its axis. ``dundurs_alpha`` =
+    coefficient (0.85: Hu et al., eq. 6), ``c`` the plateau of the pressure over the yield stress (1: Hu et al., eq.
+    10), ``length`` the length of the joint along its axis. ``dundurs_alpha`` =
     (E1' - E2')/(E1' + E2') is positive where the pin is the stiffer body, ``dundurs_beta`` goes with it; both are zero
     for like bodies. Raises `SceneError` for values that make no joint.
     """
@@ -37,13 +38,14 @@ class LawJoint:
     E_star: float
     yield_stress: float | None = None
     k: float = 0.85
+    c: float = 1.0
     length: float | None = None
     dundurs_alpha: float = 0.0
     dundurs_beta: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name in ("radius", "clearance", "E_star", "k", "yield_stress", "length"):
+        for name in ("radius", "clearance", "E_star", "k", "c", "yield_stress", "length"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise SceneError(f"{name} = {value:g} must be a positive number.")
@@ -89,8 +91,13 @@ class LawJoint:
 
     @property
     def first_yield(self) -> float:
-        """Critical displacement ``delta0 = R sigY / (k E*)`` (Hu et al.); infinite without a yield stress."""
-        return math.inf if self.yield_stress is None else self.radius * self.yield_stress / (self.k * self.E_star)
+        """Critical displacement ``delta0 = c sigY R/(k E*)`` (Hu et al.: c = 1); infinite without a yield stress."""
+        return self.radius * self.threshold / (self.k * self.E_star)
+
+    @property
+    def threshold(self) -> float:
+        """Largest pressure of the foundation, ``c sigY``; infinite without a yield stress."""
+        return math.inf if self.yield_stress is None else self.c * self.yield_stress
 
 
 def _transverse(nu: float, plane: Plane) -> float:

@@ -10,7 +10,6 @@ from archord.postprocess.curve_fit import CurveFit, Residual, selected
 from archord.postprocess.least_squares import fit
 from archord.postprocess.refinement import Refined
 from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.winkler import onset
 
 
 def median_pressure(arc: ArcPressure) -> float:
@@ -63,7 +62,7 @@ def fit_plateau(
         run = g.run
         if run.sigY is None or run.folder is None:
             continue
-        wide = run.delta > 4 / 3 * onset(force.k.value, force.c.value, run.E_star, run.R, run.sigY)
+        wide = run.delta > 4 / 3 * run.joint(force.k.value, force.c.value).first_yield
         rows = selected(run, load_range) & wide
         if not rows.any():
             continue

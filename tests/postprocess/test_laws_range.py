@@ -162,6 +162,9 @@ def test_roots_of_rising_functions():
     assert root[:5] == pytest.approx(target[:5] ** (2 / 3), rel=1e-13)
     assert np.isnan(root[5])
     assert root[6] == 0
+    bounded = monotone_root(np.tanh, lambda x: 1 / np.cosh(np.minimum(x, 99.0)) ** 2, np.array([0.5, 2.0]), 1.0)
+    assert bounded[0] == pytest.approx(np.arctanh(0.5), rel=1e-13)
+    assert np.isnan(bounded[1])
     concave = monotone_root(np.log1p, lambda x: 1 / (1 + x), target[:4], 1e-3)
     assert concave == pytest.approx(np.expm1(target[:4]), rel=1e-13)
 
