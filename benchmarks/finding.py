@@ -19,8 +19,9 @@ from archord.benchmarks.finding_variants import CROSSED, ELASTIC, VARIANTS, Vari
 from archord.benchmarks.paper_runs import PLANES, Plane
 from archord.postprocess.calibration import calibrate
 from archord.postprocess.chord_laws import plastic_force
-from archord.postprocess.finding_rows import LOADS, FindingRow, write_rows
-from archord.postprocess.law_joint import LawJoint
+from archord.postprocess.finding_rows import LOADS, FindingRow, read_rows, write_rows
+from archord.postprocess.regime_fit import fit_regimes, row_joint
+from archord.postprocess.regime_law import RegimeFit, to_json
 from archord.postprocess.run_curve import read_run
 from archord.solver.run import solve_scene
 
@@ -58,39 +59,59 @@ def solve(variant: Variant, plane: Plane, element_size: float) -> FindingRow | s
 
 def _entries(row: FindingRow) -> list[str]:
     """The entries below `HEADINGS`."""
-    joint = LawJoint(1.0, row.clearance, 1.0, yield_stress=row.s * row.clearance)
-    law, force = float(plastic_force(joint, np.array(2 * row.clearance))), row.P[-1] * row.clearance
+    law = float(plastic_force(row_joint(row, 0.85, 1.0), np.array(2 * row.clearance)))
+    force, peak = row.P[-1] * row.clearance, "-" if math.isinf(row.s) else f"{row.p0_over_sigY:.3f}"
     c = "-" if math.isnan(row.c) else f"{row.c:.3f} ± {row.c_error:.3f}"
     plateau = "-" if math.isnan(row.plateau) else f"{row.plateau:.3f}"
-    numbers = [f"{force:.6f}", f"{force / law:.3f}", f"{row.p0_over_sigY:.3f}", f"{row.k:.3f} ± {row.k_error:.3f}", c]
+    numbers = [f"{force:.6f}", f"{force / law:.3f}", peak, f"{row.k:.3f} ± {row.k_error:.3f}", c]
     return [row.joint, row.plane, *numbers, f"{row.r2:.4f}", plateau]
+
+
+def _laws(rows: list[FindingRow]) -> tuple[RegimeFit, ...]:
+    """Print how the regime law is fitted, and how good it is."""
+    fits = fit_regimes(rows)
+    print("\n| plane | yields | joints | k off by | c off by | P off by, 0.5 to 2 dR | rms | 0.1 to 0.4 dR |")
+    print("|" + "---|" * 8)
+    for f in fits:
+        errors = (f.k_error, f.c_error, f.P_error, f.P_rms, f.P_early)
+        print(f"| {f.plane} | {f.yielding} | {f.rows} | {' | '.join(f'{error:.1%}' for error in errors)} |")
+    return fits
 
 
 def main() -> None:
     """Solve all variants in both planes, ranks side by side, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--element-size", type=float, default=0.04, help="on the arcs, over R [0.04]")
-    parser.add_argument("--csv", type=Path, help="write all rows into this file as well (postprocess/finding.csv)")
+    parser.add_argument("--rows", type=Path, help="take the rows of this file (postprocess/finding.csv), solve nothing")
+    parser.add_argument("--csv", type=Path, help="write all rows into this file as well")
+    parser.add_argument("--json", type=Path, help="write the coefficients of the regime law into this file")
     arguments = parser.parse_args()
-    comm = MPI.COMM_WORLD
-    jobs = [(variant, plane) for plane in PLANES for variant in (*VARIANTS, *ELASTIC, *CROSSED)]
-    mine = {i: solve(*jobs[i], arguments.element_size) for i in range(comm.rank, len(jobs), comm.size)}
-    gathered = comm.gather(mine)
-    if gathered is None:
+    rows = read_rows(arguments.rows) if arguments.rows else _solve_all(arguments.element_size)
+    if MPI.COMM_WORLD.rank > 0:
         return
-    found = {i: result for part in gathered for i, result in part.items()}
-    for i in sorted(found):
-        if isinstance(found[i], str):
-            print(f"{jobs[i][0].name}, plane {jobs[i][1]}: {found[i]}")
-    rows = [row for _, row in sorted(found.items()) if isinstance(row, FindingRow)]
     if arguments.csv:
         write_rows(rows, arguments.csv)
-    shown = {variant.name for variant in VARIANTS}
+    shown = {variant.name for variant in (*VARIANTS, *ELASTIC)}
     print("| " + " | ".join(HEADINGS) + " |")
     print("|" + "---|" * len(HEADINGS))
     for row in rows:
         if row.joint in shown:
             print("| " + " | ".join(_entries(row)) + " |")
+    fits = _laws(rows)
+    if arguments.json:
+        arguments.json.write_text(to_json(fits), encoding="utf-8")
+
+
+def _solve_all(element_size: float) -> list[FindingRow]:
+    """The rows of all variants in both planes, on the first rank; collective."""
+    comm = MPI.COMM_WORLD
+    jobs = [(variant, plane) for plane in PLANES for variant in (*VARIANTS, *ELASTIC, *CROSSED)]
+    mine = {i: solve(*jobs[i], element_size) for i in range(comm.rank, len(jobs), comm.size)}
+    found = {i: result for part in comm.gather(mine) or [] for i, result in part.items()}
+    for i, result in sorted(found.items()):
+        if isinstance(result, str):
+            print(f"{jobs[i][0].name}, plane {jobs[i][1]}: {result}")
+    return [row for _, row in sorted(found.items()) if isinstance(row, FindingRow)]
 
 
 if __name__ == "__main__":
