@@ -39,7 +39,7 @@ def test_k_and_c_of_every_row_are_those_of_its_curve():
             return plastic_force(LawJoint(1.0, row.clearance, 1.0, yields, k=k, c=c), x) / row.clearance
 
         start = [0.9 * row.k] if math.isnan(row.c) else [0.9 * row.k, 1.1 * row.c]
-        found, _ = curve_fit(law, delta, row.P, p0=start, ftol=1e-14, xtol=1e-14)
+        found, _ = curve_fit(law, delta, row.P, p0=start, bounds=(0, np.inf), ftol=1e-14, xtol=1e-14)
         assert found == pytest.approx([row.k, row.c][: len(start)], rel=1e-5), row.joint
 
 
