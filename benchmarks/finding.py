@@ -73,8 +73,9 @@ def _laws(rows: list[FindingRow]) -> tuple[RegimeFit, ...]:
     print("\n| plane | yields | joints | k off by | c off by | P off by, 0.5 to 2 dR | rms | 0.1 to 0.4 dR |")
     print("|" + "---|" * 8)
     for f in fits:
-        errors = (f.k_error, f.c_error, f.P_error, f.P_rms, f.P_early)
-        print(f"| {f.plane} | {f.yielding} | {f.rows} | {' | '.join(f'{error:.1%}' for error in errors)} |")
+        errors = (f.k_error, f.c_error if f.ln_c else None, f.P_error, f.P_rms, f.P_early)
+        words = ["-" if error is None else f"{error:.1%}" for error in errors]
+        print(f"| {f.plane} | {f.yielding} | {f.rows} | {' | '.join(words)} |")
     return fits
 
 
