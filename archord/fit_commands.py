@@ -16,6 +16,9 @@ def fit(
         typer.Option("--range", help="steps to fit: delta from ... to ..., in clearances [all]"),
     ] = None,
     confidence: Annotated[float, typer.Option("--confidence", help="level of the confidence intervals")] = 0.95,
+    hold_k: Annotated[
+        float | None, typer.Option("--hold-k", metavar="VALUE", help="hold k, e.g. at that of an elastic run, fit c")
+    ] = None,
     residuals: Annotated[bool, typer.Option("--residuals", help="print the residual of every step")] = False,
     json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write law, fits, residuals")] = None,
     picture: Annotated[
@@ -23,7 +26,9 @@ def fit(
     ] = None,
     python: Annotated[
         Path | None,
-        typer.Option("--python", metavar="FILE", help="write force(delta) as a module that needs only math"),
+        typer.Option(
+            "--python", metavar="FILE", help="write force and stiffness over delta as a module that needs only math"
+        ),
     ] = None,
 ) -> int:
     """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields."""
@@ -35,7 +40,8 @@ def fit(
     from archord.postprocess.calibration import calibrate
     from archord.postprocess.run_curve import read_run
 
-    calibration = calibrate([read_run(folder) for folder in folders], load_range or (0.0, math.inf), confidence)
+    runs = [read_run(folder) for folder in folders]
+    calibration = calibrate(runs, load_range or (0.0, math.inf), confidence, hold_k)
     law = calibration.law()
     # checked and written before anything is printed: a file that cannot be written is one sentence alone
     files = [file for file in (json_file, python, picture) if file]
@@ -59,7 +65,8 @@ def fit(
         print(note)
     threshold = "" if law.c is None else f", c = {law.c:.5f}"
     low, high = law.fitted_range
-    print(f"law: k = {law.k:.5f}{threshold}, from P(delta), delta = {low:g} to {high:g} dR")
+    held = "" if hold_k is None else " (held)"
+    print(f"law: k = {law.k:.5f}{held}{threshold}, from P(delta), delta = {low:g} to {high:g} dR")
     for file in files:
         print(file)
     return 0

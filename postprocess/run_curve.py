@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.postprocess.law_joint import LawJoint
 from archord.solver.history import read_history
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import load_scene
@@ -46,6 +47,10 @@ class RunCurve:
         """Yield stress of the weaker body; None if neither yields."""
         given = [s.yield_stress for s in (self.scene.pin, self.scene.block) if s.yield_stress is not None]
         return min(given, default=None)
+
+    def joint(self, k: float, c: float | None = None) -> LawJoint:
+        """The joint with these coefficients; elastic without ``c``."""
+        return LawJoint(self.R, self.dR, self.E_star, self.sigY if c else None, k=k, c=c or 1.0)
 
     @property
     def plane(self) -> str:
