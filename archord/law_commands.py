@@ -167,4 +167,7 @@ def _console() -> Any:
     """A console as wide as its text where nobody watches, so that pipes get whole rows."""
     from rich.console import Console
 
-    return Console(highlight=False, width=None if sys.stdout.isatty() else 160)
+    from archord.ranks import on_terminal
+
+    watched = on_terminal()
+    return Console(highlight=False, width=None if watched else 160, force_terminal=watched)

@@ -70,6 +70,8 @@ def read_run(folder: str | Path) -> RunCurve:
         delta, P, p0, eps, peeq = [np.array(history[name]) for name in ("delta", "P", "p0", "eps", "peeq_max")]
     except (ValueError, IndexError, KeyError, OSError):
         raise SceneError(f"{folder / 'history.csv'}: cannot be read as the history of a run.") from None
+    if not np.isfinite([delta, P, p0, eps, peeq]).all():
+        raise SceneError(f"{folder / 'history.csv'}: holds numbers that are not finite.")
     if not len(delta):
         raise SceneError(f"{folder}: holds no accepted step.")
     return RunCurve(str(folder), scene, delta, P, p0, eps, peeq, folder)
