@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import platform
 import sys
 from dataclasses import asdict
@@ -17,6 +16,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.solver.contact_profile import ArcProfile
+from archord.solver.disk import replace_text
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures
 from archord.solver.stepping import Step
@@ -64,11 +64,9 @@ class Report:
         self.write()
 
     def write(self) -> None:
-        """Replace run.json in one move, so that a reader never sees half of it."""
+        """Replace run.json in one move, so that a reader never sees half of it. Raises `OSError`."""
         self.content |= {"totals": self._totals(), "seconds": self._seconds(), "error_estimates": self._errors()}
-        new = self.path.with_suffix(".json.new")
-        new.write_text(json.dumps(self.content, indent=1) + "\n", encoding="utf-8")
-        os.replace(new, self.path)
+        replace_text(self.path, json.dumps(self.content, indent=1) + "\n")
 
     def _totals(self) -> dict[str, int]:
         counts = self.joint.timer.counts

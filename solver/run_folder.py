@@ -5,9 +5,18 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from archord.solver.disk import new_name
 from archord.solver.scene import SceneError
 
 FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
+CHECKPOINT = "checkpoint.h5"
+
+
+def clear(folder: Path) -> None:
+    """Remove an old run's files, and what a kill left half done of them. Raises `OSError`."""
+    for name in (CHECKPOINT, *FILES):
+        (folder / name).unlink(missing_ok=True)
+        new_name(folder / name).unlink(missing_ok=True)
 
 
 def claim_folder(folder: Path, force: bool) -> None:
