@@ -134,5 +134,5 @@ def _arrays(state) -> Arrays:
 def _used(state) -> np.ndarray:
     """Which points ``(n,)`` are not what they were at the beginning."""
     virgin = _arrays(type(state).virgin(len(state.peeq)))
-    changed = [(v != virgin[name]).reshape(len(v), -1).any(axis=1) for name, v in _arrays(state).items()]
+    changed = [(v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in _arrays(state).items()]
     return np.logical_or.reduce(changed)
