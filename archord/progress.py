@@ -8,28 +8,38 @@ import sys
 from contextlib import nullcontext
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from archord.solver.scene import Scene, SceneError
 
+if TYPE_CHECKING:
+    from archord.solver.restart import Plan
 
-def solve_with_progress(scene: Scene, folder: Path, *, force: bool, quiet: bool, begun: float) -> int:
-    """Solve ``scene`` into ``folder`` on all ranks of MPI_COMM_WORLD and report; returns the exit code."""
+
+def solve_with_progress(
+    scene: Scene, folder: Path, *, force: bool, quiet: bool, begun: float, plan: Plan | None = None
+) -> int:
+    """Solve ``scene`` into ``folder`` on all ranks of MPI_COMM_WORLD and report; returns the exit code.
+
+    A ``plan``, the same on all ranks but for its start, which rank 0 has, continues the run in ``folder``.
+    """
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
-    _claim(comm, folder, force)
+    _claim(comm, folder, force or plan is not None)
     from archord.solver.run import solve_scene
     from archord.solver.timer import Timer
 
     timer = Timer()
     timer.seconds["start-up"] = perf_counter() - begun
-    report = _Progress(scene, silent=quiet or comm.rank != 0)
+    start = plan.start if plan else None
+    report = _Progress(scene, silent=quiet or comm.rank != 0, done=start.checkpoint.step if start else 0)
     with report:
         outcome = solve_scene(
             scene,
             folder,
             comm,
+            start=start,
             timer=timer,
             begun=begun,
             on_start=report.start,
@@ -86,7 +96,7 @@ def _on_terminal() -> bool:
 class _Progress:
     """Reports steps as they are accepted."""
 
-    def __init__(self, scene: Scene, silent: bool) -> None:
+    def __init__(self, scene: Scene, silent: bool, done: int = 0) -> None:
         self.scene, self.silent = scene, silent
         self._bar: Any = nullcontext()
         self._task: Any = None
@@ -100,7 +110,7 @@ class _Progress:
                 TextColumn("{task.description}"),
                 TimeElapsedColumn(),
             )
-            self._task = self._bar.add_task("meshing", total=scene.load.steps)
+            self._task = self._bar.add_task("meshing", total=len(scene.targets), completed=done)
 
     def __enter__(self) -> _Progress:
         self._bar.__enter__()
@@ -126,7 +136,8 @@ class _Progress:
     def attempt(self, load: float, iterations: int) -> None:
         """Show a solve that ended."""
         if self._task is not None:
-            self._bar.update(self._task, description=f"load {load / self.scene.target:.4g}, {iterations} iterations")
+            name = "P" if self.scene.force_controlled else "delta"
+            self._bar.update(self._task, description=f"{name} = {load:.6g}, {iterations} iterations")
 
     def step(self, m) -> None:
         """Show an accepted output step."""

@@ -81,9 +81,9 @@ def run_calculix(
     seconds = perf_counter() - start
     printed = read_printed((folder / "joint.dat").read_text()) if (folder / "joint.dat").exists() else []
     pin, block = (step_forces(printed, name, thick) for name in (loaded_nodes(scene), "BLOCK_HELD"))
-    if len(pin) != scene.load.steps:
+    if len(pin) != len(scene.targets):
         errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
-        raise RuntimeError("; ".join([f"CalculiX ended after step {len(pin)} of {scene.load.steps}", *errors]))
+        raise RuntimeError("; ".join([f"CalculiX ended after step {len(pin)} of {len(scene.targets)}", *errors]))
     pressure = read_contact_pressure((folder / "joint.frd").read_text(), len(mesh.x))
     largest, integral = plastic_strain(printed, mesh)
     return SecondOpinion(

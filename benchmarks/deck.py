@@ -100,10 +100,10 @@ def _model_lines(scene: Scene, thick: float) -> Iterator[str]:
 
 
 def _step_lines(scene: Scene) -> Iterator[str]:
-    loaded, n = loaded_nodes(scene), scene.load.steps
-    for k in range(1, n + 1):
+    loaded, n = loaded_nodes(scene), len(scene.targets)
+    for k, target in enumerate(scene.targets, start=1):
         yield from ("*STEP, INC=1000", "*STATIC", "1., 1.", "*BOUNDARY")
-        yield f"{loaded}, 2, 2, {_number(-scene.target * k / n)}"
+        yield f"{loaded}, 2, 2, {_number(-target)}"
         for support in (loaded, "BLOCK_HELD"):
             yield from (f"*NODE PRINT, NSET={support}, TOTALS=ONLY", "RF")
         if k == n:

@@ -164,7 +164,7 @@ class Curve:
 
 
 class RigidCircle:
-    """A rigid disc of the given centre and radius, as an opposite curve without nodes."""
+    """A rigid disc of the given centre and radius, as an opposite curve with one node that moves all of it."""
 
     def __init__(self, centre: Array, radius: float) -> None:
         self.centre = np.asarray(centre, dtype=float)
@@ -175,7 +175,6 @@ class RigidCircle:
         m = len(x)
         ray = x - self.centre - displacement
         normal = ray / np.linalg.norm(ray, axis=1)[:, None]
-        none = np.zeros((m, 0))
         return Projection(
             found=(normal * outward).sum(1) < 0,
             point=x - ray + self.radius * normal,
@@ -183,9 +182,9 @@ class RigidCircle:
             tangent=np.stack([-normal[:, 1], normal[:, 0]], axis=1),
             bend=np.full(m, -1.0 / self.radius),
             slides=np.ones(m, dtype=bool),
-            nodes=none.astype(np.int64),
-            shape=none,
-            slope=none,
+            nodes=np.zeros((m, 1), dtype=np.int64),
+            shape=np.ones((m, 1)),
+            slope=np.zeros((m, 1)),
             facet=np.zeros(m, dtype=np.int64),
             xi=np.zeros(m),
         )

@@ -56,5 +56,6 @@ def _without_mesh(scene: Scene) -> tuple:
     joint = scene.joint
     sizes = (joint.radius, joint.dR / joint.radius, joint.W / joint.radius, joint.growth, scene.target)
     rounded = tuple(float(f"{size:.9g}") for size in sizes)
-    return (*rounded, scene.load.steps, scene.pin.model_dump_json(), scene.block.model_dump_json(),
+    return (*rounded, tuple(scene.load.leg_steps), tuple(scene.load.legs),
+            scene.pin.model_dump_json(), scene.block.model_dump_json(),
             scene.analysis.plane, scene.analysis.kinematics, scene.analysis.integration)  # fmt: skip

@@ -150,10 +150,10 @@ class Bulk:
             self._sigma = fem.Function(fem.functionspace(V.mesh, element[(3,)]))
             self._tangent = fem.Function(fem.functionspace(V.mesh, element[(3, 3)]))
             domain = [(1, np.sort(np.concatenate([p.cells for p in self._plastic.values()])))]
-            dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)
-            self._force_forms.append(fem.form(ufl.inner(self._sigma, _voigt(v)) * dx(1)))
-            tangent = ufl.inner(ufl.dot(self._tangent, _voigt(u)), _voigt(v))
-            self._plastic_forms.append(fem.form(tangent * dx(1)))
+            self._plastic_dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
+            self._force_forms.append(fem.form(ufl.inner(self._sigma, _voigt(v)) * self._plastic_dx))
+            self._plastic_forms.append(fem.form(self._plastic_tangent(u, v)))
+        self._action_form: fem.Form | None = None
         self.stiffness = None
         if self._elastic_forms:
             self.stiffness = matrix(V, self._elastic_forms)
@@ -196,6 +196,21 @@ class Bulk:
             with force.localForm() as local:
                 fem_petsc.assemble_vector(local, form)
         force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
+    def add_action(self, direction: fem.Function, out: PETSc.Vec) -> None:
+        """Add the tangent of the last `update`, applied to the displacement ``direction``, to ``out``."""
+        if self.stiffness is not None:
+            self.stiffness.multAdd(direction.x.petsc_vec, out, out)
+        if self._plastic and self._action_form is None:
+            u, v = direction, ufl.TestFunction(self.V)
+            self._action_form = fem.form(self._plastic_tangent(u, v))
+        if self._action_form is not None:
+            with out.localForm() as local:
+                fem_petsc.assemble_vector(local, self._action_form)
+        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
+    def _plastic_tangent(self, u, v) -> ufl.Form:
+        return ufl.inner(ufl.dot(self._tangent, _voigt(u)), _voigt(v)) * self._plastic_dx
 
     def assemble_elastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
         """Add the stiffness of the elastic bodies to ``A``."""

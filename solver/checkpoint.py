@@ -19,7 +19,7 @@ import h5py
 
 import archord
 from archord.geometry.basis import Array
-from archord.solver.disk import on_root, replace_file
+from archord.solver.disk import replace_file
 from archord.solver.mesh_order import Arrays, MeshOrder
 from archord.solver.scene import SceneError
 
@@ -118,8 +118,3 @@ def read(path: Path) -> Checkpoint:
         fields = {name: values[()] for name, values in file["fields"].items()}
         mesh = file.attrs["mesh"]
     return Checkpoint(facts["step"], facts["scene"], mesh, fields, history, facts["scalars"], facts["archord"])
-
-
-def write_together(order: MeshOrder, path: Path, checkpoint: Checkpoint) -> None:
-    """`write` on rank 0. Collective; raises `WriteError` on every rank."""
-    on_root(order.joint.comm, lambda: write(path, checkpoint))

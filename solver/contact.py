@@ -73,6 +73,7 @@ class Contact:
         self.sides = sides
         self.kinematics = kinematics
         self.rigid_motion = np.zeros(2)
+        self.flips = 0  # points of this rank that opened or closed at the last evaluation
         self.comm = sides[0].comm
         opposites: list = [rigid] if rigid is not None else [sides[1], sides[0]]
         chosen = range(len(sides)) if one_sided is None else [one_sided]
@@ -106,10 +107,12 @@ class Contact:
         on every rank if a point on any of them finds no partner.
         """
         motions = [pair.opposite_motion(u, self.rigid_motion) for pair in self.pairings]
-        failure = None
+        failure, self.flips = None, 0
         for pair, motion in zip(self.pairings, motions, strict=True):
             try:
+                before = pair.active
                 pair.evaluate(u, motion)
+                self.flips += int((before != pair.active).sum())
             except ProjectionError as error:
                 failure = str(error)
                 break

@@ -39,6 +39,7 @@ class Pairing:
         x, outward = self.side.point.reshape(-1, 2), self.side.outward.reshape(-1, 2)
         self.projection = self.curve.closest_point(x, outward, self.opposite_motion(None))
         self.separation = x - self.projection.point
+        self.pressure = np.zeros(len(x))
 
     @property
     def curve(self) -> Curve | RigidCircle:

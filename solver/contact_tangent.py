@@ -28,7 +28,7 @@ class _Basis(NamedTuple):
 def entries(pair: Pairing) -> tuple[np.ndarray, np.ndarray, Array]:
     """Derivative of the residual: blocks ``(n, 2, 2)`` at ``rows`` and ``columns`` ``(n,)`` in global block dofs.
 
-    Returns ``(rows, columns, blocks)``.
+    A rigid opposite is the block dof behind the last. Returns ``(rows, columns, blocks)``.
     """
     on = np.flatnonzero(pair.active)
     side, P = pair.side, pair.projection
@@ -45,9 +45,10 @@ def entries(pair: Pairing) -> tuple[np.ndarray, np.ndarray, Array]:
     block = _tied(pair, on, basis) if pair.kinematics == "tied" else _pressed(pair, on, basis)
     block *= -(pair.share * side.weight.ravel()[on])[:, None, None, None, None]
 
-    opposite = np.zeros((len(on), 0), dtype=np.int64)
     if isinstance(pair.opposite, ContactSide):
         opposite = pair.opposite.curve_dofs[P.nodes[on]]
+    else:
+        opposite = np.full((len(on), 1), side.V.dofmap.index_map.size_global)
     own_rows = np.take_along_axis(side.cell_global[facet], side.trace[facet], axis=1)
     rows = np.concatenate([own_rows, opposite], axis=1)
     columns = np.concatenate([side.cell_global[facet], opposite], axis=1)

@@ -79,7 +79,9 @@ class FieldWriter:
         return share, pressure
 
     def _write_xdmf(self, file: StepFile) -> None:
-        grids = [self._grid(file.shapes, k, load) for k, load in enumerate(file.loads, start=1)]
+        scene = self.joint.scene
+        times = file.loads if scene.monotonic and not scene.force_controlled else range(1, file.accepted + 1)
+        grids = [self._grid(file.shapes, k, float(time)) for k, time in enumerate(times, start=1)]
         text = (
             '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
             '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
@@ -88,12 +90,12 @@ class FieldWriter:
         )
         replace_text(self.path, text)
 
-    def _grid(self, shapes: Shapes, step: int, load: float) -> str:
+    def _grid(self, shapes: Shapes, step: int, time: float) -> str:
         n_nodes, n_cells = shapes["displacement"][0][0], shapes["von_mises"][0][0]
         at = step_name(step)
         cell = "".join(_attribute(n, "Scalar", "Cell", f"{n_cells}", f"{n}/{at}") for n in self.names)
         return (
-            f'<Grid Name="{escape(f"step {step}")}" GridType="Uniform">\n<Time Value="{load!r}"/>\n'
+            f'<Grid Name="{escape(f"step {step}")}" GridType="Uniform">\n<Time Value="{time!r}"/>\n'
             f'<Topology TopologyType="Triangle_6" NumberOfElements="{n_cells}">'
             f"{_data(f'{n_cells} 6', 'mesh/cells', 'Int', 8)}</Topology>\n"
             f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", "mesh/coordinates")}</Geometry>\n'

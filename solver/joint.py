@@ -59,7 +59,9 @@ class Joint:
                 self._supports(),
                 self.contact,
                 None if rigid is None else np.array([0.0, -1.0]),
-                applied=self._core_force() if scene.force_controlled else None,
+                applied=self._core_force() if geometry.model == "ring" else None,
+                by_force=0.5 if scene.force_controlled and geometry.model == "block" else None,
+                load_name="P" if scene.force_controlled else "delta",
                 tolerance=analysis.tolerance,
                 max_iterations=analysis.max_iterations,
                 timer=self.timer,
@@ -90,7 +92,7 @@ class Joint:
             Support("block", 0, self._nodes(Facets.BLOCK_HELD)),
             Support("block", 1, self._nodes(Facets.BLOCK_HELD)),
         ]
-        if not (self.scene.pin.rigid or self.scene.force_controlled):
+        if not self.scene.pin.rigid and self.scene.joint.model == "block":
             supports.append(Support("pin", 1, self._nodes(Facets.PIN_TOP), -1.0))
         return supports
 
@@ -98,21 +100,23 @@ class Joint:
         return fem.locate_dofs_topological(self.V, 1, self.model.facets.find(tag))
 
     def rigid_translation(self, load: float) -> Array:
-        """A first guess: nodal displacements ``(n, 2)`` of this rank with the pin moved down, the block at rest.
+        """A first guess of the state of the equilibrium: the pin moved down, the block at rest.
 
         By the load, if that is a displacement; by about what a force would press it, if the load is one.
         """
         scene = self.scene
+        shift = load / scene.E_star if scene.force_controlled else load
+        if scene.joint.model == "ring":
+            shift += max(scene.joint.dR, 0.0)
         u = np.zeros((self.equilibrium.n_local, 2))
         if not scene.pin.rigid:
-            shift = max(scene.joint.dR, 0.0) + load / scene.E_star if scene.force_controlled else load
             u[np.unique(self.V.dofmap.list[self.model.cells.find(Cells.PIN)]), 1] = -shift
-        return u
+        return np.append(u, shift)
 
     def delta(self) -> float:
-        """Displacement of the pin from first touch: prescribed, or the mean over the core where the force acts."""
-        if not self.scene.force_controlled:
-            return self.equilibrium.load
+        """Displacement of the pin from first touch: of its diameter, or in a ring the mean over the core."""
+        if self.scene.joint.model == "block":
+            return self.equilibrium.level
         u = self.equilibrium.displacement()[: self.equilibrium.n_owned]
         return self.comm.allreduce(-float((self._core * u).sum())) - max(self.scene.joint.dR, 0.0)
 
@@ -120,10 +124,8 @@ class Joint:
         """Downward force of the whole joint at pin, contact and block's support, per unit thickness."""
         contact = -2 * self.contact.resultant()[1]
         block = 2 * self.equilibrium.reaction("block")[1]
-        if self.scene.force_controlled:
-            pin = self.equilibrium.load
-        else:
-            pin = contact if self.scene.pin.rigid else -2 * self.equilibrium.reaction("pin")[1]
+        ring = self.scene.joint.model == "ring"
+        pin = self.equilibrium.load if ring else 2 * self.equilibrium.force_on_level()
         return {"pin": pin, "contact": contact, "block": block}
 
     @property

@@ -19,7 +19,7 @@ class Measures:
     ``contact_area`` is the arc length in contact, the mean of both sides; ``peeq_max`` the largest value at a
     quadrature point, which grows without bound under mesh refinement where perfect plasticity localises. ``work`` is
     the integral of ``P`` over ``delta`` by the trapezoidal rule. ``force_balance`` is the largest difference between
-    the forces at pin, contact and block, over ``P``.
+    the forces at pin, contact and block, over the largest ``P`` so far.
     """
 
     step: int
@@ -62,9 +62,15 @@ def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
 
 
 def measure(
-    joint: Joint, number: int, step: Step, profiles: dict[str, ArcProfile], work: Work, seconds: float
+    joint: Joint,
+    number: int,
+    step: Step,
+    profiles: dict[str, ArcProfile],
+    work: Work,
+    seconds: float,
+    largest_force: float = 0.0,
 ) -> Measures:
-    """Sum up the last accepted state of ``joint``. Collective."""
+    """Sum up the last accepted state of ``joint``; ``largest_force`` is that of the steps before. Collective."""
     comm, arcs = joint.comm, list(profiles.values())
     u = joint.equilibrium.displacement()
     largest, integral = joint.bulk.peeq()
@@ -73,6 +79,7 @@ def measure(
     comm.Allreduce(MPI.IN_PLACE, total)
     forces = joint.forces()
     P = forces["pin"]
+    scale = max(abs(P), largest_force)
     eps = float(np.mean([semi_angle(p) for p in arcs]))
     return Measures(
         step=number,
@@ -86,7 +93,7 @@ def measure(
         elastic_energy=2 * total[1],
         plastic_dissipation=2 * total[2],
         work=work.total,
-        force_balance=max(abs(f - P) for f in forces.values()) / abs(P),
+        force_balance=max(abs(f - P) for f in forces.values()) / scale if scale else 0.0,
         iterations=step.iterations,
         cutbacks=step.cutbacks,
         seconds=seconds,

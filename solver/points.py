@@ -48,6 +48,10 @@ class PlasticPoints:
         stress, tangent, self.trial = material.return_map(strain, self.state)
         return stress, tangent
 
+    def increment(self) -> float:
+        """Largest increment of PEEQ from the committed history to the last strain seen."""
+        return float((self.trial.peeq - self.state.peeq).max(initial=0.0))
+
     def commit(self) -> None:
         """Make the history of the last strain seen the committed one."""
         self.state = self.trial

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import math
 import platform
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -27,11 +27,22 @@ _FEW_FACETS = 5
 
 
 class Report:
-    """The content of run.json for ``joint``; ``begun`` is the ``perf_counter`` from which the seconds count."""
+    """The content of run.json for ``joint``; ``begun`` is the ``perf_counter`` from which the seconds count.
 
-    def __init__(self, path: Path, joint: Joint, begun: float) -> None:
+    A run that goes on has the steps ``done`` behind it, and ``before`` is its run.json.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        joint: Joint,
+        begun: float,
+        done: Sequence[Measures] = (),
+        before: dict[str, Any] | None = None,
+    ) -> None:
         self.path, self.joint, self.begun = path, joint, begun
-        self.measures: list[Measures] = []
+        self.measures = list(done)
+        self._residual = 0.0
         self.content: dict[str, Any] = {
             "status": "running",
             "message": "",
@@ -45,15 +56,35 @@ class Report:
                 "newton": joint.equilibrium.tolerance,
                 "gamma_factor": joint.scene.analysis.gamma_factor,
             },
+            "restarts": [],
             "warnings": [],
             "steps": [],
+        }
+        self._before: dict[str, Any] = before or {}
+        if before is not None:
+            self._go_on(before, len(self.measures))
+
+    def _go_on(self, before: dict[str, Any], done: int) -> None:
+        """Take over what the run's earlier processes noted, and note this one."""
+        now, steps = self.content["started"], before["steps"][:done]
+        restart = {"when": now, "after_step": done + 1, "ranks": self.joint.comm.size, "command": sys.argv}
+        self._residual = max((r[-1][-1] for step in steps if (r := step["residuals"]) and r[-1]), default=0.0)
+        self.content |= {
+            "started": before["started"],
+            "command": before["command"],
+            "restarts": [*before.get("restarts", []), restart],
+            "warnings": [w for w in before["warnings"] if _step_of(w) <= done],
+            "steps": steps,
         }
 
     def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
         """Note an accepted output step."""
         self.measures.append(m)
-        self.content["warnings"] += _warnings(self.joint, profiles, m, step.residuals[-1][-1])
-        self.content["steps"].append(asdict(m) | {"substeps": step.substeps, "residuals": step.residuals})
+        self._residual = max(self._residual, step.residual)
+        self.content["warnings"] += _warnings(self.joint, profiles, m, step.residual)
+        self.content["steps"].append(
+            asdict(m) | {"substeps": step.substeps, "residuals": [a.residuals for a in step.attempts]}
+        )
         self.write()
 
     def finish(self, status: str, message: str, failed: Step | None = None) -> None:
@@ -69,12 +100,12 @@ class Report:
         replace_text(self.path, json.dumps(self.content, indent=1) + "\n")
 
     def _totals(self) -> dict[str, int]:
-        counts = self.joint.timer.counts
+        counts, before = self.joint.timer.counts, self._before.get("totals", {})
         return {
             "newton_iterations": sum(m.iterations for m in self.measures),
             "cutbacks": sum(m.cutbacks for m in self.measures),
-            "factorisations": counts.get("assemble bulk", 0),
-            "residual_evaluations": counts.get("return mapping", 0),
+            "factorisations": counts.get("assemble bulk", 0) + before.get("factorisations", 0),
+            "residual_evaluations": counts.get("return mapping", 0) + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.measures),
         }
 
@@ -83,17 +114,25 @@ class Report:
         if "solve" in s:
             s["linear solve"] = s.pop("solve") - sum(s.get(name, 0.0) for name in _INSIDE_SOLVE)
         s["total"] = perf_counter() - self.begun
+        for name, value in self._before.get("seconds", {}).items():
+            s[name] = s.get(name, 0.0) + value
         return {name: round(value, 4) for name, value in s.items()}
 
     def _errors(self) -> dict[str, float]:
         if not self.measures:
             return {}
         m = self.measures[-1]
+        work = max(abs(m.work) for m in self.measures)
         return {
             "force_balance": max(m.force_balance for m in self.measures),
-            "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / m.work if m.work else math.nan,
-            "newton_residual": max(s["residuals"][-1][-1] for s in self.content["steps"]),
+            "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / work if work else 0.0,
+            "newton_residual": self._residual,
         }
+
+
+def _step_of(warning: str) -> int:
+    """The step that a warning is about."""
+    return int(warning.removeprefix("step ").partition(":")[0])
 
 
 def _versions() -> dict[str, str]:
@@ -141,11 +180,11 @@ def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residu
     if joint.scene.joint.model == "block" and any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc")
     touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
-    if touching < _FEW_FACETS:
+    if m.P and touching < _FEW_FACETS:
         said.append(
             f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
         )
-    if m.delta > 0.1 * joint.scene.joint.radius:
+    if abs(m.delta) > 0.1 * joint.scene.joint.radius:
         said.append("delta exceeds 0.1 R, too much for small-strain theory")
     if residual > 1e-8:
         said.append(f"round-off limits the residual to {residual:.1e} of the reaction")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from archord.solver.disk import new_name
@@ -17,6 +20,22 @@ def clear(folder: Path) -> None:
     for name in (CHECKPOINT, *FILES):
         (folder / name).unlink(missing_ok=True)
         new_name(folder / name).unlink(missing_ok=True)
+
+
+@contextmanager
+def occupied(folder: Path) -> Iterator[None]:
+    """Keep other processes from writing to ``folder``; a kill ends that, too. Raises `SceneError` if one does."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise SceneError(f"{folder}: another archord is solving into it.") from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def claim_folder(folder: Path, force: bool) -> None:

@@ -6,6 +6,7 @@ Any consistent set of units will do; ``[units]`` only names them. Where a key ha
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -183,34 +184,46 @@ class Analysis(_Section):
     gamma_factor: float = _key(
         "Nitsche's gamma over the trace constant of each contact cell; coercive above 0.25",
         default=0.5,
-        gt=0.25,
-        le=1000,
+        ge=1e-3,
+        le=1e6,
     )
     tolerance: float = _key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
     max_iterations: int = _key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
 
 
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
+Targets = float | Annotated[list[float], Field(min_length=1, max_length=100_000)]
+Steps = Annotated[int, Field(ge=1, le=100_000)]
 
 
 class Load(_Section):
-    """The displacement of the pin, from first touch, or the force on it, in equal output steps."""
+    """The displacement of the pin, from first touch, or the force on it: a ramp to a target, or to several in turn."""
 
-    displacement: Positive | None = _key(
-        "largest displacement delta of the pin, in clearances dR; at most R/2", default=None, example=2.0
-    )
-    displacement_absolute: Positive | None = _key(
-        "largest displacement delta of the pin, instead of displacement", "length", default=None
-    )
-    force: Positive | None = _key(
-        "largest force P on the whole pin per unit thickness, instead of a displacement; for a ring",
-        "force",
+    displacement: Targets | None = _key(
+        "displacement delta of the pin, in clearances dR, at most R/2: the target, or a list of targets in turn",
         default=None,
+        example=2.0,
     )
-    relative_force: Positive | None = _key("P/(E* R), instead of force", default=None)
-    core_radius: float = _key("radius of the core over which the force is spread, over R", default=0.1, ge=0.01, le=0.5)
-    steps: int = _key("equal output steps up to it", default=20, ge=1, le=100000)
-    max_cutbacks: int = _key("times an output step may be halved before the run ends", default=10, ge=0, le=30)
+    displacement_absolute: Targets | None = _key(
+        "displacement delta of the pin, instead of displacement", "length", default=None
+    )
+    force: Targets | None = _key(
+        "force P on the whole pin per unit thickness, instead of a displacement", "force", default=None
+    )
+    relative_force: Targets | None = _key("P/(E* R), instead of force", default=None)
+    path: str | None = _key(
+        "CSV file with the targets, instead of a list: one column, headed by one of the four names above; each row is "
+        "one step unless steps is given",
+        default=None,
+        min_length=1,
+        pattern=_LINE,
+    )
+    core_radius: float = _key(
+        "ring: radius of the core over which the force is spread, over R", default=0.1, ge=0.01, le=0.5
+    )
+    steps: Steps | Annotated[list[Steps], Field(min_length=1)] = _key(
+        "equal output steps up to each target: one number for all, or a list with one for each", default=20
+    )
 
     @model_validator(mode="after")
     def _one_load(self) -> Load:
@@ -218,7 +231,45 @@ class Load(_Section):
         if len(given) > 1:
             raise ValueError(f"{given[0]}|must not be given together with {given[1]}")
         if not given:
-            raise ValueError(f"displacement|is missing (or {', '.join(LOADS[1:])})")
+            raise ValueError(f"displacement|is missing (or {', '.join(LOADS[1:])}, path)")
+        n = len(self.legs)
+        if isinstance(self.steps, list) and len(self.steps) != n:
+            raise ValueError(f"steps|must have one number for each of the {n} targets of {self.name}")
+        if sum(self.leg_steps) > 100_000:
+            raise ValueError("steps|must not add up to more than 100000 steps")
+        return self
+
+    @property
+    def name(self) -> str:
+        """The key that holds the load."""
+        return next(name for name in LOADS if getattr(self, name) is not None)
+
+    @property
+    def legs(self) -> list[float]:
+        """The targets in turn, as given."""
+        value = getattr(self, self.name)
+        return value if isinstance(value, list) else [value]
+
+    @property
+    def leg_steps(self) -> list[int]:
+        """Output steps up to each target."""
+        return self.steps if isinstance(self.steps, list) else [self.steps] * len(self.legs)
+
+
+class Stepping(_Section):
+    """Control of the steps between outputs; lengths are in output steps."""
+
+    initial: float = _key("length of the first step", default=1.0, gt=0, le=1)
+    minimum: float = _key("length below which a step is not cut", default=1e-3, gt=0, le=1)
+    maximum: float = _key("length beyond which a step does not grow", default=1.0, gt=0, le=1)
+    growth: float = _key("factor on the length after an easy step", default=2.0, ge=1, le=10)
+    cutback: float = _key("factor on the length after a failed step", default=0.5, ge=0.05, le=0.9)
+    target_iterations: int = _key("Newton iterations up to which a step was easy", default=15, ge=1, le=1000)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Stepping:
+        if not self.minimum <= self.initial <= self.maximum:
+            raise ValueError("initial|must be between stepping.minimum and stepping.maximum")
         return self
 
 
@@ -231,6 +282,7 @@ class Scene(_Section):
     block: Solid = Field(description="material of the block")
     analysis: Analysis = Field(default_factory=Analysis, description="model and solver")
     load: Load = Field(description="loading")
+    stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
@@ -244,33 +296,49 @@ class Scene(_Section):
                 raise ValueError(f"{name}|must be between 1e-30 and 1e30; choose other units")
         if self.pin.E is not None and not _SOFTEST <= self.pin.E / self.block.E <= 1 / _SOFTEST:
             raise ValueError("pin.E|must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
-        name = next(name for name in LOADS if getattr(self.load, name) is not None)
-        if (self.joint.model == "ring") != self.force_controlled:
-            wanted = (
-                "force or relative_force" if self.joint.model == "ring" else "displacement or displacement_absolute"
-            )
-            raise ValueError(f'load.{name}|does not load a joint whose model is "{self.joint.model}"; give {wanted}')
+        name = f"load.{self.load.name}"
+        if self.joint.model == "ring" and not self.force_controlled:
+            raise ValueError(f'{name}|does not load a joint whose model is "ring"; give force or relative_force')
         if self.joint.model == "ring" and self.pin.rigid:
             raise ValueError('pin.rigid|must be false where joint.model is "ring"')
-        if self.force_controlled and self.target > 0.5 * self.E_star * self.joint.radius:
-            raise ValueError(f"load.{name}|must not exceed half E* R ({0.5 * self.E_star * self.joint.radius:g})")
-        if not self.force_controlled and self.target > 0.5 * self.joint.radius:
-            raise ValueError(f"load.{name}|must not exceed half the radius ({0.5 * self.joint.radius:g})")
+        largest = max(map(abs, self.targets))
+        if self.force_controlled and not largest <= 0.5 * self.E_star * self.joint.radius:
+            raise ValueError(f"{name}|must not exceed half E* R ({0.5 * self.E_star * self.joint.radius:g})")
+        if not self.force_controlled and not largest <= 0.5 * self.joint.radius:
+            raise ValueError(f"{name}|must not exceed half the radius ({0.5 * self.joint.radius:g})")
         return self
 
     @property
     def force_controlled(self) -> bool:
         """Whether the load is a force."""
-        return self.load.force is not None or self.load.relative_force is not None
+        return self.load.name in ("force", "relative_force")
+
+    @property
+    def load_unit(self) -> float:
+        """What the targets of the section load are multiplied by."""
+        scale = {"displacement": self.joint.dR, "relative_force": self.E_star * self.joint.radius}
+        return scale.get(self.load.name, 1.0)
+
+    @property
+    def targets(self) -> list[float]:
+        """The load at every output step: the displacement of the pin, or the force on it."""
+        out, begin = [], 0.0
+        for leg, n in zip(self.load.legs, self.load.leg_steps, strict=True):
+            end = leg * self.load_unit
+            out += [begin + (end - begin) * k / n for k in range(1, n)] + [end]
+            begin = end
+        return out
 
     @property
     def target(self) -> float:
-        """The load at the end: the displacement of the pin, or the force on it."""
-        load, joint = self.load, self.joint
-        scaled = {"displacement": joint.dR, "displacement_absolute": 1.0, "force": 1.0, "relative_force": 0.0}
-        if load.relative_force is not None:
-            scaled["relative_force"] = self.E_star * joint.radius
-        return next(value * scale for name, scale in scaled.items() if (value := getattr(load, name)) is not None)
+        """The load at the end of the path."""
+        return self.targets[-1]
+
+    @property
+    def monotonic(self) -> bool:
+        """Whether the load only grows."""
+        targets = [0.0, *self.targets]
+        return all(a < b for a, b in pairwise(targets))
 
     @property
     def E_star(self) -> float:

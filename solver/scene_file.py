@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import difflib
 import tomllib
 from pathlib import Path
@@ -14,7 +15,7 @@ from archord.solver.scene_format import key_names, limits_in_words, toml_value
 
 ALTERNATIVES = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
-    "load": [LOADS],
+    "load": [(*LOADS, "path")],
 }
 
 
@@ -34,7 +35,36 @@ def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) ->
     origin = {}
     for override in overrides:
         origin[_override(data, override)] = f"--set {override}"
+    _read_targets(data, Path(path))
     return parse_scene(data, str(path), origin)
+
+
+def _read_targets(data: dict[str, Any], scene: Path) -> None:
+    """Put the targets of the file ``load.path``, beside the file ``scene``, into ``data``; each is one step by default.
+
+    Raises `SceneError`.
+    """
+    load = data.get("load")
+    if not isinstance(load, dict) or not isinstance(load.get("path"), str):
+        return
+    both = next((name for name in LOADS if name in load), None)
+    if both:
+        raise SceneError(f"{scene}: load.path must not be given together with {both}.")
+    file = scene.parent / load.pop("path")
+    try:
+        heading, *rows = [row for row in csv.reader(file.open(newline="", encoding="utf-8-sig")) if row] or [[]]
+    except OSError as error:
+        raise SceneError(f"{file}: cannot be read: {error.strerror or error}.") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise SceneError(f"{file}: is not a CSV file of text in UTF-8.") from None
+    name = heading[0].strip() if len(heading) == 1 else None
+    if name not in LOADS:
+        raise SceneError(f"{file}: must have one column, headed by {', '.join(LOADS[:-1])} or {LOADS[-1]}.")
+    try:
+        load[name] = [float(row[0]) for row in rows]
+    except ValueError as error:
+        raise SceneError(f"{file}: {error}; every row below the heading must be a number.") from None
+    load.setdefault("steps", 1)
 
 
 def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, str] | None = None) -> Scene:
@@ -43,7 +73,7 @@ def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, s
     try:
         return Scene.model_validate(data)
     except ValidationError as error:
-        sentences = [_sentence(e, data, source, origin or {}) for e in error.errors()]
+        sentences = [_sentence(e, data, source, origin or {}) for e in _meant(error.errors(), data)]
         raise SceneError("\n".join(sentences)) from None
 
 
@@ -85,6 +115,23 @@ def _value(text: str) -> Any:
         return text
 
 
+def _meant(errors: list[Any], data: dict[str, Any]) -> list[Any]:
+    """The errors, less those of the kind that was not given where a key may be one number or a list."""
+    out: dict[tuple, Any] = {}
+    for error in errors:
+        section, key, *rest = [*error["loc"], None, None][: max(2, len(error["loc"]))]
+        if not rest:
+            out[error["loc"]] = error
+            continue
+        listed = isinstance(data[section][key], list)
+        if str(rest[0]).startswith("list") == listed:
+            error = {**error, "loc": (section, key), "entry": rest[1] if len(rest) > 1 else None}
+            if error["type"] in ("float_type", "int_type") and not listed:
+                error["type"] = f"{error['type']}_or_list"
+            out.setdefault((section, key), error)
+    return list(out.values())
+
+
 def _sentence(error: Any, data: dict[str, Any], source: str, origin: dict[str, str]) -> str:
     """One sentence for one fault that pydantic found."""
     location, kind, context = [str(part) for part in error["loc"]], error["type"], error.get("ctx", {})
@@ -98,7 +145,13 @@ def _sentence(error: Any, data: dict[str, Any], source: str, origin: dict[str, s
         given = given.get(part) if isinstance(given, dict) else None
     where = next((said_in for name, said_in in origin.items() if name == key or name.startswith(f"{key}.")), source)
     shown = "" if given is None or isinstance(given, dict) or where != source else f" = {toml_value(given)}"
+    if error.get("entry") is not None:
+        shown += f": entry {error['entry'] + 1}"
     rules = {
+        "float_type_or_list": "must be a number or a list of numbers",
+        "int_type_or_list": "must be a whole number or a list of them",
+        "too_short": "must not be empty",
+        "too_long": "must not have more than {max_length} entries",
         "literal_error": "must be {expected}",
         "float_type": "must be a number",
         "int_type": "must be a whole number",

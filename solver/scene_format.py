@@ -53,6 +53,7 @@ _SHOWN = {
     "displacement_absolute": 0.1,
     "force": 1000.0,
     "relative_force": 0.01,
+    "path": "cycle.csv",
 }
 
 
@@ -93,10 +94,10 @@ def reference() -> str:
 
 def _allowed(schema: dict[str, Any]) -> str:
     """Type and limits of a key from its JSON schema, for a table."""
-    schema = _given(schema)
-    if "enum" in schema:
-        return ", ".join(f"`{toml_value(value)}`" for value in schema["enum"])
-    if schema["type"] == "boolean":
+    given = _given(schema)
+    if "enum" in given:
+        return ", ".join(f"`{toml_value(value)}`" for value in given["enum"])
+    if given["type"] == "boolean":
         return "true, false"
     kind, limits = _limits(schema)
     return " ".join([kind, ", ".join(f"{sign} {value:g}" for sign, value in limits)]).strip()
@@ -108,7 +109,9 @@ def _given(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _limits(schema: dict[str, Any]) -> tuple[str, list[tuple[str, float]]]:
+    listed = any(s.get("type") == "array" for s in schema.get("anyOf", []))
     schema = _given(schema)
     signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
     kind = {"number": "number", "integer": "whole number", "string": "text"}[schema["type"]]
+    kind += " or list" if listed else ""
     return kind, [(sign, schema[name]) for name, sign in signs.items() if name in schema]

@@ -182,7 +182,7 @@ def solve(V, bulk: Bulk, supports: list[Support], contact: Contact | None, loads
     """Step through ``loads`` from rest and return the equilibrium at the last; every step must converge."""
     problem = Equilibrium(V, bulk, supports, contact)
     for load in loads:
-        result = problem.solve(load, problem.displacement())
+        result = problem.solve(load, problem.state())
         assert result.converged, result.reason
         problem.commit()
     return problem

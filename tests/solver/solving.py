@@ -30,16 +30,17 @@ def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Sol
     joint = Joint(scene, comm, partitioner=partitioner)
     solution, work = Solution(joint, [], []), Work()
 
-    def target_done(step):
+    def target_done(step, position):
         profiles = arc_profiles(joint)
         solution.profiles.append(profiles)
-        solution.steps.append(measure(joint, len(solution.steps) + 1, step, profiles, work, 0.0))
+        largest = max((abs(m.P) for m in solution.steps), default=0.0)
+        solution.steps.append(measure(joint, len(solution.steps) + 1, step, profiles, work, 0.0, largest))
 
     march(
         joint.equilibrium,
-        [scene.target * k / scene.load.steps for k in range(1, scene.load.steps + 1)],
+        scene.targets,
         joint.rigid_translation,
-        max_cutbacks=scene.load.max_cutbacks,
+        rules=scene.stepping,
         substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
         target_done=target_done,
     )

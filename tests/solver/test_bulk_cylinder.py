@@ -43,7 +43,7 @@ class Cylinder:
         self.problem = Equilibrium(V, self.bulk, supports)
 
     def step(self, wall: float) -> None:
-        result = self.problem.solve(wall, self.problem.displacement())
+        result = self.problem.solve(wall, self.problem.state())
         assert result.converged, result.reason
         self.u = self.problem.displacement()
         force = internal_force(self.bulk, self.u)

@@ -67,11 +67,12 @@ def state(comm, pin, block, kinematics, partitioner=None):
     largest, integral = parts.bulk.peeq()
     norms += [comm.allreduce(largest, op=MPI.MAX), comm.allreduce(integral)]
     rows, columns, values = parts.contact.tangent()
-    field = np.zeros((parts.V.dofmap.index_map.size_global, 2))
+    field = np.zeros((parts.V.dofmap.index_map.size_global + 1, 2))  # a rigid pin's is the last
     index_map = parts.V.dofmap.index_map
     start, end = index_map.local_range
     field[start:end] = 1 + np.sin(5 * x[: end - start])
     field = comm.allreduce(field)
+    field[-1] = 0.3, -1.0
     action = np.zeros_like(field)
     np.add.at(action, rows, (values @ field[columns, :, None])[..., 0])
     norms.append((comm.allreduce(action) ** 2).sum())

@@ -33,6 +33,8 @@ every_kinematics = pytest.mark.parametrize("kinematics", ["current", "reference"
 
 
 def matrix(contact, n):
+    """The tangent over all nodes and, behind them, the rigid pin."""
+    n += 2
     rows, columns, values = contact.tangent()
     K = sp.csr_matrix((n, n))
     for i, j in np.ndindex(2, 2):
@@ -50,7 +52,8 @@ def branch(contact):
 
 
 def assert_tangent_is_derivative(parts, u, *, directions=3):
-    """Central differences in random directions that move the pin as a whole as well as every node by itself."""
+    """Central differences in random directions that move the pin as a whole, a rigid one too, and every node by itself;
+    a rigid pin's own force is against the resultant."""
     contact, rng = parts.contact, np.random.default_rng(7)
     contact.search()
     contact_force(contact, u)
@@ -59,13 +62,18 @@ def assert_tangent_is_derivative(parts, u, *, directions=3):
     h = 1e-6 * DR
     for k in range(directions):
         d = rng.normal(size=u.shape) if k else parts.pressed(1.0)
+        rigid, motion = len(contact.sides) == 1, contact.rigid_motion
+        e = rng.normal(size=2) * rigid
         sides = []
         for sign in (1, -1):
-            sides.append(contact_force(contact, u + sign * h * d))
+            contact.rigid_motion = motion + sign * h * e
+            force = contact_force(contact, u + sign * h * d)
+            sides.append(np.append(force.ravel(), contact.resultant() * rigid))
             np.testing.assert_array_equal(branch(contact), at)
-        difference = (sides[0] - sides[1]).ravel() / (2 * h)
+        contact.rigid_motion = motion
+        difference = (sides[0] - sides[1]) / (2 * h)
         assert np.linalg.norm(difference) > 0
-        assert np.linalg.norm(K @ d.ravel() - difference) < 1e-6 * np.linalg.norm(difference)
+        assert np.linalg.norm(K @ np.append(d, e) - difference) < 1e-6 * np.linalg.norm(difference)
     return active
 
 
@@ -129,7 +137,7 @@ def test_tangent_of_a_tied_elastic_contact_is_constant():
     parts = joint_parts(kinematics="tied")
     u, v = parts.pressed(DR, noise=1e-4, seed=1), parts.pressed(30 * DR, noise=1e-2, seed=2)
     at_u = contact_force(parts.contact, u).ravel()
-    K = matrix(parts.contact, u.size)
+    K = matrix(parts.contact, u.size)[:-2, :-2]
     at_v = contact_force(parts.contact, v).ravel()
     np.testing.assert_allclose(at_v - at_u, K @ (v - u).ravel(), rtol=0, atol=1e-12 * np.abs(at_v).max())
 

@@ -110,7 +110,7 @@ def test_the_resolved_scene_gives_the_same_numbers(run, tmp_path):
 
 def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
     """Four of ten steps, then no convergence: all four readable, and run.json says why."""
-    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5}, load={"max_cutbacks": 0})
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5}, stepping={"minimum": 1.0})
     outcome = solve_scene(problem, tmp_path, MPI.COMM_SELF)
     assert outcome.status == "stopped"
     assert len(read_history(tmp_path / "history.csv")["P"]) == 4

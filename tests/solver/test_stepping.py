@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from archord.solver.scene import Stepping
 from archord.solver.stepping import StepFailure, march
 from tests.solver.solving import scene, solve
 
@@ -27,9 +28,9 @@ def test_a_failed_step_leaves_no_trace():
     load, u = equilibrium.load, equilibrium.displacement()
     forces = joint.forces()
     equilibrium.max_iterations = 1
-    result = equilibrium.solve(1.2 * load, u)
+    result = equilibrium.solve(1.2 * load, equilibrium.state())
     assert not result.converged
-    equilibrium.restore(load, u)
+    equilibrium.restore(load, np.append(u, load))
     assert all(p.state is s for p, s in zip(points, states, strict=True))
     assert all(np.array_equal(p.state.peeq, b) for p, b in zip(points, before, strict=True))
     equilibrium.evaluate()
@@ -43,7 +44,7 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
     from tests.solver.solving import MPI
 
     joint, accepted = Joint(problem, MPI.COMM_SELF), []
-    targets = [problem.target * k / 10 for k in range(1, 11)]
+    targets = problem.targets
     with pytest.raises(
         StepFailure, match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller"
     ):
@@ -51,9 +52,9 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
             joint.equilibrium,
             targets,
             joint.rigid_translation,
-            max_cutbacks=0,
+            rules=Stepping(minimum=1.0),
             substep_done=lambda load: None,
-            target_done=lambda step: accepted.append(step.load),
+            target_done=lambda step, position: accepted.append(step.load),
         )
     assert accepted == targets[:4]
 

@@ -1,0 +1,95 @@
+"""Newton's linear system with one more unknown: the level of a rigid motion on which a given force acts.
+
+``[A b; c d] (u, s) = (r, rho)`` is solved by one factorisation of A, the matrix at a given level, and two solves with
+it: displacement control is regular wherever force control is, and beyond.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from archord.geometry.basis import Array
+
+_FREE = 1e-9  # stiffness of the joint over ``stiffness`` below which nothing resists the force
+
+
+def direct_solver(ksp: PETSc.KSP, A: PETSc.Mat) -> None:
+    """Let ``ksp`` factorise ``A`` by MUMPS."""
+    ksp.setType("preonly")
+    ksp.setOperators(A)
+    pc = ksp.getPC()
+    pc.setType("lu")
+    pc.setFactorSolverType("mumps")
+    pc.setFactorSetUpSolverType()
+    pc.getFactorMatrix().setMumpsIcntl(14, 60)
+
+
+class Bordered:
+    """Python context of the bordered matrix and of its preconditioner, which solves with it exactly.
+
+    The level is the last entry of rank 0. ``stiffness`` scales what counts as resistance. Collective.
+    """
+
+    def __init__(self, comm: MPI.Comm, A: PETSc.Mat, stiffness: float) -> None:
+        self.comm, self._stiffness = comm, stiffness
+        self._n = A.getLocalSize()[0]
+        self._extra = int(comm.rank == 0)
+        self.b, self.c, self.d = np.zeros(self._n), np.zeros(self._n), 0.0
+        self._stale, self.came_free = True, False
+        self._x, self._y = A.createVecs()
+        self._along_b = np.zeros(self._n)
+        size = (self._n + self._extra, None)
+        self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=comm)
+        self.matrix.setUp()
+        self.replace(A)
+
+    def replace(self, A: PETSc.Mat) -> None:
+        """Border another matrix ``A`` of the same size."""
+        self._A, self._stale = A, True
+        self._ksp = PETSc.KSP().create(self.comm)
+        direct_solver(self._ksp, A)
+
+    def vector(self) -> PETSc.Vec:
+        """A vector with the level as its last entry."""
+        return PETSc.Vec().createMPI((self._n + self._extra, None), comm=self.comm)
+
+    def level(self, x: PETSc.Vec) -> float:
+        """The level in ``x``, on every rank."""
+        return float(self.comm.bcast(x.array_r[-1] if self._extra else None))
+
+    def join(self, x: PETSc.Vec, u: Array, level: float) -> None:
+        """Put ``u`` ``(n_owned dofs,)`` and ``level`` into ``x``."""
+        x.array[: self._n] = u
+        x.array[self._n :] = level
+
+    def update(self, b: Array, c: Array, d: float) -> None:
+        """New border for a matrix with new values: ``b`` and ``c`` of this rank's dofs, ``d`` of all ranks."""
+        self.b, self.c, self.d, self._stale = b, c, d, True
+
+    def _solve(self, r: Array) -> Array:
+        self._x.array[:] = r
+        self._ksp.solve(self._x, self._y)
+        return self._y.array_r.copy()
+
+    def _dot(self, a: Array, b: Array) -> float:
+        return self.comm.allreduce(float(a @ b))
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """``y = [A b; c d] x``, called by PETSc."""
+        s, u = self.level(x), x.array_r[: self._n]
+        self._x.array[:] = u
+        self._A.mult(self._x, self._y)
+        self.join(y, self._y.array_r + s * self.b, self._dot(self.c, u) + self.d * s)
+
+    def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
+        """``x = [A b; c d]^-1 r``, called by PETSc; where nothing resists the level, it stays."""
+        if self._stale:
+            self._along_b = self._solve(self.b)
+            self._stale = False
+        rho, u = self.level(r), self._solve(r.array_r[: self._n])
+        pivot = self.d - self._dot(self.c, self._along_b)
+        self.came_free = abs(pivot) < _FREE * self._stiffness
+        s = 0.0 if self.came_free else (rho - self._dot(self.c, u)) / pivot
+        self.join(x, u - s * self._along_b, s)
