@@ -1,4 +1,5 @@
-"""The command line: ``archord solve``, ``archord picture`` and ``archord scene``.
+"""The command line: ``archord solve``, ``archord picture`` and ``archord scene``; the other commands are in files of
+their own.
 
 Heavy packages are imported by the commands that need them. Bad input ends with exit code 2 and one sentence from rank
 0.
@@ -18,6 +19,7 @@ import typer
 from archord import law_commands
 from archord.deck_commands import export_deck
 from archord.fit_commands import fit
+from archord.ranks import launcher_rank, run_on_ranks
 from archord.reproduce_commands import reproduce
 
 app = typer.Typer(
@@ -30,20 +32,15 @@ app = typer.Typer(
 _begun = perf_counter()
 
 
-def launcher_rank() -> int:
-    """Rank of this process as its MPI launcher says, without importing MPI."""
-    for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"):
-        if name in os.environ:
-            return int(os.environ[name])
-    return 0
-
-
 def run(arguments: list[str], begun: float | None = None) -> int:
     """Run the command line ``arguments``; returns the exit code. Only rank 0 prints."""
     global _begun
     _begun = perf_counter() if begun is None else begun
-    if launcher_rank() != 0:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+    return run_on_ranks(arguments[0] if arguments else "", lambda: _run(arguments))
+
+
+def _run(arguments: list[str]) -> int:
+    """Run the command line on this rank; all errors are told here and become exit codes."""
     try:
         code = app(arguments, prog_name="archord", standalone_mode=False)
         sys.stdout.flush()
@@ -128,13 +125,13 @@ def solve(
         from archord.continuing import continue_with_progress
 
         return continue_with_progress(scene, overrides or [], output, extend=extend, quiet=quiet, begun=_begun)
+    from archord.progress import solve_with_progress
     from archord.solver.scene_file import load_scene
 
-    checked = load_scene(scene, overrides or [])
     folder = output or Path("runs") / scene.stem
-    from archord.progress import solve_with_progress
-
-    return solve_with_progress(checked, folder, force=force, quiet=quiet, begun=_begun)
+    return solve_with_progress(
+        lambda: load_scene(scene, overrides or []), folder, force=force, quiet=quiet, begun=_begun
+    )
 
 
 @app.command()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from dataclasses import replace
 from pathlib import Path
 
 from archord.solver.scene import SceneError
@@ -19,33 +17,22 @@ def continue_with_progress(
     """
     from mpi4py import MPI
 
-    from archord.solver.disk import on_root
-
-    comm = MPI.COMM_WORLD
-    plan = on_root(comm, lambda: _plan(source, overrides, output, extend))
-    folder = _folder(source, output)
-    shared = comm.bcast(replace(plan, start=None) if plan else None)
-    plan = plan or shared
-    if comm.rank == 0 and not quiet:
-        print(f"{plan.said}.", file=sys.stdout, flush=True)
-    if plan.finished:
-        return 0
+    # on all ranks: it imports petsc4py, which is collective
     from archord.progress import solve_with_progress
+    from archord.solver.ranks import agreed
+    from archord.solver.restart import Plan, plan_extension, plan_restart
 
-    return solve_with_progress(plan.scene, folder, force=False, quiet=quiet, begun=begun, plan=plan)
+    folder = source if source.is_dir() else output or Path("runs") / source.stem
 
+    def plan() -> Plan:
+        if source.is_dir() and output is not None and output.resolve() != source.resolve():
+            raise SceneError(f"-o {output}: does not go with a run folder, {source}.")
+        scene = load_scene(source / "scene.toml" if source.is_dir() else source, overrides)
+        return plan_extension(folder, scene) if extend else plan_restart(folder, scene)
 
-def _folder(source: Path, output: Path | None) -> Path:
-    return source if source.is_dir() else output or Path("runs") / source.stem
-
-
-def _plan(source: Path, overrides: list[str], output: Path | None, extend: bool):
-    from archord.solver.restart import plan_extension, plan_restart
-
-    folder = _folder(source, output)
-    if source.is_dir() and output is not None and output.resolve() != source.resolve():
-        raise SceneError(f"-o {output}: does not go with a run folder, {source}.")
-    if extend and not (folder / "scene.toml").exists():
-        raise SceneError(f"{folder}: is not a run folder: scene.toml is missing.")
-    scene = load_scene(source / "scene.toml" if source.is_dir() else source, overrides)
-    return plan_extension(folder, scene) if extend else plan_restart(folder, scene)
+    planned = agreed(MPI.COMM_WORLD, plan)
+    if not quiet:
+        print(f"{planned.said}.", flush=True)
+    if planned.finished:
+        return 0
+    return solve_with_progress(lambda: planned.scene, folder, force=True, quiet=quiet, begun=begun, start=planned.start)

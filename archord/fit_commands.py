@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +15,9 @@ def fit(
         typer.Option("--range", help="steps to fit: delta from ... to ..., in clearances [all]"),
     ] = None,
     confidence: Annotated[float, typer.Option("--confidence", help="level of the confidence intervals")] = 0.95,
+    hold_k: Annotated[
+        float | None, typer.Option("--hold-k", metavar="VALUE", help="hold k, e.g. at that of an elastic run, fit c")
+    ] = None,
     residuals: Annotated[bool, typer.Option("--residuals", help="print the residual of every step")] = False,
     json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write law, fits, residuals")] = None,
     picture: Annotated[
@@ -23,7 +25,9 @@ def fit(
     ] = None,
     python: Annotated[
         Path | None,
-        typer.Option("--python", metavar="FILE", help="write force(delta) as a module that needs only math"),
+        typer.Option(
+            "--python", metavar="FILE", help="write force and stiffness over delta as a module that needs only math"
+        ),
     ] = None,
 ) -> int:
     """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields."""
@@ -34,21 +38,28 @@ def fit(
     from archord.postprocess import fit_report
     from archord.postprocess.calibration import calibrate
     from archord.postprocess.run_curve import read_run
+    from archord.solver.output_file import check_output, writing
+    from archord.solver.scene import SceneError
 
-    calibration = calibrate([read_run(folder) for folder in folders], load_range or (0.0, math.inf), confidence)
+    runs = [read_run(folder) for folder in folders]
+    calibration = calibrate(runs, load_range or (0.0, math.inf), confidence, hold_k)
     law = calibration.law()
     # checked and written before anything is printed: a file that cannot be written is one sentence alone
     files = [file for file in (json_file, python, picture) if file]
     for file in files:
-        _check_writable(file)
+        check_output(file)
+    if len({file.resolve() for file in files}) < len(files):
+        raise SceneError("--json, --python, --picture: must be different files.")
     if picture:
         from archord.postprocess.fit_picture import draw_fit
 
         draw_fit(calibration, picture)
     if json_file:
-        json_file.write_text(fit_report.as_json(calibration), encoding="utf-8")
+        with writing(json_file):
+            json_file.write_text(fit_report.as_json(calibration), encoding="utf-8")
     if python:
-        python.write_text(law.to_python(), encoding="utf-8")
+        with writing(python):
+            python.write_text(law.to_python(), encoding="utf-8")
     console = Console(highlight=False, width=200)  # numbers that wrap are better than numbers cut off
     tables = [fit_report.summary_table(calibration)]
     tables += [fit_report.residual_table(curve) for curve in calibration.joint.curves if residuals]
@@ -59,16 +70,8 @@ def fit(
         print(note)
     threshold = "" if law.c is None else f", c = {law.c:.5f}"
     low, high = law.fitted_range
-    print(f"law: k = {law.k:.5f}{threshold}, from P(delta), delta = {low:g} to {high:g} dR")
+    held = "" if hold_k is None else " (held)"
+    print(f"law: k = {law.k:.5f}{held}{threshold}, from P(delta), delta = {low:g} to {high:g} dR")
     for file in files:
         print(file)
     return 0
-
-
-def _check_writable(file: Path) -> None:
-    from archord.solver.scene import SceneError
-
-    if not file.parent.is_dir():
-        raise SceneError(f"{file}: cannot be written: {file.parent} is not a folder.")
-    if file.is_dir() or not os.access(file if file.exists() else file.parent, os.W_OK):
-        raise SceneError(f"{file}: cannot be written: it is a folder, or may not be written.")

@@ -50,6 +50,12 @@ def law(
     yield_stress: Annotated[float | None, typer.Option(help="yield stress")] = None,
     length: Annotated[float | None, typer.Option(help="length of the joint, for the laws that need one")] = None,
     k: Annotated[float, typer.Option("--k", help="Winkler's coefficient")] = 0.85,
+    c: Annotated[float | None, typer.Option("--c", help="plateau of the pressure over the yield stress [1]")] = None,
+    plane: Annotated[str | None, typer.Option(help="strain or stress, for the regime law")] = None,
+    nu: Annotated[float | None, typer.Option(help="Poisson's ratio of both bodies, for the regime law")] = None,
+    yielding: Annotated[
+        str | None, typer.Option(help="which bodies yield, for the regime law: both, block or pin [both]")
+    ] = None,
     dundurs_alpha: Annotated[
         float | None, typer.Option(help="(E1' - E2')/(E1' + E2'), positive for the stiffer pin [0, or the scene's]")
     ] = None,
@@ -77,13 +83,17 @@ def law(
         raise SceneError(f"--points {points}: must be between 1 and 100000.")
     if strict and extrapolate:
         raise SceneError("--strict: must not be given together with --extrapolate.")
-    given = {
+    given: dict[str, Any] = {
         "radius": radius,
         "clearance": clearance,
         "E_star": E_star,
         "yield_stress": yield_stress,
         "length": length,
         "dundurs_alpha": dundurs_alpha,
+        "c": c,
+        "plane": plane,
+        "nu": nu,
+        "yielding": yielding,
     }
     joint, units = _joint(scene, overrides or [], given, k)
     rows = "load" if by_load or not all(entry.gives_displacement for entry in chosen) else "displacement"
@@ -98,7 +108,7 @@ def law(
 
 
 def _joint(
-    scene: Path | None, overrides: list[str], given: dict[str, float | None], k: float
+    scene: Path | None, overrides: list[str], given: dict[str, Any], k: float
 ) -> tuple[LawJoint, dict[str, str]]:
     """The joint of the scene, or of the options, which come before it; and the names of the units."""
     import dataclasses
@@ -107,6 +117,8 @@ def _joint(
     from archord.solver.scene import SceneError
 
     values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    if "nu" in values:
+        values["pin_nu"] = None  # one for both
     if scene is not None:
         from archord.solver.scene_file import load_scene
 
@@ -155,4 +167,7 @@ def _console() -> Any:
     """A console as wide as its text where nobody watches, so that pipes get whole rows."""
     from rich.console import Console
 
-    return Console(highlight=False, width=None if sys.stdout.isatty() else 160)
+    from archord.ranks import on_terminal
+
+    watched = on_terminal()
+    return Console(highlight=False, width=None if watched else 160, force_terminal=watched)

@@ -2,37 +2,43 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from archord.solver.scene import Scene, SceneError
+from archord.ranks import on_terminal
+from archord.solver.scene import Scene
 
 if TYPE_CHECKING:
-    from archord.solver.restart import Plan
+    from archord.solver.restart import Start
 
 
 def solve_with_progress(
-    scene: Scene, folder: Path, *, force: bool, quiet: bool, begun: float, plan: Plan | None = None
+    load: Callable[[], Scene], folder: Path, *, force: bool, quiet: bool, begun: float, start: Start | None = None
 ) -> int:
-    """Solve ``scene`` into ``folder`` on all ranks of MPI_COMM_WORLD and report; returns the exit code.
-
-    A ``plan``, the same on all ranks but for its start, which rank 0 has, continues the run in ``folder``.
-    """
+    """Solve the scene that ``load`` gives rank 0 into ``folder`` on all ranks of MPI_COMM_WORLD and report; returns the
+    exit code. ``start`` continues the run in ``folder``."""
     from mpi4py import MPI
 
+    from archord.solver.ranks import agreed
+    from archord.solver.run_folder import claim_folder
+
+    def claimed() -> Scene:
+        scene = load()
+        claim_folder(folder, force)
+        return scene
+
     comm = MPI.COMM_WORLD
-    _claim(comm, folder, force or plan is not None)
+    scene = agreed(comm, claimed)
     from archord.solver.run import solve_scene
     from archord.solver.timer import Timer
 
     timer = Timer()
     timer.seconds["start-up"] = perf_counter() - begun
-    start = plan.start if plan else None
     report = _Progress(scene, silent=quiet or comm.rank != 0, done=start.checkpoint.step if start else 0)
     with report:
         outcome = solve_scene(
@@ -65,34 +71,6 @@ def _shortened(warnings: list[str]) -> list[str]:
     return list(first.values())
 
 
-def _claim(comm, folder: Path, force: bool) -> None:
-    """Let rank 0 look at the folder, and all ranks agree."""
-    from archord.solver.run_folder import claim_folder
-
-    fault = None
-    if comm.rank == 0:
-        try:
-            claim_folder(folder, force)
-        except SceneError as error:
-            fault = str(error)
-    fault = comm.bcast(fault)
-    if fault:
-        raise SceneError(fault)
-
-
-def _on_terminal() -> bool:
-    """Whether somebody watches: Open MPI gives its ranks a terminal of their own even where it writes to a file
-    itself."""
-    if not sys.stdout.isatty():
-        return False
-    if "PMIX_RANK" not in os.environ and "OMPI_COMM_WORLD_RANK" not in os.environ:
-        return True
-    try:
-        return os.readlink(f"/proc/{os.getppid()}/fd/1").startswith(("/dev/pts/", "/dev/tty", "/dev/console"))
-    except OSError:
-        return False
-
-
 class _Progress:
     """Reports steps as they are accepted."""
 
@@ -100,7 +78,7 @@ class _Progress:
         self.scene, self.silent = scene, silent
         self._bar: Any = nullcontext()
         self._task: Any = None
-        if not silent and _on_terminal():
+        if not silent and on_terminal():
             from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
             self._bar = Progress(

@@ -15,6 +15,7 @@ import numpy as np
 
 from archord.benchmarks.deck_mesh import Elements, Ints, PlaneMesh, deck_mesh
 from archord.geometry.joint_mesh import Cells, Facets
+from archord.solver.output_file import writing
 from archord.solver.scene import Pin, Scene, SceneError, Solid
 
 PENETRATION = 1e-4  # in clearances, under a pressure E* dR/R
@@ -58,12 +59,8 @@ def write_deck(scene: Scene, path: Path, elements: Elements, *, force: bool = Fa
     without ``force``."""
     if path.exists() and not path.is_dir() and not force:
         raise SceneError(f"{path}: is there already; choose another file with -o, or overwrite it with --force.")
-    if not path.parent.is_dir():
-        raise SceneError(f"{path}: cannot be written: {path.parent} is not a folder.")
-    try:
+    with writing(path):
         path.write_text(deck(scene, deck_mesh(scene, elements)), encoding="utf-8")
-    except OSError as error:
-        raise SceneError(f"{path}: cannot be written: {error.strerror}.") from None
 
 
 def _mesh_lines(scene: Scene, mesh: PlaneMesh, thick: float) -> Iterator[str]:

@@ -15,6 +15,7 @@ from typing import Literal
 
 from mpi4py import MPI
 
+from archord.solver.ranks import agreed
 from archord.solver.run import solve_scene
 from archord.solver.run_folder import claim_folder
 from archord.solver.scene import Scene
@@ -72,13 +73,20 @@ def solve_missing(
 ) -> list[str]:
     """Solve the cases that are not done yet into ``folder``, each on one rank, the ranks side by side.
 
-    ``report(case, P)`` follows each on the rank that solved it. Returns the complaints of all that failed. Collective.
+    ``report(case, P)`` follows each on the rank that solved it. Returns the complaints of all that failed. Raises
+    `SceneError`, before any is solved, if ``folder`` cannot take them. Collective.
     """
-    missing = comm.bcast([case for case in wanted if not case.is_done(folder)])
+
+    def claimed() -> list[Case]:
+        missing = [case for case in wanted if not case.is_done(folder)]
+        for case in missing:
+            claim_folder(folder / case.name, force=True)
+        return missing
+
+    missing = agreed(comm, claimed)
     complaints = []
     for case in missing[comm.rank :: comm.size]:
         run = folder / case.name
-        claim_folder(run, force=True)
         outcome = solve_scene(case.load(), run, MPI.COMM_SELF)
         if outcome.status == "interrupted":
             raise KeyboardInterrupt

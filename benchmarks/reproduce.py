@@ -12,6 +12,9 @@ from archord.benchmarks.claims import CLAIMS
 from archord.benchmarks.figures import Runs, Table, fig2, fig3, fig4, fig5, fig7, fig9
 from archord.benchmarks.first_yield import fig8
 from archord.benchmarks.paper_runs import PAIRS, Case, cases, plastic, solve_missing
+from archord.solver.output_file import check_output
+from archord.solver.ranks import agreed
+from archord.solver.run_folder import claim_folder
 from archord.solver.scene import SceneError
 
 _PLASTIC = [plastic(pair) for pair in PAIRS]
@@ -41,9 +44,11 @@ def reproduce(
     """Solve what ``names`` need and is not in ``folder`` yet, and write their CSV files and pictures.
 
     With all figures also ``report.md`` and ``report.html``. ``said(case, P)`` follows every run. Returns the files, on
-    rank 0. Raises `SceneError` for unknown figures and RuntimeError if a run failed. Collective.
+    rank 0. Raises `SceneError` for unknown figures and a folder that cannot be written, and RuntimeError if a run
+    failed. Collective.
     """
     wanted = chosen(names)
+    agreed(comm, lambda: _claim(folder, wanted))
     runs = Runs(folder / "runs")
     complaints = solve_missing(cases(s for name in wanted for s in FIGURES[name][1]), runs.folder, comm, said)
     if complaints:
@@ -52,6 +57,13 @@ def reproduce(
         return []
     files = [file for name in wanted for file in _draw(name, runs, folder)]
     return files + (_report(runs, folder) if len(wanted) == len(FIGURES) else [])
+
+
+def _claim(folder: Path, wanted: list[str]) -> None:
+    claim_folder(folder, force=True)
+    for name in wanted:
+        for kind in ("csv", "png"):
+            check_output(folder / f"{name}.{kind}")
 
 
 def _draw(name: str, runs: Runs, folder: Path) -> list[Path]:

@@ -38,6 +38,7 @@ class Calibration:
     joint: Fits
     load_range: tuple[float, float]
     confidence: float
+    hold_k: float | None = None
 
     def law(self, run: RunCurve | None = None) -> FittedLaw:
         """The law for the joint of ``run`` (by default the first), with k and c from P(delta) of all scenes."""
@@ -65,18 +66,23 @@ class Calibration:
 
 
 def calibrate(
-    runs: list[RunCurve], load_range: tuple[float, float] = (0.0, np.inf), confidence: float = 0.95
+    runs: list[RunCurve],
+    load_range: tuple[float, float] = (0.0, np.inf),
+    confidence: float = 0.95,
+    hold_k: float | None = None,
 ) -> Calibration:
     """Fit the law to each of ``runs`` and to all scenes together, over ``load_range`` of ``delta/dR``.
 
-    Runs of one scene on several meshes give the error of the mesh; the finest of them enters the joint fit. Raises
-    `SceneError` where the range, the steps or the runs do not allow a fit.
+    Runs of one scene on several meshes give the error of the mesh; the finest of them enters the joint fit. With
+    ``hold_k`` only c is fitted. Raises `SceneError` where the range, the steps or the runs do not allow a fit.
     """
     low, high = load_range
     if not 0 <= low < high:
         raise SceneError(f"--range {low:g} {high:g}: must be two displacements in clearances, 0 or more and rising.")
     if not 0.5 <= confidence < 1:
         raise SceneError(f"--confidence {confidence:g}: must be at least 0.5 and below 1.")
+    if hold_k is not None and not 0 < hold_k < np.inf:
+        raise SceneError(f"--hold-k {hold_k:g}: must be a number greater than 0.")
     _check_compatible(runs)
     groups = group(runs)
     of = {id(r): g for g in groups for r in (g.run, *g.coarser)}
@@ -84,9 +90,12 @@ def calibrate(
     for run in runs:
         g = of[id(run)]
         alone = g if g.run is run else Refined(run)
-        each.append(_fits([alone], load_range, confidence, None if g.run is run else g.run.name))
-    together = [_fits(groups, load_range, confidence)] if len(groups) > 1 else [f for f in each if f.finer is None]
-    return Calibration(tuple(each), together[0], load_range, confidence)
+        each.append(_fits([alone], load_range, confidence, hold_k, None if g.run is run else g.run.name))
+    one = [f for f in each if f.finer is None]
+    together = _fits(groups, load_range, confidence, hold_k) if len(groups) > 1 else one[0]
+    if hold_k is not None and together.P.c is None:
+        raise SceneError(f"--hold-k {hold_k:g}: leaves nothing to fit: no two steps of the range are past yield.")
+    return Calibration(tuple(each), together, load_range, confidence, hold_k)
 
 
 def _check_compatible(runs: list[RunCurve]) -> None:
@@ -116,8 +125,13 @@ def _elastic_pair(run: RunCurve) -> tuple[float, float, float]:
     return (0.0, block.nu, 0.0) if pin.E is None else (pin.nu or 0.0, block.nu, 1 / (1 + pin.E / block.E))
 
 
-def _fits(groups: list[Refined], load_range: tuple[float, float], confidence: float, finer: str | None = None) -> Fits:
-    force = fit_curve("P", groups, load_range, confidence)
-    peak = fit_curve("p0", groups, load_range, confidence)
+def _fits(
+    groups: list[Refined],
+    load_range: tuple[float, float],
+    confidence: float,
+    hold_k: float | None,
+    finer: str | None = None,
+) -> Fits:
+    force, peak = (fit_curve(curve, groups, load_range, confidence, hold_k) for curve in ("P", "p0"))
     plateau = fit_plateau(force, groups, load_range, confidence)
     return Fits(tuple(g.run for g in groups), force, peak, plateau, finer)

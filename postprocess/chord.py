@@ -71,17 +71,22 @@ def chord_projection(
     """Project ``pressure`` at the angles ``phi`` [rad] from the contact axis onto the chord of ``eps`` (eq. 15).
 
     Arrays of one shape, in the order of the angle; ``weight`` is each point's share of arc length, by default that of
-    the trapezoidal rule. The resultant is that of the arc, ``2 sum(weight pressure cos(phi))``, but for round-off,
-    whatever ``eps`` is: points beyond it stay as long as they carry pressure, the others there are left out. Raises
-    ValueError for angles that do not rise within 0 to pi/2 or a contact angle that is not between 0 and pi.
+    the trapezoidal rule, which counts nothing between the axis and a first point past it. The resultant is that of the
+    arc, ``2 sum(weight pressure cos(phi))``, but for round-off, whatever ``eps`` is: points beyond it stay as long as
+    they carry pressure, the others there are left out. Raises ValueError for angles that do not rise from 0, pressure
+    beyond pi/2, numbers that are not finite, and a contact angle that is not between 0 and pi.
     """
     angle, p = np.ravel(np.asarray(phi, float)), np.ravel(np.asarray(pressure, float))
     if not 0 < eps < np.pi:
         raise ValueError(f"the contact semi-angle is {eps:g}; it must be between 0 and pi.")
+    if not 0 < R < np.inf:
+        raise ValueError(f"the radius is {R:g}; it must be positive.")
     if len(angle) < 2 or len(angle) != len(p):
         raise ValueError("phi and pressure must have the same length, two or more.")
-    if not (angle[0] >= 0 and angle[-1] <= np.pi / 2 * (1 + 1e-12) and (np.diff(angle) >= 0).all()):
-        raise ValueError("phi must rise from the contact axis, between 0 and pi/2.")
+    if not (angle[0] >= 0 and (np.diff(angle) >= 0).all()):
+        raise ValueError("phi must rise from the contact axis, from 0 or more.")
+    if not np.isfinite(p).all():
+        raise ValueError("the pressure must be finite everywhere.")
     if weight is None:
         gap = np.diff(angle) * R
         measure = (np.append(gap, 0.0) + np.append(0.0, gap)) / 2
@@ -91,6 +96,8 @@ def chord_projection(
             raise ValueError("weight must have the length of phi.")
     kept = (angle <= eps) | (p != 0)
     angle, p, measure = angle[kept], p[kept], measure[kept]
+    if len(angle) and angle[-1] > np.pi / 2 * (1 + 1e-12):
+        raise ValueError("the contact must end within pi/2 of the axis.")
     stretch = np.cos(eps / 2) / np.cos(angle - eps / 2) ** 2
     return ChordPressure(
         chord_coordinate(angle, eps, R), p * np.cos(angle) / stretch, measure * stretch, float(eps), float(R)
@@ -101,7 +108,7 @@ def read_chord_pressure(folder: str | Path, step: int | None = None, side: str |
     """Chord pressure on one ``side`` ("pin" or "hole"; the hole, if both are there) at a ``step`` of a run (the last).
 
     ``R`` is the side's own radius (that of the hole is R + dR) and ``eps`` the step's in history.csv. Raises
-    `SceneError` where there is no run, no such step or side, or no contact angle.
+    `SceneError` where there is no run, no such step or side, no contact angle, or one beyond pi/2 (a ring).
     """
     run = read_run(folder)
     number = len(run.delta) if step is None else step
@@ -112,4 +119,7 @@ def read_chord_pressure(folder: str | Path, step: int | None = None, side: str |
     arc, eps = arcs[chosen], float(run.eps[number - 1])
     if not eps > 0:
         raise SceneError(f"{folder}: has no contact angle at step {number}.")
-    return chord_projection(arc.angle, arc.pressure, eps, arc.radius, arc.weight)
+    try:
+        return chord_projection(arc.angle, arc.pressure, eps, arc.radius, arc.weight)
+    except ValueError as error:  # a ring whose contact goes round, or a file that is not a run's
+        raise SceneError(f"{folder}: step {number} cannot be projected: {error}") from None

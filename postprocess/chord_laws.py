@@ -74,31 +74,32 @@ def _truncation(joint: LawJoint, delta: Array) -> tuple[Array, Array]:
 
 
 def plastic_force(joint: LawJoint, delta: Array) -> Array:
-    """Elasto-plastic NFD: the parabola of `paper_force`, cut off at the yield stress (Hu et al., eqs 10 to 12).
+    """Elasto-plastic NFD: the parabola of `paper_force`, cut off at ``c sigY`` (Hu et al., eqs 10 to 12, with c = 1).
 
-    ``P = 2 sigY l [ (delta/delta0) (2/3 - s + s^3/3) + s ]``, ``s = sqrt(1 - delta0/delta)``, beyond ``delta0 = R sigY
-    / (k E*)``; `paper_force` below. Perfect plasticity.
+    ``P = 2 c sigY l [ (delta/delta0) (2/3 - s + s^3/3) + s ]``, ``s = sqrt(1 - delta0/delta)``, beyond ``delta0 = c
+    sigY R/(k E*)``; `paper_force` below, and everywhere without a yield stress. Perfect plasticity.
     """
-    assert joint.yield_stress is not None
+    if joint.yield_stress is None:
+        return paper_force(joint, delta)
     s, flank = _truncation(joint, delta)
     shape = delta / joint.first_yield * flank + s
-    return 2 * joint.yield_stress * semi_chord(joint, delta) * shape
+    return 2 * joint.threshold * semi_chord(joint, delta) * shape
 
 
 def plastic_stiffness(joint: LawJoint, delta: Array) -> Array:
     """``dP/d(delta)`` of `plastic_force`."""
-    assert joint.yield_stress is not None
+    if joint.yield_stress is None:
+        return paper_stiffness(joint, delta)
     dR = joint.clearance
     s, flank = _truncation(joint, delta)
     root = np.sqrt(delta / (2 * (dR + delta)))
     slope = flank + (flank + joint.first_yield * s / np.where(delta > 0, delta, 1)) * dR / (2 * (dR + delta))
-    return 4 * joint.yield_stress * joint.radius * root * slope / joint.first_yield
+    return 4 * joint.threshold * joint.radius * root * slope / joint.first_yield
 
 
 def plastic_peak(joint: LawJoint, delta: Array) -> Array:
-    """Peak pressure of `plastic_force`: Winkler's, at most the yield stress."""
-    assert joint.yield_stress is not None
-    return np.minimum(winkler_pressure(joint, delta), joint.yield_stress)
+    """Peak pressure of `plastic_force`: Winkler's, at most ``c sigY``."""
+    return np.minimum(winkler_pressure(joint, delta), joint.threshold)
 
 
 def winkler_force(joint: LawJoint, delta: Array) -> Array:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.postprocess.chord_laws import plastic_force, plastic_peak
 from archord.postprocess.least_squares import Estimate, LeastSquares, fit
-from archord.postprocess.refinement import Refined
+from archord.postprocess.refinement import Order, Refined
 from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.winkler import elastic_force, onset, peak_pressure, plastic_force, plastic_peak_pressure
 from archord.solver.scene import SceneError
 
 _STARTS_OF_C = (0.7, 1.0, 1.5, 2.5)  # p0 has a kink at the onset: one start may miss the best side of it
@@ -37,7 +37,10 @@ class Residual:
 
 @dataclass(frozen=True)
 class CurveFit:
-    """A fit to one curve of one or more runs; ``k`` or ``c`` is None where the curve does not determine it."""
+    """A fit to one curve of one or more runs; ``k`` or ``c`` is None where the curve does not determine it.
+
+    ``orders`` are the orders of convergence taken for the runs that have a second mesh.
+    """
 
     quantity: str
     k: Estimate | None
@@ -47,6 +50,8 @@ class CurveFit:
     residuals: tuple[Residual, ...]
     refined: int  # of the scenes, how many have a second mesh
     flatness: tuple[float, float] | None = None  # plateau only: smallest and largest median over peak pressure
+    orders: tuple[tuple[str, Order], ...] = ()
+    k_held: bool = False
 
     @property
     def rms(self) -> float:
@@ -68,39 +73,48 @@ class CurveFit:
 
 
 def fit_curve(
-    quantity: str, groups: list[Refined], load_range: tuple[float, float] = (0.0, np.inf), confidence: float = 0.95
+    quantity: str,
+    groups: list[Refined],
+    load_range: tuple[float, float] = (0.0, np.inf),
+    confidence: float = 0.95,
+    hold_k: float | None = None,
 ) -> CurveFit:
     """Fit the law to the curve "P" or "p0" of all ``groups``.
 
     ``c`` is fitted where two steps or more lie on the plateau. Where fewer than two have not yielded, p0 tells nothing
-    of ``k``, and ``c`` alone is fitted to those that have. Where some scenes have a second mesh, the fit is repeated
-    with their data extrapolated to vanishing element size; the change of a parameter is its discretisation error.
+    of ``k``, and ``c`` alone is fitted to those that have. ``hold_k`` is ``k`` where it is given, without an error.
+    Where some scenes have a second mesh, the fit is repeated with their data extrapolated to vanishing element size;
+    the change of a parameter is its discretisation error.
     Raises `SceneError` where too few steps are in the range.
     """
     runs = tuple(g.run for g in groups)
     chosen = tuple(selected(run, load_range) for run in runs)
     yielded = tuple(rows & (run.peeq_max > 0) for run, rows in zip(runs, chosen, strict=True))
-    plateau_alone = quantity == "p0" and any(map(np.any, yielded)) and _count(chosen) - _count(yielded) < 2
-    problem = _Problem(quantity, runs, yielded if plateau_alone else chosen)
+    plateau_alone = (
+        hold_k is None and quantity == "p0" and any(map(np.any, yielded)) and _count(chosen) - _count(yielded) < 2
+    )
+    problem = _Problem(quantity, runs, yielded if plateau_alone else chosen, hold_k)
     data = [getattr(g.run, quantity) for g in groups]
     free, best = (("c",), problem.solve(("c",), data)) if plateau_alone else problem.solve_best(data)
     mesh: dict[str, float] = {}
     refined = sum(bool(g.coarser) for g in groups)
-    if refined:
-        finer = [
-            y + g.shift(y, getattr(g.coarser[0], quantity)) if g.coarser else y
-            for g, y in zip(groups, data, strict=True)
-        ]
+    curves = [[getattr(run, quantity) for run in g.runs] for g in groups]
+    if refined and free:
+        finer = [y[0] + g.shift(y) if g.coarser else y[0] for g, y in zip(groups, curves, strict=True)]
         moved = problem.solve(free, finer).parameters - best.parameters
         mesh = dict(zip(free, np.abs(moved).tolist(), strict=True))
     found = {name: best.estimate(i, confidence, mesh.get(name)) for i, name in enumerate(free)}
+    if hold_k is not None:
+        found["k"] = Estimate(hold_k, 0.0, 0.0, 0.0, hold_k, hold_k)
     law = problem.predict(free, best.parameters)
     loads = [run.delta[rows] / run.dR for run, rows in zip(problem.runs, problem.chosen, strict=True)]
     residuals = tuple(
         Residual(run.name, *arrays)
         for run, *arrays in zip(problem.runs, loads, problem.dimensionless(data), law, strict=True)
     )
-    return CurveFit(quantity, found.get("k"), found.get("c"), best.r2, best.dof, residuals, refined)
+    orders = tuple((g.run.name, g.order(y)) for g, y in zip(groups, curves, strict=True) if g.coarser)
+    k, c = found.get("k"), found.get("c")
+    return CurveFit(quantity, k, c, best.r2, best.dof, residuals, refined, None, orders, hold_k is not None)
 
 
 def _count(rows: tuple[Array, ...]) -> int:
@@ -109,11 +123,15 @@ def _count(rows: tuple[Array, ...]) -> int:
 
 @dataclass(frozen=True)
 class _Problem:
-    """A curve of some runs at their chosen steps, and the law's fit to it with some parameters free."""
+    """A curve of some runs at their chosen steps, and the law's fit to it with some parameters free.
+
+    ``held`` is k where it is not free.
+    """
 
     quantity: str
     runs: tuple[RunCurve, ...]
     chosen: tuple[Array, ...]
+    held: float | None = None
 
     def dimensionless(self, data: list[Array]) -> list[Array]:
         """The chosen steps of each run's ``data``, over the run's scale."""
@@ -123,7 +141,7 @@ class _Problem:
     def predict(self, free: tuple[str, ...], values: Array) -> list[Array]:
         """The law for each run; without ``c`` it is elastic, without ``k`` rigid up to the plateau."""
         given = dict(zip(free, values, strict=True))
-        k, c = given.get("k", np.inf), given.get("c")
+        k, c = given.get("k", self.held), given.get("c")
         parts = zip(self.runs, self.chosen, strict=True)
         return [dimensionless_law(self.quantity, run, run.delta[rows], k, c) for run, rows in parts]
 
@@ -145,12 +163,14 @@ class _Problem:
 
     def solve_best(self, data: list[Array]) -> tuple[tuple[str, ...], LeastSquares]:
         """The parameters that the steps can tell, and their fit."""
-        if not any(run.sigY for run in self.runs):
-            return ("k",), self.solve(("k",), data)
-        best = self.solve(("k", "c"), data)
-        if np.isfinite(best.standard_errors).all() and self._on_plateau(*best.parameters) >= 2:
-            return ("k", "c"), best
-        return ("k",), self.solve(("k",), data)
+        elastic = ("k",) if self.held is None else ()
+        if any(run.sigY for run in self.runs):
+            plastic = (*elastic, "c")
+            best = self.solve(plastic, data)
+            k, c = best.parameters if self.held is None else (self.held, best.parameters[0])
+            if np.isfinite(best.standard_errors).all() and self._on_plateau(k, c) >= 2:
+                return plastic, best
+        return elastic, self.solve(elastic, data)
 
     def _on_plateau(self, k: float, c: float) -> int:
         """Number of steps past the onset of the plateau that have yielded indeed.
@@ -158,21 +178,21 @@ class _Problem:
         A falling slope alone is no plateau: that of an elastic p0(delta) falls too.
         """
         return sum(
-            int(((r.delta > onset(k, c, r.E_star, r.R, r.sigY)) & (r.peeq_max > 0))[rows].sum())
+            int(((r.delta > r.joint(k, c).first_yield) & (r.peeq_max > 0))[rows].sum())
             for r, rows in zip(self.runs, self.chosen, strict=True)
             if r.sigY
         )
 
 
-def dimensionless_law(quantity: str, run: RunCurve, delta: Array, k: float, c: float | None) -> Array:
-    """``P/(E* dR)`` or ``p0 R/(E* dR)`` of ``run``'s joint ``(n,)``; elastic if ``c`` or its yield stress is None."""
-    if quantity == "P":
-        elastic = elastic_force(delta, k, run.E_star, run.R, run.dR)
-        plastic = plastic_force(delta, k, c, run.E_star, run.R, run.dR, run.sigY) if c and run.sigY else elastic
-    else:
-        elastic = peak_pressure(delta, k, run.E_star, run.R)
-        plastic = plastic_peak_pressure(delta, k, c, run.E_star, run.R, run.sigY) if c and run.sigY else elastic
-    return plastic / _scale(quantity, run)
+def dimensionless_law(quantity: str, run: RunCurve, delta: Array, k: float | None, c: float | None) -> Array:
+    """``P/(E* dR)`` or ``p0 R/(E* dR)`` of ``run``'s joint ``(n,)``; elastic if ``c`` or its yield stress is None.
+
+    Without ``k`` p0 is at the plateau everywhere.
+    """
+    if k is None:
+        return np.full(delta.shape, (c or np.nan) * (run.sigY or np.nan)) / _scale(quantity, run)
+    law = plastic_force if quantity == "P" else plastic_peak
+    return law(run.joint(k, c), delta) / _scale(quantity, run)
 
 
 def selected(run: RunCurve, load_range: tuple[float, float]) -> Array:

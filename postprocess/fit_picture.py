@@ -8,6 +8,7 @@ import numpy as np
 
 from archord.postprocess.calibration import Calibration, Fits
 from archord.postprocess.curve_fit import CurveFit, dimensionless_law
+from archord.solver.output_file import writing
 from archord.solver.scene import SceneError
 
 
@@ -28,7 +29,8 @@ def draw_fit(calibration: Calibration, target: str | Path) -> Path:
         _curve(axes[0], fits, fits.P, "P / (E* ΔR)", "force")
         _curve(axes[1], fits, fits.p0, "p0 R / (E* ΔR)", "peak pressure")
         _residuals(axes[2], fits.P, fits.p0)
-        figure.savefig(target, dpi=110)
+        with writing(target):
+            figure.savefig(target, dpi=110)
     finally:
         plt.close(figure)
     return target

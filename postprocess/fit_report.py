@@ -63,6 +63,10 @@ def notes(calibration: Calibration) -> list[str]:
         said.append("mesh: the discretisation error is unknown, no scene was given on a second mesh.")
     elif refined < scenes:
         said.append(f"mesh: {refined} of {scenes} scenes were given on a second mesh; the joint fit counts no other.")
+    if refined:
+        said += [f"mesh: order of convergence of {name}: {words}." for name, words in _orders(joint).items()]
+    if calibration.hold_k is not None:
+        said.append(f"k: held at {calibration.hold_k:g}, not fitted; the errors of c do not count an error of k.")
     for fits in calibration.each:
         if fits.finer:
             said.append(f"mesh: {fits.runs[0].name} serves to estimate the discretisation error of {fits.finer}.")
@@ -86,6 +90,18 @@ def notes(calibration: Calibration) -> list[str]:
     return said
 
 
+def _orders(fits: Fits) -> dict[str, str]:
+    """By run, the orders taken for its curves, in words."""
+    found: dict[str, dict[str, list[str]]] = {}
+    for fit in fits.curves:
+        for name, order in fit.orders:
+            found.setdefault(name, {}).setdefault(order.words, []).append(fit.quantity)
+    return {
+        name: ", ".join(f"{' and '.join(curves)} {words}" for words, curves in orders.items())
+        for name, orders in found.items()
+    }
+
+
 def as_json(calibration: Calibration) -> str:
     """Everything as JSON: the law (see `FittedLaw.from_json`), its variant per run, fits, residuals, notes."""
     low, high = calibration.load_range
@@ -94,6 +110,7 @@ def as_json(calibration: Calibration) -> str:
         "laws": [asdict(calibration.law(run)) for run in calibration.joint.runs],
         "range": [low, high if math.isfinite(high) else None],
         "confidence": calibration.confidence,
+        "hold_k": calibration.hold_k,
         "each": [_fits(fits) for fits in calibration.each],
         "joint": _fits(calibration.joint),
         "notes": notes(calibration),
@@ -115,7 +132,9 @@ def _curve(fit: CurveFit) -> dict[str, Any]:
         "c": fit.c and asdict(fit.c),
         "r2": fit.r2 if math.isfinite(fit.r2) else None,
         "degrees_of_freedom": fit.dof,
+        "k_held": fit.k_held,
         "scenes_with_second_mesh": fit.refined,
+        "orders": {name: asdict(order) for name, order in fit.orders},
         "flatness": fit.flatness,
         "rms_residual": fit.rms,
         "largest_residual": fit.largest,
@@ -142,7 +161,10 @@ def _add_rows(table: Table, fits: Fits, name: str) -> None:
                 steps = sum(len(part.load) for part in fit.residuals)
                 r2 = "" if fit.k is None else f"{fit.r2:.5f}"
                 quality = [r2, f"{100 * fit.rms:.2f} %", f"{100 * fit.largest:+.2f} %", str(steps)]
-            table.add_row(name, fit.quantity, parameter, *_numbers(estimate), *quality)
+            numbers = _numbers(estimate)
+            if parameter == "k" and fit.k_held:
+                numbers = [numbers[0], "held", "", ""]
+            table.add_row(name, fit.quantity, parameter, *numbers, *quality)
             name = ""
 
 

@@ -7,10 +7,13 @@ import math
 from dataclasses import asdict, dataclass, fields
 from string import Template
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from archord.geometry.basis import Array
-from archord.postprocess.winkler import elastic_force, plastic_force
+from archord.postprocess.chord_laws import plastic_force, plastic_stiffness
+from archord.postprocess.law_joint import LawJoint
+from archord.postprocess.monotone_root import monotone_root
 from archord.solver.scene import SceneError
 
 
@@ -51,13 +54,30 @@ class FittedLaw:
     @property
     def onset(self) -> float | None:
         """Displacement ``delta0 = c sigY R/(k E*)`` at which the plateau begins; None for an elastic law."""
-        return None if self.c is None or self.sigY is None else self.c * self.sigY * self.R / (self.k * self.E_star)
+        return None if self.c is None else self.joint.first_yield
+
+    @property
+    def joint(self) -> LawJoint:
+        """The joint with the law's coefficients, as the closed-form laws take it."""
+        return LawJoint(self.R, self.dR, self.E_star, self.sigY, k=self.k, c=self.c or 1.0)
 
     def force(self, delta: ArrayLike) -> Array:
         """Force per unit thickness of the whole joint at ``delta`` (any shape); 0 where ``delta <= 0``."""
-        if self.c is None or self.sigY is None:
-            return elastic_force(delta, self.k, self.E_star, self.R, self.dR)
-        return plastic_force(delta, self.k, self.c, self.E_star, self.R, self.dR, self.sigY)
+        return plastic_force(self.joint, np.maximum(delta, 0.0))
+
+    def stiffness(self, delta: ArrayLike) -> Array:
+        """``dP/d(delta)`` of `force` (any shape); 0 where ``delta <= 0``."""
+        return plastic_stiffness(self.joint, np.maximum(delta, 0.0))
+
+    def displacement(self, force: ArrayLike) -> Array:
+        """The inverse of `force` (any shape): 0 where ``force <= 0``, nan where no displacement brings so much.
+
+        The plastic law's force stays below ``2 sqrt(2) c sigY R``, twice the threshold on the longest chord.
+        """
+        joint = self.joint
+        return monotone_root(
+            lambda x: plastic_force(joint, x), lambda x: plastic_stiffness(joint, x), np.asarray(force, float), self.dR
+        )
 
     def to_json(self) -> str:
         """The law as a JSON object; `from_json` gives it back, digit for digit."""
@@ -81,7 +101,7 @@ class FittedLaw:
         return cls(**data)
 
     def to_python(self) -> str:
-        """Source of a Python module with ``force(delta)`` that needs nothing but ``math``."""
+        """Source of a Python module with ``force(delta)`` and ``stiffness(delta)``, which needs only ``math``."""
         low, high = self.fitted_range
         values = {
             "note": "plastic-Winkler law" if self.c is not None else "Winkler law",
@@ -132,4 +152,19 @@ def force(delta, k=K, c=C, e_star=E_STAR, r=R, dr=DR, sig_y=SIG_Y):
     u = threshold / peak
     s = math.sqrt(1.0 - u)
     return 2.0 * threshold * chord * (s + u * (2.0 + s) / (3.0 * (1.0 + s) ** 2))
+
+
+def stiffness(delta, k=K, c=C, e_star=E_STAR, r=R, dr=DR, sig_y=SIG_Y):
+    """Derivative of force; 0 while the joint is open."""
+    if delta <= 0.0:
+        return 0.0
+    chord = r * math.sqrt(2.0 * delta / (dr + delta))
+    peak, threshold = k * e_star * delta / r, c * sig_y
+    longer = dr / (2.0 * (dr + delta))
+    if peak <= threshold:
+        return 4.0 / 3.0 * k * e_star / r * chord * (1.0 + longer)
+    u = threshold / peak
+    s = math.sqrt(1.0 - u)
+    flank = u * (2.0 + s) / (3.0 * (1.0 + s) ** 2)
+    return 2.0 * threshold * chord / delta * (flank + (flank + s) * longer)
 ''')

@@ -14,6 +14,9 @@ from archord.solver.scene import Scene, SceneError
 Array = npt.NDArray[np.float64]
 
 
+YIELDING = ("both", "block", "pin", "unlike")
+
+
 class LawRangeWarning(UserWarning):
     """A law was asked outside its range; the message tells the range."""
 
@@ -27,9 +30,12 @@ class LawJoint:
     """A pin of radius ``radius`` (R1) in a hole of radius R2 = R1 + ``clearance``, in any consistent units.
 
     ``E_star`` is the contact modulus of the plane, ``yield_stress`` that of the weaker body, ``k`` Winkler's
-    coefficient (0.85: Hu et al., eq. 6), ``length`` the length of the joint along its axis. ``dundurs_alpha`` =
+    coefficient (0.85: Hu et al., eq. 6), ``c`` the plateau of the pressure over the yield stress (1: Hu et al., eq.
+    10), ``length`` the length of the joint along its axis. ``dundurs_alpha`` =
     (E1' - E2')/(E1' + E2') is positive where the pin is the stiffer body, ``dundurs_beta`` goes with it; both are zero
-    for like bodies. Raises `SceneError` for values that make no joint.
+    for like bodies. Only the regime law asks for the rest: ``plane`` ("strain" or "stress"), ``nu`` of the block and
+    ``pin_nu`` of the pin (None: the block's, or rigid), and which bodies have the yield stress, ``yielding``: "both",
+    "block", "pin", or "unlike" where each has its own. Raises `SceneError` for values that make no joint.
     """
 
     radius: float
@@ -37,18 +43,31 @@ class LawJoint:
     E_star: float
     yield_stress: float | None = None
     k: float = 0.85
+    c: float = 1.0
     length: float | None = None
     dundurs_alpha: float = 0.0
     dundurs_beta: float = 0.0
+    plane: str | None = None
+    nu: float | None = None
+    pin_nu: float | None = None
+    yielding: str = "both"
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name in ("radius", "clearance", "E_star", "k", "yield_stress", "length"):
+        for name in ("radius", "clearance", "E_star", "k", "c", "yield_stress", "length"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise SceneError(f"{name} = {value:g} must be a positive number.")
         if not -1 <= self.dundurs_alpha <= 1:
             raise SceneError(f"dundurs_alpha = {self.dundurs_alpha:g} must be between -1 and 1.")
+        if self.plane not in (None, "strain", "stress"):
+            raise SceneError(f'plane = {self.plane!r} must be "strain" or "stress".')
+        if self.yielding not in YIELDING:
+            raise SceneError(f"yielding = {self.yielding!r} must be one of {', '.join(YIELDING)}.")
+        for name in ("nu", "pin_nu"):
+            value = getattr(self, name)
+            if value is not None and not -1 < value < 0.5:
+                raise SceneError(f"{name} = {value:g} must be between -1 and 0.5.")
         if not -0.5 <= self.dundurs_beta <= 0.5:
             raise SceneError(f"dundurs_beta = {self.dundurs_beta:g} must be between -0.5 and 0.5.")
 
@@ -75,6 +94,10 @@ class LawJoint:
             length=length,
             dundurs_alpha=alpha,
             dundurs_beta=beta,
+            plane=plane,
+            nu=scene.block.nu,
+            pin_nu=None if pin is None else pin.nu,
+            yielding=_yielding(None if pin is None else pin.yield_stress, scene.block.yield_stress),
         )
 
     @property
@@ -89,8 +112,19 @@ class LawJoint:
 
     @property
     def first_yield(self) -> float:
-        """Critical displacement ``delta0 = R sigY / (k E*)`` (Hu et al.); infinite without a yield stress."""
-        return math.inf if self.yield_stress is None else self.radius * self.yield_stress / (self.k * self.E_star)
+        """Critical displacement ``delta0 = c sigY R/(k E*)`` (Hu et al.: c = 1); infinite without a yield stress."""
+        return self.radius * self.threshold / (self.k * self.E_star)
+
+    @property
+    def threshold(self) -> float:
+        """Largest pressure of the foundation, ``c sigY``; infinite without a yield stress."""
+        return math.inf if self.yield_stress is None else self.c * self.yield_stress
+
+
+def _yielding(pin: float | None, block: float | None) -> str:
+    if pin is not None and block is not None:
+        return "both" if math.isclose(pin, block, rel_tol=1e-6) else "unlike"
+    return "pin" if pin is not None else "block" if block is not None else "both"
 
 
 def _transverse(nu: float, plane: Plane) -> float:

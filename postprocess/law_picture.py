@@ -9,6 +9,7 @@ import numpy as np
 from archord.postprocess.law import Law, Outside
 from archord.postprocess.law_joint import LawJoint
 from archord.postprocess.law_tables import sample
+from archord.solver.output_file import check_output, writing
 from archord.solver.scene import SceneError
 
 _POINTS = 400
@@ -36,8 +37,7 @@ def draw_laws(
     formats = plt.gcf().canvas.get_supported_filetypes()
     if target.suffix[1:].lower() not in formats:
         raise SceneError(f"{target}: must end in one of {', '.join('.' + name for name in sorted(formats))}.")
-    if not target.parent.is_dir():
-        raise SceneError(f"{target}: cannot be written: {target.parent} is not a folder.")
+    check_output(target)
     figure, axes = plt.subplots(1, 3, figsize=(14, 4.4), layout="constrained")
     force = joint.E_star * joint.clearance
     for law in laws:
@@ -55,6 +55,7 @@ def draw_laws(
         axis.set(xlabel=names[0], ylabel=label, xlim=(0, to), ylim=(0, None))
         axis.grid(alpha=0.3)
     axes[0].legend(frameon=False)
-    figure.savefig(target, dpi=110)
+    with writing(target):
+        figure.savefig(target, dpi=110)
     plt.close(figure)
     return target

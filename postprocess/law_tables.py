@@ -71,10 +71,13 @@ def _comparison() -> list[str]:
 
     from archord.postprocess.law_joint import LawRangeWarning
 
-    joint = LawJoint(radius=1.0, clearance=0.005, E_star=1.0, yield_stress=0.002, length=2.0)
+    joint = LawJoint(radius=1.0, clearance=0.005, E_star=1.0, yield_stress=0.002, length=2.0, plane="strain", nu=0.3)
     delta = np.array([0.05, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0]) * joint.clearance
     lines = ["### P/(E* dR) against each other", ""]
-    lines += ["dR/R = 0.5 %, sigY/E* = 0.2 %, k = 0.85, length 2 R; in brackets: outside the law's range.", ""]
+    lines += [
+        "dR/R = 0.5 %, sigY/E* = 0.2 %, k = 0.85, length 2 R, plane strain, nu = 0.3; in brackets: outside the range.",
+        "",
+    ]
     lines += [
         f"| delta/dR | {' | '.join(f'{d:g}' for d in delta / joint.clearance)} |",
         "|---" * (len(delta) + 1) + "|",

@@ -10,6 +10,7 @@ from archord.postprocess import chord_laws as chord
 from archord.postprocess import hertz_laws as hertz
 from archord.postprocess import logarithmic_laws as log
 from archord.postprocess import persson_law as persson
+from archord.postprocess import regime_law
 from archord.postprocess.law import Law
 from archord.postprocess.law_joint import LawJoint
 from archord.solver.scene import SceneError
@@ -105,6 +106,22 @@ _ALL = [
         force_at=chord.plastic_force,
         stiffness_at=chord.plastic_stiffness,
         peak_at=chord.plastic_peak,
+        angle_at=chord.chord_angle,
+    ),
+    Law(
+        "regime",
+        "plastic-Winkler law with k and c of archord's simulations",
+        "as paper-plastic with k, and c sigY in place of sigY; ln k, ln c = polynomials of ln(sigY R/(0.4 E* "
+        "dR)), nu - 0.3, alpha and beta, by plane and yielding body",
+        regime_law.range_in_words(),
+        "ours: fitted to postprocess/finding.csv, which python3 -m archord.benchmarks.finding solves anew",
+        regime_law.quality_in_words(),
+        limit=_deepest,
+        unfit=regime_law.unfit,
+        needs=("plane", "nu"),
+        force_at=regime_law.regime_force,
+        stiffness_at=regime_law.regime_stiffness,
+        peak_at=regime_law.regime_peak,
         angle_at=chord.chord_angle,
     ),
     Law(

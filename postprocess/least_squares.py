@@ -52,11 +52,14 @@ def fit(predict: Callable[[Array], Array], starts: Sequence[Sequence[float]], da
 
     The covariance is ``s^2 (J^T J)^-1`` with ``s^2 = sum r^2/(n - m)`` (Seber and Wild 2003, section 2.1). It takes the
     residuals as independent. A parameter without influence on any prediction gets an infinite error. Raises ValueError
-    unless there are more data than parameters, or where only combinations of parameters can be told.
+    unless there are more data than parameters, or where only combinations of parameters can be told. Without parameters
+    the residuals are all.
     """
     m, n = len(starts[0]), len(data)
     if n <= m:
         raise ValueError(f"{n} points cannot determine {m} parameters and their errors")
+    if m == 0:
+        return _judged(np.zeros(0), np.zeros(0), predict(np.zeros(0)) - data, data)
     tight = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
     found = [least_squares(lambda v: predict(v) - data, s, bounds=(0, np.inf), x_scale="jac", **tight) for s in starts]
     best = min(found, key=lambda solution: solution.cost)
@@ -68,5 +71,10 @@ def fit(predict: Callable[[Array], Array], starts: Sequence[Sequence[float]], da
     squares = float(best.fun @ best.fun)
     errors = np.full(m, np.inf)
     errors[felt] = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)) * squares / (n - m)) / size[felt]
-    spread = float(((data - data.mean()) ** 2).sum())
-    return LeastSquares(best.x, errors, best.fun, 1 - squares / spread if spread else float("nan"), n - m)
+    return _judged(best.x, errors, best.fun, data)
+
+
+def _judged(parameters: Array, errors: Array, residuals: Array, data: Array) -> LeastSquares:
+    squares, spread = float(residuals @ residuals), float(((data - data.mean()) ** 2).sum())
+    r2 = 1 - squares / spread if spread else float("nan")
+    return LeastSquares(parameters, errors, residuals, r2, len(data) - len(parameters))

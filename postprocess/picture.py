@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 import h5py
 import numpy as np
 
+from archord.postprocess.run_curve import read_run
 from archord.solver.history import read_history
+from archord.solver.output_file import check_output, writing
 from archord.solver.run_folder import FILES
 from archord.solver.scene import Scene, SceneError
-from archord.solver.scene_file import parse_scene
 from archord.solver.step_file import step_name
 
 _SUBTRIANGLES = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]  # of a VTK second-order triangle
@@ -29,25 +29,27 @@ def draw(folder: str | Path, target: str | Path | None = None) -> Path:
 
     folder = Path(folder)
     missing = [name for name in FILES if not (folder / name).is_file()]
-    if "history.csv" in missing or "scene.toml" in missing:
-        raise SceneError(f"{folder}: is not a run folder: {missing[0]} is missing.")
+    run = read_run(folder)
+    if missing:
+        raise SceneError(f"{folder}: is not a complete run folder: {missing[0]} is missing.")
     history = read_history(folder / "history.csv")
-    if missing or not history["step"]:
-        raise SceneError(f"{folder}: holds no accepted step.")
     target = Path(target) if target else folder / "picture.png"
     formats = plt.gcf().canvas.get_supported_filetypes()
     if target.suffix[1:].lower() not in formats:
         raise SceneError(f"{target}: must end in one of {', '.join('.' + name for name in sorted(formats))}.")
-    if not target.parent.is_dir():
-        raise SceneError(f"{target}: cannot be written: {target.parent} is not a folder.")
-    scene = parse_scene(tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8")), str(folder / "scene.toml"))
+    check_output(target)
     figure, axes = plt.subplots(1, 3, figsize=(13, 4.2), layout="constrained", width_ratios=[1.0, 1.1, 1.1])
-    draw_zone(figure, axes[0], folder, scene, len(history["step"]))
-    _pressure(axes[1], folder, scene, history)
+    try:
+        draw_zone(figure, axes[0], folder, run.scene, len(history["step"]))
+        _pressure(axes[1], folder, run.scene, history)
+    except (OSError, KeyError):
+        plt.close(figure)
+        raise SceneError(f"{folder}: fields.h5 or contact.h5 cannot be read, or lacks steps of history.csv.") from None
     axes[2].plot([0, *history["delta/dR"]], [0, *history["P/(E* R)"]], ".-", color="tab:blue")
     axes[2].set(xlabel="δ / ΔR", ylabel="P / (E* R)", title="force of the joint", xlim=(0, None), ylim=(0, None))
     axes[2].grid(alpha=0.3)
-    figure.savefig(target, dpi=110)
+    with writing(target):
+        figure.savefig(target, dpi=110)
     plt.close(figure)
     return target
 

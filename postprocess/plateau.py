@@ -10,7 +10,6 @@ from archord.postprocess.curve_fit import CurveFit, Residual, selected
 from archord.postprocess.least_squares import fit
 from archord.postprocess.refinement import Refined
 from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.winkler import onset
 
 
 def median_pressure(arc: ArcPressure) -> float:
@@ -58,12 +57,12 @@ def fit_plateau(
     """
     if force.k is None or force.c is None:
         return None
-    residuals, shifted, flat, refined = [], [], [], 0
+    residuals, shifted, flat, orders = [], [], [], []
     for g in groups:
         run = g.run
         if run.sigY is None or run.folder is None:
             continue
-        wide = run.delta > 4 / 3 * onset(force.k.value, force.c.value, run.E_star, run.R, run.sigY)
+        wide = run.delta > 4 / 3 * run.joint(force.k.value, force.c.value).first_yield
         rows = selected(run, load_range) & wide
         if not rows.any():
             continue
@@ -71,8 +70,9 @@ def fit_plateau(
         values = median[rows] / run.sigY
         shift = np.zeros(len(values))
         if g.coarser:
-            shift = g.shift(median, plateau_pressure(g.coarser[0])[0])[rows] / run.sigY
-            refined += 1
+            curves = [median, *(plateau_pressure(coarse)[0] for coarse in g.coarser)]
+            shift = g.shift(curves)[rows] / run.sigY
+            orders.append((run.name, g.order(curves)))
         residuals.append(Residual(run.name, run.delta[rows] / run.dR, values, values))
         shifted.append(values + shift)
         flat.append(flatness[rows])
@@ -80,8 +80,8 @@ def fit_plateau(
         return None
     data = np.concatenate([r.data for r in residuals])
     mean = fit(lambda v: np.full(len(data), v[0]), [[float(data.mean())]], data)
-    error = abs(float(np.concatenate(shifted).mean() - data.mean())) if refined else None
+    error = abs(float(np.concatenate(shifted).mean() - data.mean())) if orders else None
     residuals = [Residual(r.name, r.load, r.data, np.full(len(r.data), mean.parameters[0])) for r in residuals]
     flats = np.concatenate(flat)
     c, limits = mean.estimate(0, confidence, error), (float(flats.min()), float(flats.max()))
-    return CurveFit("plateau", None, c, mean.r2, mean.dof, tuple(residuals), refined, limits)
+    return CurveFit("plateau", None, c, mean.r2, mean.dof, tuple(residuals), len(orders), limits, tuple(orders))

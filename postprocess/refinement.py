@@ -1,17 +1,41 @@
-"""The discretisation error of a run, from a second run of the same scene on another mesh."""
+"""The discretisation error of a run, from runs of the same scene on other meshes."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import brentq
 
 from archord.geometry.basis import Array
 from archord.postprocess.run_curve import RunCurve
 from archord.solver.scene import Scene, SceneError
 
-_ORDER = 1  # assumed: P converges faster, but peak pressures and perfect plasticity do not for certain
+_ASSUMED = 1.0  # P converges faster, but peak pressures and perfect plasticity do not for certain
+_LOWEST, _HIGHEST = 0.5, 2.0  # below, extrapolation multiplies noise; above, the error would be told too small
+_TELLABLE = (0.05, 12.0)
+
+
+@dataclass(frozen=True)
+class Order:
+    """Order of convergence taken for a curve; ``estimate`` is what three meshes say, None if they cannot, or if there
+    are but two."""
+
+    value: float
+    estimate: float | None
+    meshes: int
+
+    @property
+    def words(self) -> str:
+        """The order and where it comes from."""
+        if self.meshes < 3:
+            return f"{self.value:g} (assumed)"
+        if self.estimate is None:
+            return f"{self.value:g} (assumed: the differences of three meshes show none)"
+        bounded = "" if self.value == self.estimate else f", which give {self.estimate:.1f}: bounded"
+        return f"{self.value:.2g} (from three meshes{bounded})"
 
 
 @dataclass(frozen=True)
@@ -21,13 +45,40 @@ class Refined:
     run: RunCurve
     coarser: tuple[RunCurve, ...] = ()
 
-    def shift(self, fine: Array, coarse: Array) -> Array:
-        """What refinement still adds to ``fine`` ``(n,)``, by Richardson's extrapolation from the next coarser run.
+    @property
+    def runs(self) -> tuple[RunCurve, ...]:
+        """All runs, finest first."""
+        return (self.run, *self.coarser)
 
-        ``(fine - coarse)/(h_coarse/h_fine - 1)`` for an error of the first order. Steps that the coarser run does not
-        have get the relative shift of its last one.
+    def order(self, curves: Sequence[Array]) -> Order:
+        """Order of convergence of a curve, given on all meshes, finest first, each ``(n,)``.
+
+        From the three finest: p of ``(h3^p - h2^p)/(h2^p - h1^p) = |f3 - f2|/|f2 - f1|``, norms over the steps they
+        have in common (Roache 1998, section 5.10), bounded to 0.5 .. 2. The first order is assumed with two meshes,
+        and where the differences have no common sign or do not shrink.
         """
-        ratio = (self.coarser[0].scene.joint.h / self.run.scene.joint.h) ** _ORDER
+        if len(curves) < 3:
+            return Order(_ASSUMED, None, len(curves))
+        n = min(map(len, curves[:3]))
+        first, second = curves[1][:n] - curves[0][:n], curves[2][:n] - curves[1][:n]
+        estimate = None
+        if first @ second > 0:
+            h = np.array([run.scene.joint.h for run in self.runs[:3]]) / self.run.scene.joint.h
+            goal = np.sqrt((second @ second) / (first @ first))
+            low, high = ((h[2] ** p - h[1] ** p) / (h[1] ** p - 1) for p in _TELLABLE)
+            if low < goal < high:
+                estimate = float(brentq(lambda p: (h[2] ** p - h[1] ** p) / (h[1] ** p - 1) / goal - 1, *_TELLABLE))
+        value = _ASSUMED if estimate is None else min(max(estimate, _LOWEST), _HIGHEST)
+        return Order(value, estimate, len(curves))
+
+    def shift(self, curves: Sequence[Array]) -> Array:
+        """What refinement still adds to the finest of ``curves`` ``(n,)``, by Richardson's extrapolation.
+
+        ``(fine - coarse)/((h_coarse/h_fine)^p - 1)`` from the next coarser run, with the order p of `order`. Steps that
+        the coarser run does not have get the relative shift of its last one.
+        """
+        fine, coarse = curves[:2]
+        ratio = (self.coarser[0].scene.joint.h / self.run.scene.joint.h) ** self.order(curves).value
         n = min(len(fine), len(coarse))
         relative = (fine[:n] - coarse[:n]) / (ratio - 1) / np.where(fine[:n] == 0, 1.0, fine[:n])
         return fine * np.append(relative, np.full(len(fine) - n, relative[-1]))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.postprocess.law_joint import LawJoint
 from archord.solver.history import read_history
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import load_scene
@@ -47,6 +48,10 @@ class RunCurve:
         given = [s.yield_stress for s in (self.scene.pin, self.scene.block) if s.yield_stress is not None]
         return min(given, default=None)
 
+    def joint(self, k: float, c: float | None = None) -> LawJoint:
+        """The joint with these coefficients; elastic without ``c``."""
+        return LawJoint(self.R, self.dR, self.E_star, self.sigY if c else None, k=k, c=c or 1.0)
+
     @property
     def plane(self) -> str:
         """Plane of the analysis: "strain" or "stress"."""
@@ -65,6 +70,8 @@ def read_run(folder: str | Path) -> RunCurve:
         delta, P, p0, eps, peeq = [np.array(history[name]) for name in ("delta", "P", "p0", "eps", "peeq_max")]
     except (ValueError, IndexError, KeyError, OSError):
         raise SceneError(f"{folder / 'history.csv'}: cannot be read as the history of a run.") from None
+    if not np.isfinite([delta, P, p0, eps, peeq]).all():
+        raise SceneError(f"{folder / 'history.csv'}: holds numbers that are not finite.")
     if not len(delta):
         raise SceneError(f"{folder}: holds no accepted step.")
     return RunCurve(str(folder), scene, delta, P, p0, eps, peeq, folder)

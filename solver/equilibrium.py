@@ -20,6 +20,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.geometry.fenicsx import create_vector
+from archord.materials.elasticity import elastic_tangent
 from archord.solver.bordered import Bordered, direct_solver
 from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact import Contact
@@ -111,7 +112,8 @@ class Equilibrium:
         self._reaction = np.zeros((self.n_owned, 2))
         self._reaction_norm = self._noise = 0.0
         self.largest_reaction = 0.0  # norm, of all accepted states
-        stiffness = max(body.material.E for body in bulk.bodies)
+        materials = [body.material for body in bulk.bodies]
+        stiffness = max(float(elastic_tangent(m.E, m.nu, m.plane)[0, 0]) for m in materials)
         rate = max(float(np.max(np.abs(s.rate), initial=0.0)) for s in supports)
         rigid = 0.0 if rigid_rate is None else float(np.abs(rigid_rate).max())
         self._stiffest = stiffness * self.comm.allreduce(max(rate, rigid), op=MPI.MAX)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import platform
 import sys
 from collections.abc import Sequence
@@ -68,7 +69,7 @@ class Report:
         """Take over what the run's earlier processes noted, and note this one."""
         now, steps = self.content["started"], before["steps"][:done]
         restart = {"when": now, "after_step": done + 1, "ranks": self.joint.comm.size, "command": sys.argv}
-        self._residual = max((r[-1][-1] for step in steps if (r := step["residuals"]) and r[-1]), default=0.0)
+        self._residual = max((r[-1][-1] or 0.0 for step in steps if (r := step["residuals"]) and r[-1]), default=0.0)
         self.content |= {
             "started": before["started"],
             "command": before["command"],
@@ -97,7 +98,7 @@ class Report:
     def write(self) -> None:
         """Replace run.json in one move, so that a reader never sees half of it. Raises `OSError`."""
         self.content |= {"totals": self._totals(), "seconds": self._seconds(), "error_estimates": self._errors()}
-        replace_text(self.path, json.dumps(self.content, indent=1) + "\n")
+        replace_text(self.path, json.dumps(_finite(self.content), indent=1, allow_nan=False) + "\n")
 
     def _totals(self) -> dict[str, int]:
         counts, before = self.joint.timer.counts, self._before.get("totals", {})
@@ -133,6 +134,15 @@ class Report:
 def _step_of(warning: str) -> int:
     """The step that a warning is about."""
     return int(warning.removeprefix("step ").partition(":")[0])
+
+
+def _finite(value: Any) -> Any:
+    """``value`` with null for numbers that are none, which JSON does not know (residuals of a solve that failed)."""
+    if isinstance(value, dict):
+        return {name: _finite(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _versions() -> dict[str, str]:

@@ -69,6 +69,8 @@ def plan_extension(folder: Path, scene: Scene) -> Plan:
     That path begins with the run's own, or both only grow; then its targets beyond the run's end are added. Raises
     `SceneError` if neither holds, another key differs, or the run is not finished.
     """
+    if not (folder / "scene.toml").exists():
+        raise SceneError(f"{folder}: is not a run folder: scene.toml is missing.")
     own = load_scene(folder / "scene.toml")
     _same_but_for(folder, own, scene, ("load.displacement", "load.relative_force", "load.force", "load.steps"))
     if own.force_controlled != scene.force_controlled:

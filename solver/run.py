@@ -89,6 +89,7 @@ def solve_scene(
                     scene.targets,
                     joint.rigid_translation,
                     rules=scene.stepping,
+                    from_rest=scene.joint.dR > 0,
                     substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
                     target_done=target_done,
                     attempted=on_attempt,

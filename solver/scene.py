@@ -6,6 +6,7 @@ Any consistent set of units will do; ``[units]`` only names them. Where a key ha
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -15,7 +16,12 @@ from archord.materials.elasticity import Elastic, contact_modulus
 
 _LINE = r"^[^\x00-\x1f]*$"
 _RANGE = 1e-30, 1e30  # of lengths and moduli; powers of them must not leave the range of numbers
+FORMAT = 1  # version of the scene format: rises when a scene gets a meaning that an older archord would get wrong
 _SOFTEST = 1e-8  # ratio of the moduli
+_WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
+_NU = -0.999, 0.499999  # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
+_WIDEST = 1e6  # block_size over R
+_MOST_CELLS = 1e6  # triangles: some 10 GB, and minutes for a mesh generator that is not parallel
 Positive = Annotated[float, Field(gt=0)]
 
 
@@ -73,7 +79,8 @@ class JointGeometry(_Section):
     )
     relative_clearance: float | None = _key("dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005)
     block_size: Positive | None = _key(
-        "width and depth of the block or radius of the ring, at least the hole's diameter; 100 R if absent",
+        "width and depth of the block or radius of the ring, at least the hole's diameter, at most 1e6 R; 100 R "
+        "if absent",
         "length",
         default=None,
     )
@@ -101,7 +108,28 @@ class JointGeometry(_Section):
             raise ValueError(f"{name}|must be between 1e-4 and 0.5 times the radius")
         if 2 * (self.radius + self.dR) > self.W:
             raise ValueError("block_size|must be at least twice the radius of the hole")
+        if self.W / self.radius > _WIDEST:
+            raise ValueError(f"block_size|must not exceed {_WIDEST:g} times the radius")
+        if self.expected_cells > _MOST_CELLS:
+            name = "relative_element_size" if self.element_size is None else "element_size"
+            raise ValueError(
+                f"{name}|with growth = {self.growth:g} would make about {self.expected_cells:.0e} triangles, and "
+                f"{_MOST_CELLS:.0e} are allowed; choose larger elements or a larger growth"
+            )
         return self
+
+    @property
+    def expected_cells(self) -> float:
+        """About how many triangles the mesh will have: the bodies' area over that of equilateral triangles of the size
+        ``t = h + growth |r - R|`` at radius r, integrated in closed form (lengths in R)."""
+        h, g, width = self.h / self.radius, self.growth, self.W / self.radius
+
+        def ring(sign: int, depth: float) -> float:  # integral of r dr / t^2 from the arc outward (1) or inward (-1)
+            t = h + g * depth
+            return (1 - sign * h / g) / g * (1 / h - 1 / t) + sign * math.log(t / h) / g**2
+
+        angle = math.pi if self.model == "ring" else math.pi / 2
+        return angle * (ring(-1, 1.0) + ring(1, width - 1)) / (math.sqrt(3) / 4)
 
     @property
     def dR(self) -> float:
@@ -136,7 +164,7 @@ class Solid(_Strength):
     """Isotropic elastic solid, elastic-plastic (J2, linear hardening) with a yield stress."""
 
     E: Positive = _key("Young's modulus", "stress", example=210000.0)
-    nu: float = _key("Poisson's ratio", gt=-1, lt=0.5, example=0.3)
+    nu: float = _key("Poisson's ratio", ge=_NU[0], le=_NU[1], example=0.3)
 
     def material(self, plane: Literal["strain", "stress"]):
         """The constitutive law: `Elastic`, or `J2Material` if there is a yield stress."""
@@ -151,7 +179,7 @@ class Pin(_Strength):
     """The pin: a solid like the block, or rigid."""
 
     E: Positive | None = _key("Young's modulus", "stress", default=None, example=210000.0)
-    nu: float | None = _key("Poisson's ratio", default=None, gt=-1, lt=0.5, example=0.3)
+    nu: float | None = _key("Poisson's ratio", default=None, ge=_NU[0], le=_NU[1], example=0.3)
     rigid: bool = _key("a rigid pin: no mesh, no other key", default=False)
 
     @model_validator(mode="after")
@@ -192,8 +220,8 @@ class Analysis(_Section):
 
 
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
-Targets = float | Annotated[list[float], Field(min_length=1, max_length=100_000)]
-Steps = Annotated[int, Field(ge=1, le=100_000)]
+Targets = float | Annotated[list[float], Field(min_length=1, max_length=10_000)]
+Steps = Annotated[int, Field(ge=1, le=10_000)]
 
 
 class Load(_Section):
@@ -235,8 +263,8 @@ class Load(_Section):
         n = len(self.legs)
         if isinstance(self.steps, list) and len(self.steps) != n:
             raise ValueError(f"steps|must have one number for each of the {n} targets of {self.name}")
-        if sum(self.leg_steps) > 100_000:
-            raise ValueError("steps|must not add up to more than 100000 steps")
+        if sum(self.leg_steps) > 10_000:
+            raise ValueError("steps|must not add up to more than 10000 steps")
         return self
 
     @property
@@ -276,6 +304,7 @@ class Stepping(_Section):
 class Scene(_Section):
     """A pin joint and how to load it."""
 
+    format: Literal[1] = _key("version of the scene format; a scene of a newer version is refused", default=FORMAT)
     units: Units = Field(default_factory=Units, description="names of the units")
     joint: JointGeometry = Field(description="geometry and mesh")
     pin: Pin = Field(description="material of the pin")
@@ -294,6 +323,11 @@ class Scene(_Section):
         for name, size in sizes.items():
             if size is not None and not _RANGE[0] <= size <= _RANGE[1]:
                 raise ValueError(f"{name}|must be between 1e-30 and 1e30; choose other units")
+        for name, body in (("pin", self.pin), ("block", self.block)):
+            if body.E is not None and body.yield_stress is not None and body.yield_stress < _WEAKEST * body.E:
+                raise ValueError(f"{name}.yield_stress|must be at least {_WEAKEST:g} times {name}.E")
+            if body.E is not None and body.hardening > body.E / _WEAKEST:
+                raise ValueError(f"{name}.hardening|must not exceed {1 / _WEAKEST:g} times {name}.E")
         if self.pin.E is not None and not _SOFTEST <= self.pin.E / self.block.E <= 1 / _SOFTEST:
             raise ValueError("pin.E|must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
         name = f"load.{self.load.name}"

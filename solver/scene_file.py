@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import csv
 import difflib
+import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from archord.solver.scene import LOADS, Scene, SceneError
+from archord.solver.scene import FORMAT, LOADS, Scene, SceneError
 from archord.solver.scene_format import key_names, limits_in_words, toml_value
 
 ALTERNATIVES = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
     "load": [(*LOADS, "path")],
 }
+_LARGEST_FILE = 10**6  # bytes
+_DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_CHAIN = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}")
+_MOST_SENTENCES = 20
 
 
 def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) -> Scene:
@@ -24,14 +31,7 @@ def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) ->
 
     Raises `SceneError` with one sentence per fault: file, key, value, and what is allowed.
     """
-    try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"{path}: cannot be read: {error.strerror or error}.") from None
-    except UnicodeDecodeError:
-        raise SceneError(f"{path}: cannot be read: it is not UTF-8 text.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{path}: is not valid TOML: {error}.") from None
+    data = _read(path)
     origin = {}
     for override in overrides:
         origin[_override(data, override)] = f"--set {override}"
@@ -67,21 +67,77 @@ def _read_targets(data: dict[str, Any], scene: Path) -> None:
     load.setdefault("steps", 1)
 
 
+def _read(path: str | Path) -> dict[str, Any]:
+    """What the TOML file ``path`` holds. Raises `SceneError`."""
+    try:
+        with Path(path).open("rb") as file:
+            raw = file.read(_LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}.") from None
+    if len(raw) > _LARGEST_FILE:
+        raise SceneError(f"{path}: cannot be read: it is larger than {_LARGEST_FILE // 10**6} MB.")
+    try:
+        text = raw.decode("utf-8-sig").replace("\r\n", "\n")
+        if _LONG_CHAIN.search(text):
+            raise SceneError(f"{path}: is not a scene: it has a key of more than {_DEEPEST} dotted parts.")
+        return tomllib.loads(text)
+    except UnicodeDecodeError:
+        raise SceneError(f"{path}: cannot be read: it is not UTF-8 text.") from None
+    except RecursionError:
+        raise SceneError(f"{path}: is not a scene: its arrays or tables are nested too deeply.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path}: is not valid TOML: {_shortened(str(error))}.") from None
+    except SceneError:
+        raise
+    except ValueError as error:  # whole numbers of thousands of digits, dates like 0000-00-00
+        raise SceneError(f"{path}: is not valid TOML: {_shortened(str(error))}.") from None
+
+
 def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, str] | None = None) -> Scene:
     """Check scene ``data`` as read from ``source``; ``origin`` names another source of some keys. Raises
     `SceneError`."""
+    _check_format(data, source)
     try:
         return Scene.model_validate(data)
     except ValidationError as error:
-        sentences = [_sentence(e, data, source, origin or {}) for e in _meant(error.errors(), data)]
+        faults = _meant(error.errors(), data)
+        sentences = [_sentence(e, data, source, origin or {}) for e in faults[:_MOST_SENTENCES]]
+        if len(faults) > _MOST_SENTENCES:
+            sentences.append(f"{source}: has {len(faults) - _MOST_SENTENCES} more faults like these.")
         raise SceneError("\n".join(sentences)) from None
+
+
+def _check_format(data: dict[str, Any], source: str) -> None:
+    """Look at the version first: a newer scene may hold anything else that is unknown here. Raises `SceneError`."""
+    given = data.get("format", FORMAT)
+    shown = _shortened(toml_value(given))
+    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+        raise SceneError(
+            f"{source}: format = {shown} must be a whole number, the version of the scene format: {FORMAT}."
+        )
+    if given > FORMAT:
+        raise SceneError(
+            f"{source}: format = {shown} is newer than this archord, which reads format {FORMAT}; use a newer archord."
+        )
+
+
+def _shortened(text: str, length: int = 80) -> str:
+    """``text`` with its middle left out if it is long."""
+    return text if len(text) <= length else f"{text[: length - 20]} ... {text[-15:]}"
+
+
+def _key_shown(part: str) -> str:
+    """One part of a key as TOML writes it, without what would break a line."""
+    return (
+        part if re.fullmatch(r"[\w-]+", part) and len(part) <= 80 else _shortened(json.dumps(part, ensure_ascii=True))
+    )
 
 
 def _override(data: dict[str, Any], override: str) -> str:
     """Set one ``a.b=value`` in ``data`` (value: TOML, a number, else text; nothing: drop it); returns the dotted
     key."""
     key, sign, text = override.partition("=")
-    if "\n" in text:
+    if "\n" in text or "\n" in key:
         raise SceneError(f"--set {override!r}: must be one line.")
     key = key.strip()
     section, dot, name = key.partition(".")
@@ -107,7 +163,7 @@ def _override(data: dict[str, Any], override: str) -> str:
 def _value(text: str) -> Any:
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         pass
     try:
         return float(text)
@@ -139,12 +195,12 @@ def _sentence(error: Any, data: dict[str, Any], source: str, origin: dict[str, s
     if kind == "value_error":
         name, said = str(context["error"]).split("|", 1)
         location += name.split(".")
-    key = ".".join(location)
+    key = ".".join(map(_key_shown, location))
     given: Any = data
     for part in location:
         given = given.get(part) if isinstance(given, dict) else None
     where = next((said_in for name, said_in in origin.items() if name == key or name.startswith(f"{key}.")), source)
-    shown = "" if given is None or isinstance(given, dict) or where != source else f" = {toml_value(given)}"
+    shown = "" if given is None or isinstance(given, dict) or where != source else f" = {_shortened(toml_value(given))}"
     if error.get("entry") is not None:
         shown += f": entry {error['entry'] + 1}"
     rules = {

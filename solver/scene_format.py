@@ -8,6 +8,8 @@ from typing import Any
 
 from archord.solver.scene import Scene
 
+TOP_LEVEL = ("format",)
+
 
 def toml_value(value: Any) -> str:
     """``value`` as TOML writes it."""
@@ -37,6 +39,8 @@ def limits_in_words(section: str, key: str) -> str:
 def _sections() -> Iterator[tuple[str, Any, list[tuple[str, Any]]]]:
     """Name, field and documented keys of every section."""
     for section, info in Scene.model_fields.items():
+        if section in TOP_LEVEL:
+            continue
         model: Any = info.annotation
         names = sorted(model.model_fields, key=lambda name: name not in ("E", "nu"))
         yield section, info, [(name, model.model_fields[name]) for name in names]
@@ -60,6 +64,9 @@ _SHOWN = {
 def example() -> str:
     """A commented scene that shows every key; alternatives and absent defaults are commented out."""
     lines = ["# An archord scene: archord solve scene.toml", ""]
+    for name in TOP_LEVEL:
+        key = Scene.model_fields[name]
+        lines += [f"{name} = {toml_value(key.default)}  # {key.description}", ""]
     for section, info, keys in _sections():
         lines += [f"[{section}]  # {info.description}"]
         for name, key in keys:
@@ -79,7 +86,15 @@ def reference() -> str:
         "",
         "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.",
         "",
+        "Above the sections a scene may say, and what archord writes does say:",
+        "",
+        "| key | default | what |",
+        "|---|---|---|",
     ]
+    for name in TOP_LEVEL:
+        info = Scene.model_fields[name]
+        lines.append(f"| `{name}` | `{toml_value(info.default)}` | {info.description} |")
+    lines.append("")
     for section, info, keys in _sections():
         lines += [f"## [{section}]", "", f"{info.description[0].upper()}{info.description[1:]}.", ""]
         lines += ["| key | unit | default | allowed | what |", "|---|---|---|---|---|"]

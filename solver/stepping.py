@@ -102,6 +102,7 @@ def march(
     attempted: Callable[[float, int], None] = lambda load, iterations: None,
     gave_up: Callable[[float], None] = lambda load: None,
     start: Position | None = None,
+    from_rest: bool = True,
 ) -> None:
     """Reach the loads ``targets`` in turn and, where a step fails or ``rules`` ask for it, loads between them.
 
@@ -109,7 +110,9 @@ def march(
     solution, at the start from ``first_guess(load)``. ``substep_done(load)`` follows every accepted step with its
     history still to be committed, ``target_done(step, position)`` every output target, ``attempted(load, iterations)``
     every solve, ``gave_up(load)`` the one after which nothing smaller is allowed, before it is taken back. ``start``
-    continues a march whose state the equilibrium has been given back. Raises `StepFailure`.
+    continues a march whose state the equilibrium has been given back. Without ``from_rest`` the joint is not in
+    equilibrium before the first step (a pin too large for its hole), whose increment then says nothing about the next.
+    Raises `StepFailure`.
     """
     at = start or Position()
     size = StepSize(rules)
@@ -140,7 +143,8 @@ def march(
             size.accepted(result.iterations)
             new = equilibrium.state()
             if stride:
-                at.increment, at.stride = new - state, stride
+                known = from_rest or at.increment is not None
+                at.increment, at.stride = (new - state if known else np.zeros_like(new)), stride
             at.load, at.size, state, passed = load, size.length, new, end
             substep_done(load)
             equilibrium.commit()

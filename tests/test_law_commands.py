@@ -104,3 +104,27 @@ def test_a_table_needs_no_plotting():
     code = f"import sys; from archord.cli import run; run(['law', 'paper', *{JOINT}]); print(*sys.modules)"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert {"matplotlib", "dolfinx", "petsc4py"}.isdisjoint(result.stdout.split())
+
+
+def test_regime_law_beside_the_paper_s(capsys):
+    """Of a scene, or of numbers; what it needs is named."""
+    numbers = [*JOINT, "--yield-stress", "230.77", "--points", "2"]
+    assert run(["law", "regime", "paper-plastic", *numbers, "--plane", "strain", "--nu", "0.3"]) == 0
+    regime, paper = map(table, capsys.readouterr().out.split("\n\n"))
+    assert regime["P/E*dR"][-1] > 1.3 * paper["P/E*dR"][-1]
+    assert run(["law", "regime", *numbers, "--plane", "strain"]) == 2
+    assert capsys.readouterr().err == "regime: this law needs nu.\n"
+    assert run(["law", "regime", *numbers, "--plane", "strain", "--nu", "0.3", "--yielding", "pin"]) == 0
+    out, err = capsys.readouterr()
+    assert "only the pin yields" in err
+    assert "nan" in out
+
+
+def test_the_plateau_of_the_plastic_law_can_be_chosen(capsys):
+    """Far beyond yield P goes with c."""
+    given = [*JOINT, "--yield-stress", "1", "--points", "1"]
+    forces = []
+    for c in ("1", "1.5"):
+        assert run(["law", "paper-plastic", *given, "--c", c]) == 0
+        forces.append(table(capsys.readouterr().out)["P"][0])
+    assert forces[1] == pytest.approx(1.5 * forces[0], rel=1e-2)

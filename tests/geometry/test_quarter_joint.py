@@ -10,6 +10,7 @@ from mpi4py import MPI
 from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.geometry.joint_mesh import Cells, Facets
 from archord.geometry.quarter_joint import quarter_joint
+from archord.solver.scene import JointGeometry
 
 R, DR, W = 1.0, 0.005, 10.0
 SIZE, GROWTH = 0.2, 0.4
@@ -132,3 +133,15 @@ def test_tagged_edges_are_where_their_names_say(joint):
     assert edge_lengths(joint, Facets.PIN_TOP).sum() == pytest.approx(R)
     assert edge_lengths(joint, Facets.BLOCK_HELD).sum() == pytest.approx(W - R - DR)
     assert edge_lengths(joint, Facets.SYMMETRY).sum() == pytest.approx(R + W - R - DR)
+
+
+@pytest.mark.parametrize(
+    ("size", "growth", "width"), [(0.2, 0.4, 10.0), (0.02, 0.25, 100.0), (0.1, 0.05, 20.0), (0.01, 1.0, 3.0)]
+)
+def test_the_expected_number_of_triangles_is_about_what_the_mesh_has(size, growth, width):
+    """The scene model refuses meshes by this estimate before they are made."""
+    expected = JointGeometry(
+        radius=R, clearance=DR, block_size=width, relative_element_size=size, growth=growth
+    ).expected_cells
+    made = quarter_joint(MPI.COMM_SELF, R, DR, width, size, growth).mesh.topology.index_map(2).size_global
+    assert 0.5 < expected / made < 1.5

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from archord.benchmarks.paper_joint import E, paper_joint
+from archord.postprocess.chord_laws import plastic_force, plastic_peak
+from archord.postprocess.law_joint import LawJoint
 from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.winkler import elastic_force, onset, peak_pressure, plastic_force, plastic_peak_pressure
 
 LOADS = np.linspace(0.1, 2.0, 20)
 
@@ -21,13 +22,8 @@ def curve(k, c=None, *, dR=0.005, sigY=None, R=1.0, modulus=1.0, noise=0.0, seed
     scene = paper_joint(joint=joint, pin=material, block=material, analysis=analysis or {})
     E_star, gap = scene.E_star, dR * R
     delta = LOADS * gap
-    if c is None:
-        P, p0, peeq = elastic_force(delta, k, E_star, R, gap), peak_pressure(delta, k, E_star, R), 0 * delta
-    else:
-        strength = sigY * modulus
-        P = plastic_force(delta, k, c, E_star, R, gap, strength)
-        p0 = plastic_peak_pressure(delta, k, c, E_star, R, strength)
-        peeq = np.maximum(delta - onset(k, c, E_star, R, strength), 0.0)
+    law = LawJoint(R, gap, E_star, sigY * modulus if c and sigY else None, k=k, c=c or 1.0)
+    P, p0, peeq = plastic_force(law, delta), plastic_peak(law, delta), np.maximum(delta - law.first_yield, 0.0)
     random = np.random.default_rng(seed)
     P = P + noise * E_star * gap * random.standard_normal(len(P))
     p0 = p0 + noise * E_star * gap / R * random.standard_normal(len(P))

@@ -154,6 +154,68 @@ def test_a_mesh_error_of_first_order_is_found_and_carried():
     assert calibrate([stopped, fine]).joint.P.k.discretisation_error == pytest.approx(0.83 * 0.04, rel=1e-6)
 
 
+def test_three_meshes_tell_the_order():
+    """Data off by A h^1.5, with ratios of mesh size that are no two alike: the error of k is exactly A h^1.5."""
+    runs = [curve(0.83 * (1 + 2 * h**1.5), h=h, name=f"h{h}") for h in (0.03, 0.1, 0.05)]
+    found = calibrate(runs).joint.P
+    assert dict(found.orders)["h0.03"].value == pytest.approx(1.5, rel=1e-6)
+    assert found.k.discretisation_error == pytest.approx(0.83 * 2 * 0.03**1.5, rel=1e-5)
+    two = calibrate([run for run in runs if run.name != "h0.1"]).joint.P
+    assert dict(two.orders)["h0.03"].words == "1 (assumed)"
+    assert two.k.discretisation_error > found.k.discretisation_error
+
+
+@pytest.mark.parametrize(
+    ("errors", "order", "said"),
+    [
+        ((1.0, 1.01, 1.16), 2.0, "2 (from three meshes, which give 3.9: bounded)"),
+        ((1.0, 1.01, 1.022), 0.5, "0.5 (from three meshes, which give 0.3: bounded)"),
+        ((1.0, 1.01, 1.015), 1.0, "1 (assumed: the differences of three meshes show none)"),
+        ((1.0, 1.01, 0.99), 1.0, "1 (assumed: the differences of three meshes show none)"),
+    ],
+)
+def test_the_order_is_bounded_or_assumed(errors, order, said):
+    """Meshes of h = 1, 2, 4: differences in the ratio 2^p."""
+    runs = [curve(0.83 * e, h=h, name=f"h{h}") for e, h in zip(errors, (0.02, 0.04, 0.08), strict=True)]
+    (found,) = dict(calibrate(runs).joint.P.orders).values()
+    assert (found.value, found.words) == (order, said)
+
+
+def test_k_can_be_held():
+    """c alone is fitted, best for that k; at the true k it is the true c; k has no error; mesh errors go to c."""
+    run = curve(0.83, 1.3, sigY=0.002)
+    for quantity in ("P", "p0"):
+        true, off = (fit_curve(quantity, group([run]), hold_k=k) for k in (0.83, 0.8))
+        assert true.c.value == pytest.approx(1.3, rel=1e-8)
+        assert off.k.value == 0.8
+        assert off.k.error == 0
+        assert (off.k_held, off.dof) == (True, 19)
+    found = calibrate([run, curve(0.83, 1.3, sigY=0.002, h=0.1, name="coarse")], hold_k=0.8)
+    law, c = found.law(), found.joint.P.c.value
+
+    def squares(value):
+        return ((replace(law, c=value).force(run.delta) - run.P) ** 2).sum()
+
+    assert squares(c) < min(squares(0.999 * c), squares(1.001 * c))
+    assert law.k_error == 0
+    free = calibrate([run]).joint.P
+    assert free.rms < found.joint.P.rms
+
+
+def test_with_k_held_an_elastic_run_is_compared_only():
+    """Beside a run that yields; alone there is nothing to fit."""
+    elastic, plastic = curve(0.83), curve(0.83, 1.3, sigY=0.002, name="plastic")
+    found = calibrate([elastic, plastic], hold_k=0.83)
+    assert found.each[0].P.c is None
+    assert found.each[0].P.largest == pytest.approx(0, abs=1e-12)
+    assert found.joint.P.c.value == pytest.approx(1.3, rel=1e-8)
+    with pytest.raises(SceneError, match=r"--hold-k 0.83: leaves nothing to fit"):
+        calibrate([elastic], hold_k=0.83)
+    for bad in (0.0, -1.0, float("nan")):
+        with pytest.raises(SceneError, match=r"--hold-k .*: must be a number greater than 0"):
+            calibrate([plastic], hold_k=bad)
+
+
 def test_the_median_of_a_cut_off_pressure_is_the_plateau():
     """The parabola over the width cut off at half its peak gives the plateau; uncut 3/4 of the peak."""
     edges = np.arcsin(np.linspace(0, 0.9, 2001))

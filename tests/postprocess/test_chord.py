@@ -56,6 +56,32 @@ def test_resultants_agree_for_samples_of_any_spacing_and_edge():
     assert len(chord_projection(phi, pressure, 0.7, 4.0).x) == (phi < 0.9).sum()
 
 
+@pytest.mark.parametrize("degrees", [1, 30, 90])
+@pytest.mark.parametrize("start", [0.0, 0.3])
+def test_a_random_pressure_on_random_points_keeps_its_force(degrees, start):
+    """Also where the first point is past the axis; and the trapezoidal rule over x, which knows nothing of weights,
+    tends to it."""
+    random, eps = np.random.default_rng(degrees), np.radians(degrees)
+    phi = np.sort(random.uniform(start * eps, eps, 30))
+    pressure = random.uniform(0, 5, 30)
+    arc = 2 * 7.0 * np.trapezoid(pressure * np.cos(phi), phi)
+    assert chord_projection(phi, pressure, eps, 7.0).resultant == pytest.approx(arc, rel=1e-12)
+    fine = np.linspace(start * eps, eps, 40001)
+    chord = chord_projection(fine, np.interp(fine, phi, pressure), eps, 7.0)
+    assert 2 * np.trapezoid(chord.py, chord.x) == pytest.approx(chord.resultant, rel=1e-6)
+
+
+def test_a_ring_s_arc_goes_round_but_its_contact_need_not():
+    """Points without pressure may lie anywhere up to pi."""
+    phi = np.linspace(0, np.pi, 181)
+    pressure = np.maximum(1 - phi, 0)
+    near = phi <= np.pi / 2
+    whole, part = (chord_projection(phi[m], pressure[m], 1.0, 2.0) for m in (slice(None), near))
+    assert whole.resultant == part.resultant > 0
+    with pytest.raises(ValueError, match="within pi/2"):
+        chord_projection(phi, np.ones(181), 3.0, 2.0)
+
+
 @pytest.mark.parametrize("name", ["elastic", "plastic"])
 def test_a_runs_chord_carries_its_force(runs, name):
     """Every step and side: chord = arc to 1e-8; the side's arc = P of history.csv to dR/R (undeformed arcs differ by
@@ -99,7 +125,17 @@ def test_what_a_run_does_not_have(runs, step, side, said):
 
 @pytest.mark.parametrize(
     ("phi", "pressure", "eps"),
-    [([0, 1], [1, 1], 0.0), ([1, 0], [1, 1], 1.0), ([0, 2], [1, 1], 1.0), ([0, 1], [1, 1, 1], 1.0), ([0], [1], 1.0)],
+    [
+        ([0, 1], [1, 1], 0.0),
+        ([0, 1], [1, 1], np.nan),
+        ([1, 0], [1, 1], 1.0),
+        ([-0.1, 1], [1, 1], 1.0),
+        ([0, np.nan], [1, 1], 1.0),
+        ([0, 1], [1, np.nan], 1.0),
+        ([0, 2], [1, 1], 1.0),
+        ([0, 1], [1, 1, 1], 1.0),
+        ([0], [1], 1.0),
+    ],
 )
 def test_arrays_that_are_no_arc(phi, pressure, eps):
     with pytest.raises(ValueError, match="must"):

@@ -42,6 +42,20 @@ def test_two_meshes_give_a_mesh_error(runs, capsys):
     assert "unknown" in printed.split(str(runs["elastic"]))[0]
 
 
+def test_held_k_is_told_everywhere(runs, tmp_path, capsys):
+    """In the table, below it, and in the file."""
+    file = tmp_path / "law.json"
+    assert run(["fit", str(runs["plastic"]), "--hold-k", "0.83", "--json", str(file)]) == 0
+    printed = capsys.readouterr().out
+    row = next(line.split() for line in printed.splitlines() if " k " in line)
+    assert row[row.index("k") :][:3] == ["k", "0.83000", "held"]
+    assert "k: held at 0.83, not fitted" in printed
+    assert "law: k = 0.83000 (held), c = " in printed
+    data = json.loads(file.read_text())
+    assert (data["hold_k"], data["law"]["k"], data["joint"]["P"]["k_held"]) == (0.83, 0.83, True)
+    assert FittedLaw.from_json(file.read_text()).c == data["joint"]["P"]["c"]["value"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

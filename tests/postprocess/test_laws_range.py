@@ -14,7 +14,7 @@ from archord.postprocess.monotone_root import monotone_root
 from archord.solver.scene import SceneError
 from archord.solver.scene_file import load_scene
 
-JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, yield_stress=300.0, length=11.0)
+JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, yield_stress=300.0, length=11.0, plane="strain", nu=0.3)
 WITH_DISPLACEMENT = [name for name, law in LAWS.items() if law.gives_displacement]
 SCENES = Path(__file__).parents[2] / "scenes"
 
@@ -52,7 +52,7 @@ def test_displacement_inverts_force(name):
 def test_units_do_not_matter(name):
     """In millimetres and MPa or in metres and Pa, the dimensionless state is the same."""
     law = LAWS[name]
-    metres = LawJoint(7e-3, 3e-5, 1.2e11, yield_stress=3e8, length=11e-3)
+    metres = LawJoint(7e-3, 3e-5, 1.2e11, yield_stress=3e8, length=11e-3, plane="strain", nu=0.3)
     a = law.at_load(JOINT, 0.02 * JOINT.E_star * JOINT.clearance)
     b = law.at_load(metres, 0.02 * metres.E_star * metres.clearance)
     assert a.peak_pressure / JOINT.E_star == pytest.approx(b.peak_pressure / 1.2e11, rel=1e-9, nan_ok=True)
@@ -162,6 +162,9 @@ def test_roots_of_rising_functions():
     assert root[:5] == pytest.approx(target[:5] ** (2 / 3), rel=1e-13)
     assert np.isnan(root[5])
     assert root[6] == 0
+    bounded = monotone_root(np.tanh, lambda x: 1 / np.cosh(np.minimum(x, 99.0)) ** 2, np.array([0.5, 2.0]), 1.0)
+    assert bounded[0] == pytest.approx(np.arctanh(0.5), rel=1e-13)
+    assert np.isnan(bounded[1])
     concave = monotone_root(np.log1p, lambda x: 1 / (1 + x), target[:4], 1e-3)
     assert concave == pytest.approx(np.expm1(target[:4]), rel=1e-13)
 

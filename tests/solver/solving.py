@@ -41,6 +41,7 @@ def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Sol
         scene.targets,
         joint.rigid_translation,
         rules=scene.stepping,
+        from_rest=scene.joint.dR > 0,
         substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
         target_done=target_done,
     )

@@ -4,10 +4,12 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import load_scene, parse_scene, resolved
-from archord.solver.scene_format import example, reference
+from archord.solver.scene_format import TOP_LEVEL, example, reference
 
 
 def basic() -> dict:
@@ -38,13 +40,15 @@ def basic() -> dict:
         ("joint", "element_size", 20.0, "must be between 1e-4 and 0.5 times the radius."),
         ("joint", "block_size", 15.0, "must be at least twice the radius of the hole."),
         ("joint", "raduis", 1.0, "did you mean radius?"),
-        ("block", "nu", 0.5, "scene: block.nu = 0.5 must be greater than -1 and less than 0.5."),
+        ("block", "nu", 0.5, "scene: block.nu = 0.5 must be at least -0.999 and at most 0.499999."),
         ("block", "rigid", True, "is not a known key"),
         ("block", "hardening", 1.0, "needs a yield_stress."),
         ("block", "yield_stress", 0.0, "must be greater than 0."),
+        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times block.E."),
+        ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
         ("pin", "rigid", True, "is not for a rigid pin."),
         ("load", "steps", 2.5, "must be a whole number."),
-        ("load", "steps", 0, "must be at least 1 and at most 100000."),
+        ("load", "steps", 0, "must be at least 1 and at most 10000."),
         ("load", "displacement", -2.0, "must be greater than 0."),
         ("load", "displacement", 200.0, "must not exceed half the radius (5)."),
     ],
@@ -128,6 +132,9 @@ def test_the_example_shows_every_key_and_loads():
     text = example()
     parse_scene(tomllib.loads(text))
     for section, info in Scene.model_fields.items():
+        if section in TOP_LEVEL:
+            assert f"\n{section} = " in text
+            continue
         assert f"[{section}]" in text
         for key, field in info.annotation.model_fields.items():
             assert f"{key} = " in text
@@ -145,3 +152,102 @@ def test_contact_modulus_of_plane_strain_and_stress():
     assert parse_scene(data).E_star == pytest.approx(105000 / 0.91, rel=1e-14)
     assert parse_scene(data | {"analysis": {"plane": "stress"}}).E_star == pytest.approx(105000, rel=1e-14)
     assert parse_scene(data | {"pin": {"rigid": True}}).E_star == pytest.approx(210000 / 0.91, rel=1e-14)
+
+
+def test_a_mesh_of_too_many_triangles_is_refused():
+    """With the key to change; the sizes that are used are far below."""
+    data = basic()
+    data["joint"] |= {"relative_element_size": 1e-4, "growth": 0.01}
+    with pytest.raises(SceneError, match=r"relative_element_size = 0.0001 with growth = 0.01 would make about .e\+06"):
+        parse_scene(data)
+    data["joint"] |= {"growth": 0.25}
+    assert parse_scene(data).joint.expected_cells < 1e6
+
+
+@pytest.mark.parametrize("value", [2, 10**30])
+def test_a_scene_of_a_newer_format_is_refused_for_that_alone(value):
+    """Whatever else it holds, which may mean something there."""
+    with pytest.raises(SceneError) as caught:
+        parse_scene(basic() | {"format": value, "friction": {"mu": 0.1}})
+    assert str(caught.value) == (
+        f"scene: format = {value} is newer than this archord, which reads format 1; use a newer archord."
+    )
+
+
+@pytest.mark.parametrize("value", [1.0, True, "1", 0, -1, [1], {"a": 1}])
+def test_a_format_that_is_no_version_is_refused(value):
+    """A version is a whole number from 1."""
+    with pytest.raises(SceneError, match=r"^scene: format = .* must be a whole number, the version .*: 1\.$"):
+        parse_scene(basic() | {"format": value})
+
+
+def test_scenes_say_their_format_when_written():
+    """The resolved scene does; where it is not said it is 1."""
+    assert parse_scene(basic()) == parse_scene(basic() | {"format": 1})
+    assert tomllib.loads(resolved(parse_scene(basic())))["format"] == 1
+    assert tomllib.loads(example())["format"] == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"x = " + b"9" * 5000, "is not valid TOML"),
+        (b"x = " + b"[" * 20000, "are nested too deeply"),
+        (b"a." * 100000 + b"b = 1", "dotted parts"),
+        (b"['a'" + b" . 'a'" * 100000 + b"]", "dotted parts"),
+        (b"# " + b"x" * 1000000, "larger than 1 MB"),
+        (b"".join(b"k%d = 1\n" % i for i in range(3000)), r"has 2984 more faults like these\."),
+        (b"x" * 5000 + b" = 1", "is not a known key"),
+        (b'"a\\nb" = 1', r'"a\\nb" = 1 is not a known key'),
+        (b"date = 0000-00-00", "is not valid TOML"),
+    ],
+    ids=["digits", "brackets", "dots", "header", "comment", "keys", "long key", "two-line key", "date"],
+)
+def test_monstrous_files_are_refused_briefly(tmp_path, content, said):
+    """In time and in words."""
+    path = tmp_path / "scene.toml"
+    path.write_bytes(content)
+    with pytest.raises(SceneError, match=said) as caught:
+        load_scene(path)
+    assert all(line.startswith(str(path)) and len(line) < 400 for line in str(caught.value).splitlines())
+
+
+def test_a_byte_order_mark_and_carriage_returns_change_nothing(tmp_path):
+    """What editors on Windows leave."""
+    path = tmp_path / "scene.toml"
+    text = resolved(parse_scene(basic()))
+    path.write_bytes(text.replace("\n", "\r\n").encode("utf-8-sig"))
+    assert load_scene(path) == parse_scene(tomllib.loads(text))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    length=st.integers(-60, 60),
+    stress=st.integers(-60, 60),
+    clearance=st.floats(-7, 0),
+    size=st.floats(-5, 0),
+    growth=st.floats(0.01, 2),
+    soft=st.floats(-10, 10),
+    delta=st.floats(-3, 4),
+)
+def test_whether_a_scene_is_accepted_does_not_depend_on_its_units(length, stress, clearance, size, growth, soft, delta):
+    """Units scaled by powers of two, which round nothing: the same verdict, the same expected mesh."""
+
+    def accepted(L: float, S: float) -> tuple[bool, float]:
+        data = {
+            "joint": {
+                "radius": 10.0 * L,
+                "clearance": 10.0**clearance * L,
+                "element_size": 10.0**size * L,
+                "growth": growth,
+            },
+            "pin": {"E": S, "nu": 0.3, "yield_stress": 1e-3 * S},
+            "block": {"E": 10.0**soft * S, "nu": 0.2},
+            "load": {"displacement": 10.0**delta},
+        }
+        try:
+            return True, parse_scene(data).joint.expected_cells
+        except SceneError:
+            return False, 0.0
+
+    assert accepted(2.0**length, 2.0**stress) == accepted(1.0, 1.0)

@@ -1,0 +1,75 @@
+"""Commands under an MPI launcher: on which ranks they work, and how all ranks end with one exit code.
+
+MPI is loaded only by commands that all ranks work on, and only where a launcher started several.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+
+COLLECTIVE = ("solve", "reproduce")  # commands that all ranks work on; all others are rank 0's alone
+_RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
+_SIZE = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
+_LAUNCHER = ("OMPI_COMM_WORLD_", "PMIX_", "PMI_", "SLURM_")  # how their variables begin
+_PATIENCE = 10.0  # seconds that a rank with bad input waits for the others
+_launched = "PMIX_RANK" in os.environ or "OMPI_COMM_WORLD_RANK" in os.environ
+
+
+def launcher_rank() -> int:
+    """Rank of this process as its MPI launcher says, without loading MPI."""
+    return next((int(os.environ[name]) for name in _RANK if name in os.environ), 0)
+
+
+def launched_with_others() -> bool:
+    """Whether a launcher may have started other ranks too, without loading MPI. PMIx tells no number of ranks."""
+    if any(os.environ.get(name, "1") != "1" for name in _SIZE):
+        return True
+    return "PMIX_RANK" in os.environ and "OMPI_COMM_WORLD_SIZE" not in os.environ
+
+
+def run_on_ranks(command: str, work: Callable[[], int]) -> int:
+    """Exit code of ``work``, done by all ranks for a command of `COLLECTIVE`, else by rank 0 alone.
+
+    Alone means without the launcher: dolfinx and PETSc start collectively, and would wait for ranks that never come. So
+    rank 0 forgets who started it, and the others, which have nothing to say, are done. With a collective command no
+    rank leaves with bad input before rank 0 has spoken, as a launcher then ends all others at once.
+    """
+    if not launched_with_others():
+        return work()
+    if command not in COLLECTIVE:
+        if launcher_rank() != 0:
+            return 0
+        for name in [name for name in os.environ if name.startswith(_LAUNCHER)]:
+            del os.environ[name]
+        return work()
+    if launcher_rank() != 0:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+    code = work()
+    if code == 2:
+        _leave_together(code)
+    return code
+
+
+def _leave_together(code: int) -> None:
+    """Wait until all ranks have found their input bad; end them if they do not come, as the fault is here alone."""
+    from mpi4py import MPI
+
+    from archord.solver.ranks import arrived_before
+
+    if not arrived_before(MPI.COMM_WORLD, _PATIENCE):
+        MPI.COMM_WORLD.Abort(code)
+
+
+def on_terminal() -> bool:
+    """Whether somebody watches stdout: Open MPI gives its ranks a terminal of their own even where it writes to a file
+    itself."""
+    if not sys.stdout.isatty():
+        return False
+    if not _launched:
+        return True
+    try:
+        return os.readlink(f"/proc/{os.getppid()}/fd/1").startswith(("/dev/pts/", "/dev/tty", "/dev/console"))
+    except OSError:
+        return False

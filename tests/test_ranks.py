@@ -1,0 +1,164 @@
+"""Commands under a launcher: one report, one file, one exit code, and no MPI where there is nothing to share."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from archord import ranks
+from archord.cli import run
+from tests.test_cli import ENVIRONMENT, archord
+
+SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")
+COARSE = ["--set", "joint.relative_element_size=0.3"]
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A run to fit and draw."""
+    target = tmp_path_factory.mktemp("ranks")
+    assert archord("solve", SCENE, *COARSE, "-o", "run", "-q", cwd=target).returncode == 0
+    return target
+
+
+@pytest.mark.parametrize(
+    ("arguments", "written"),
+    [
+        (["law", "johnson", "--scene", SCENE], None),
+        (["fit", "run", "--json", "FILE"], "fit.json"),
+        (["export-deck", SCENE, *COARSE, "-o", "FILE"], "deck.inp"),
+    ],
+)
+def test_two_ranks_say_and_write_what_one_does(folder, arguments, written):
+    """stdout, stderr and file to the last byte."""
+    found = []
+    for n in (0, 2):
+        file = folder / f"{n}" / (written or "none")
+        file.parent.mkdir(exist_ok=True)
+        result = archord(*(a.replace("FILE", str(file)) for a in arguments), cwd=folder, ranks=n)
+        assert result.returncode == 0, result.stderr
+        said = result.stdout.replace("\r\n", "\n").replace(str(file), "FILE")
+        found.append((said, result.stderr, file.read_bytes() if written else None))
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["fit", "nowhere"], "nowhere: is not a run folder"),
+        (["scene", "--bogus"], "No such option: --bogus"),
+        (["reproduce", "fig6"], "fig6: is not a figure of the paper"),
+        (["solve", "--bogus", "nowhere.toml"], "No such option: --bogus"),
+    ],
+)
+def test_bad_input_is_told_once_by_two_ranks(tmp_path, arguments, said):
+    """Exit code 2 for the whole launcher, nothing written, for commands of one rank and of all."""
+    result = archord(*arguments, cwd=tmp_path, ranks=2)
+    assert result.returncode == 2
+    assert result.stderr.count(said) == 1
+    assert "Traceback" not in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def launched(monkeypatch):
+    """Sets the environment of a launcher, alone."""
+    for name in list(os.environ):
+        if name.startswith(ranks._LAUNCHER):
+            monkeypatch.delenv(name)
+
+    def set_(**variables: str) -> None:
+        for name, value in variables.items():
+            monkeypatch.setenv(name, value)
+
+    return set_
+
+
+@pytest.mark.parametrize(
+    ("variables", "rank", "others"),
+    [
+        ({}, 0, False),
+        ({"OMPI_COMM_WORLD_RANK": "2", "OMPI_COMM_WORLD_SIZE": "3", "PMIX_RANK": "2"}, 2, True),
+        ({"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "1", "PMIX_RANK": "0"}, 0, False),
+        ({"PMI_RANK": "1", "PMI_SIZE": "2"}, 1, True),
+        ({"PMIX_RANK": "1"}, 1, True),
+        ({"SLURM_PROCID": "3", "SLURM_STEP_NUM_TASKS": "4"}, 3, True),
+        ({"SLURM_PROCID": "0", "SLURM_NTASKS": "4"}, 0, False),  # the script of a batch job, which is one process
+    ],
+)
+def test_launchers_are_known_by_their_variables(launched, variables, rank, others):
+    launched(**variables)
+    assert (ranks.launcher_rank(), ranks.launched_with_others()) == (rank, others)
+
+
+@pytest.mark.parametrize("rank", ["0", "1"])
+def test_a_command_of_one_rank_forgets_the_launcher(launched, rank):
+    """Rank 0 works as if started by hand, the other not at all."""
+    launched(OMPI_COMM_WORLD_RANK=rank, OMPI_COMM_WORLD_SIZE="2", PMIX_RANK=rank)
+    seen = []
+    assert ranks.run_on_ranks("fit", lambda: seen.append(ranks.launched_with_others()) or 5) == (
+        5 if rank == "0" else 0
+    )
+    assert seen == ([False] if rank == "0" else [])
+
+
+def test_laws_load_no_mpi_even_under_a_launcher(tmp_path):
+    """Nor dolfinx: a law is there in half a second."""
+    code = "import sys; from archord.cli import run; run(['laws']); print({'mpi4py', 'dolfinx'} & {*sys.modules})"
+    environment = ENVIRONMENT | {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "2", "PMIX_RANK": "0"}
+    result = subprocess.run([sys.executable, "-c", code], env=environment, cwd=tmp_path, capture_output=True, text=True)
+    assert result.stdout.splitlines()[-1] == "set()"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["picture", "run", "-o", "run/history.csv"], "run/history.csv: must end in one of "),
+        (["fit", "run", "--json", "run/history.csv"], "run/history.csv: cannot be written: it belongs to "),
+        (["fit", "run", "--json", "x", "--python", "./x"], "--json, --python, --picture: must be different files."),
+        (["fit", "run", "--json", "/dev/full"], "/dev/full: cannot be written: No space left on device."),
+        (["picture", "run", "-o", "/proc/x.png"], "/proc/x.png: cannot be written: No such file or directory."),
+        (["law", "paper", "--scene", SCENE, "--plot", "/proc/x.png"], "/proc/x.png: cannot be written: No such file"),
+        (["reproduce", "fig2", "-o", "run/history.csv"], "run/history.csv: is a file, not a run folder."),
+        (["export-deck", SCENE, "-o", "run"], "run: cannot be written: it is a folder."),
+    ],
+)  # fmt: skip
+def test_results_that_cannot_be_written(folder, monkeypatch, capsys, arguments, said):
+    """One sentence, and the run stays as it is."""
+    monkeypatch.chdir(folder)
+    before = {p: p.stat().st_mtime_ns for p in folder.rglob("*")}
+    assert run(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(said)
+    assert err.count("\n") == 1
+    assert {p: p.stat().st_mtime_ns for p in folder.rglob("*")} == before
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("history.csv", "", "run/history.csv: cannot be read as the history of a run."),
+        ("history.csv", "step,delta\n1", "run/history.csv: cannot be read as the history of a run."),
+        ("history.csv", "delta,P,p0,eps,peeq_max\n1,nan,1,1,0\n", "run/history.csv: holds numbers that are not "),
+        ("scene.toml", "[joint", "run/scene.toml: is not valid TOML"),
+        ("fields.h5", "", "run: fields.h5 or contact.h5 cannot be read"),
+        ("contact.h5", None, "run: is not a complete run folder: contact.h5 is missing."),
+    ],
+)  # fmt: skip
+def test_a_broken_run_cannot_be_drawn(folder, tmp_path, monkeypatch, capsys, name, text, said):
+    """A sentence that names the file, no picture."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run").mkdir()
+    for file in (folder / "run").iterdir():
+        (tmp_path / "run" / file.name).write_bytes(file.read_bytes())
+    (tmp_path / "run" / name).unlink()
+    if text is not None:
+        (tmp_path / "run" / name).write_text(text)
+    assert run(["picture", "run"]) == 2
+    assert capsys.readouterr().err.startswith(said)
+    assert not (tmp_path / "run" / "picture.png").exists()
