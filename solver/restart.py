@@ -152,5 +152,10 @@ def _same_but_for(folder: Path, own: Scene, scene: Scene, free: tuple[str, ...])
 
 def _keys(scene: Scene) -> dict[str, Any]:
     """Every key of the resolved scene by its dotted name."""
-    data = tomllib.loads(resolved(scene))
-    return {f"{section}.{name}": value for section, keys in data.items() for name, value in keys.items()}
+    found = {}
+    for section, keys in tomllib.loads(resolved(scene)).items():
+        if isinstance(keys, dict):
+            found |= {f"{section}.{name}": value for name, value in keys.items()}
+        else:
+            found[section] = keys
+    return found
