@@ -64,8 +64,11 @@ def _xdmf(path: Path) -> int:
     return len(grids)
 
 
-def same_run(one: Path, other: Path, tolerance: float) -> None:
-    """All numbers of two finished runs agree, relative to the largest of their kind: tables, fields and contact."""
+def same_run(one: Path, other: Path, tolerance: float, fields: float = 0.0) -> None:
+    """All numbers of two finished runs agree, relative to the largest of their kind: tables, fields and contact.
+
+    ``fields`` is the tolerance of values at points, if it is another one.
+    """
     a, b = (read_history(folder / "history.csv") for folder in (one, other))
     assert set(a) == set(b)
     for name in set(a) - {"seconds", "force_balance"}:
@@ -81,7 +84,7 @@ def same_run(one: Path, other: Path, tolerance: float) -> None:
             for key in (n for n in names if isinstance(first[n], h5py.Dataset)):
                 last = key.rpartition("/")[2]
                 if key != "load" and (not last.isdigit() or int(last) <= len(a["step"])):
-                    _agree(f"{name}/{key}", first[key][()], second[key][()], tolerance)
+                    _agree(f"{name}/{key}", first[key][()], second[key][()], fields or tolerance)
 
 
 def _agree(name: str, a: np.ndarray, b: np.ndarray, tolerance: float) -> None:

@@ -107,7 +107,11 @@ def test_a_run_may_be_halted_after_every_step(tmp_path):
 )
 @pytest.mark.parametrize("name", ["plastic", "rigid pin", "force"])
 def test_ranks_may_change(tmp_path_factory, comm, name, before, after, tolerance):
-    """Halted on all ranks or one, continued on one or all."""
+    """Halted on all ranks or one, continued on one or all.
+
+    The order in which MUMPS sums up what other ranks send is left to chance: values at points differ by 1e-12 between
+    any two runs.
+    """
     problem, step = CASES[name]
     folder = comm.bcast(tmp_path_factory.mktemp("ranks") if comm.rank == 0 else None)
     on = {"all": comm, "one": MPI.COMM_SELF}
@@ -120,7 +124,7 @@ def test_ranks_may_change(tmp_path_factory, comm, name, before, after, tolerance
             work()
         comm.barrier()
     if comm.rank == 0:
-        same_run(folder / "whole", folder / "halted", tolerance)
+        same_run(folder / "whole", folder / "halted", tolerance, 30 * tolerance)
 
 
 def test_an_extended_run_equals_the_long_one(tmp_path):
