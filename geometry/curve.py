@@ -15,6 +15,7 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
 _END_MARGIN = 0.05  # a polynomial facet may be continued by this much beyond a free end of its curve
+_CONTINUED = 0.5  # and a facet by this much where points are to stay on theirs
 _NEWTON_STEPS = 30
 
 
@@ -108,13 +109,19 @@ class Curve:
             return self.closest_point(x, outward, displacement)
         return found
 
-    def _project(self, x: Array, outward: Array, displacement: Array, home: Index) -> Projection:
+    def continued(self, x: Array, outward: Array, displacement: Array, facet: Index) -> Projection:
+        """As `closest_point`, but on the given facets, each a polynomial continued beyond its ends: smooth in ``x``."""
+        return self._project(x, outward, displacement, facet, reach=0, margin=_CONTINUED)
+
+    def _project(
+        self, x: Array, outward: Array, displacement: Array, home: Index, reach: int = 1, margin: float = 0.0
+    ) -> Projection:
         m = len(x)
         by_facet = (self.X + displacement)[self.connectivity]
-        facet = np.clip(home[:, None] + np.array([-1, 0, 1]), 0, self.n_facets - 1)
+        facet = np.clip(home[:, None] + np.arange(-reach, reach + 1), 0, self.n_facets - 1)
         xi = np.where(facet < home[:, None], 1.0, np.where(facet > home[:, None], 0.0, 0.5))
-        low = np.where(facet == 0, -_END_MARGIN, 0.0)
-        high = np.where(facet == self.n_facets - 1, 1.0 + _END_MARGIN, 1.0)
+        low = np.where(facet == 0, -_END_MARGIN, -margin)
+        high = np.where(facet == self.n_facets - 1, 1.0 + _END_MARGIN, 1.0 + margin)
         control = by_facet[facet]
         target = x[:, None, :]
         for _ in range(_NEWTON_STEPS):

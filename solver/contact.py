@@ -100,6 +100,11 @@ class Contact:
         for pair in self.pairings:
             pair.search()
 
+    def hold(self) -> None:
+        """Keep all points on the facets they were last paired with, until `search`: the forces become smooth."""
+        for pair in self.pairings:
+            pair.hold()
+
     def evaluate(self, u: Array) -> bool:
         """Gaps, pressures and trial history at the nodal displacements ``u`` ``(n, 2)`` of this rank.
 

@@ -33,6 +33,7 @@ class Pairing:
     pressure: Array = field(init=False)  # (m,)
     tangent: Array = field(init=False)  # (m, 3, 3) of the material
     _search: bool = field(init=False, default=True)
+    _hold: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         """Pair the undeformed curves. Raises `ProjectionError`."""
@@ -54,7 +55,11 @@ class Pairing:
 
     def search(self) -> None:
         """Forget where the pairs were: the next evaluation searches them anew, over the whole curve."""
-        self._search = True
+        self._search, self._hold = True, False
+
+    def hold(self) -> None:
+        """Keep every point on the facet it was last paired with, until `search`."""
+        self._search, self._hold = False, True
 
     def evaluate(self, u: Array, motion: Array) -> None:
         """Pairs, gaps, pressures and trial history at ``u`` ``(n, 2)``, with the opposite moved by ``motion``.
@@ -90,7 +95,9 @@ class Pairing:
             self.pressure = np.where(self.projection.found & (trial > 0), trial, 0.0)
 
     def _pair_anew(self, x: Array, outward: Array, motion: Array) -> None:
-        if isinstance(self.curve, Curve):
+        if isinstance(self.curve, Curve) and self._hold:
+            self.projection = self.curve.continued(x, outward, motion, self.projection.facet)
+        elif isinstance(self.curve, Curve):
             start = None if self._search else self.projection.facet
             self.projection = self.curve.closest_point(x, outward, motion, start)
         else:

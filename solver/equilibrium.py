@@ -28,6 +28,9 @@ from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.points import PlasticPoints
 from archord.solver.timer import Timer
 
+_PATIENCE = 12  # Newton iterations in which the residual must halve
+_CIRCLING = 4  # the same where no contact point opens or closes
+
 
 @dataclass(frozen=True)
 class Support:
@@ -48,6 +51,7 @@ class Newton:
 
     Of a solve that did not converge, ``worst`` is the place ``(2,)`` of the largest residual, ``flips`` the number of
     contact points that changed between open and closed at each residual, ``plastic_increment`` the largest of PEEQ.
+    ``held``: contact points had to stay on their facets.
     """
 
     converged: bool
@@ -57,13 +61,15 @@ class Newton:
     worst: tuple[float, float] | None = None
     flips: list[int] = field(default_factory=list)
     plastic_increment: float = 0.0
+    held: bool = False
 
     def after(self, before: Newton | None) -> Newton:
         """This solve with the iterations and residuals of the one ``before`` it."""
         if before is None:
             return self
         iterations, residuals = before.iterations + self.iterations, before.residuals + self.residuals
-        return replace(self, iterations=iterations, residuals=residuals, flips=before.flips + self.flips)
+        flips, held = before.flips + self.flips, before.held or self.held
+        return replace(self, iterations=iterations, residuals=residuals, flips=flips, held=held)
 
 
 class Equilibrium:
@@ -364,9 +370,17 @@ class Equilibrium:
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
         if norm <= self.tolerance * scale:
             return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
+        if self._stagnates():
+            self._failure = "the residual does not fall any further"
+            return PETSc.SNES.ConvergedReason.DIVERGED_DTOL
         if iteration >= self.max_iterations:
             return PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT
         return PETSc.SNES.ConvergedReason.ITERATING
+
+    def _stagnates(self) -> bool:
+        patience = _PATIENCE if any(self._flips[-_CIRCLING:]) else _CIRCLING
+        recent, before = self._residuals[-patience:], self._residuals[:-patience]
+        return bool(before) and min(recent) > 0.5 * min(before)
 
     def solve(self, load: float, guess: Array, *, elastic_first: bool = False) -> Newton:
         """Solve at ``load`` from ``guess``, shaped like `state`, whose prescribed values are replaced.
@@ -407,6 +421,25 @@ class Equilibrium:
         self._snes.setFromOptions()
 
     def _run(self, guess: Array) -> Newton:
+        """Newton's method from ``guess``.
+
+        Where it circles though no point opens or closes, points jump between two facets that meet at an angle; they
+        stay on theirs then, each facet continued beyond its ends.
+        """
+        result = self._newton(guess)
+        contact = self.contact
+        circles = len(result.flips) > _CIRCLING and not any(result.flips[-_CIRCLING:])
+        if result.converged or contact is None or contact.kinematics != "current" or not circles:
+            return result
+        x = guess.copy()
+        x[: 2 * self.n_owned] = self._x.array_r[: 2 * self.n_owned]
+        self.u.x.array[:] = x[:-1]
+        self.u.x.scatter_forward()
+        x[:-1], x[-1] = self.u.x.array, self.level
+        contact.hold()
+        return replace(self._newton(x, search=False).after(result), held=True)
+
+    def _newton(self, guess: Array, *, search: bool = True) -> Newton:
         self._residuals: list[float] = []
         self._flips: list[int] = []
         self._failure = ""
@@ -419,7 +452,7 @@ class Equilibrium:
             self._x.array[:] = x[: self.n_owned].ravel()
         else:
             self._border.join(self._x, x[: self.n_owned].ravel(), self.level)
-        if self.contact is not None:
+        if self.contact is not None and search:
             self.contact.search()
         self._raised = None
         with self.timer("solve"):
@@ -431,7 +464,7 @@ class Equilibrium:
                 raise
         code, iterations = self._snes.getConvergedReason(), self._snes.getIterationNumber()
         if code > 0:
-            return Newton(True, "converged", iterations, self._residuals)
+            return Newton(True, "converged", iterations, self._residuals, None, self._flips)
         reason = self._failure or _REASONS.get(code, f"SNES reason {code}")
         if self._border is not None and self._border.came_free:
             reason = "nothing resists the force, the pin has come free"

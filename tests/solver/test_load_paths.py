@@ -181,7 +181,7 @@ def test_a_bad_path_is_refused_with_a_sentence(tmp_path, content, said):
         ('displacement = "far"', "must be a number or a list of numbers"),
         ('displacement = [1.0, "far"]', "entry 2 must be a number"),
         ("displacement = [1.0, 2.0]\nsteps = [1]", "must have one number for each of the 2 targets"),
-        ("displacement = 1.0\nsteps = 0", "must be at least 1 and at most 100000"),
+        ("displacement = 1.0\nsteps = 0", "must be at least 1 and at most 10000"),
         ("displacement = 1.0\nsteps = 1.5", "must be a whole number or a list of them"),
         ('displacement = 1.0\npath = "x.csv"', "load.path must not be given together with displacement"),
         ("steps = 3", "load.displacement is missing"),
