@@ -24,12 +24,16 @@ class ContactWriter:
         self._path, self._steps = folder / "contact.h5", steps
         self._file: StepFile | None = None
 
-    def write(self, step: int, load: float, profiles: dict[str, ArcProfile]) -> None:
-        """Make this ``step`` the last one. The first call makes the file, or opens that of the steps before. Raises
-        `OSError`, and `SceneError` if that file is not this run's."""
+    def write(self, step: int, load: float, profiles: dict[str, ArcProfile], *, again: bool = False) -> None:
+        """Make this ``step`` the last one; ``again``, if it is not there yet.
+
+        The first call makes the file, or opens that of the steps before. Raises `OSError`, and `SceneError` if that
+        file is not this run's.
+        """
         arrays = {f"{name}/{key}": getattr(p, key) for name, p in profiles.items() for key in _PER_STEP}
         if self._file is None:
             shapes: Shapes = {name: (values.shape, "<f8") for name, values in arrays.items()}
             fixed = {f"{name}/{key}": getattr(p, key) for name, p in profiles.items() for key in _FIXED}
             self._file = open_or_create(self._path, self._steps, shapes, fixed, step - 1)
-        self._file.write(step, load, arrays)
+        if not again or self._file.accepted < step:
+            self._file.write(step, load, arrays)

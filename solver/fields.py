@@ -48,8 +48,11 @@ class FieldWriter:
 
         self._file = on_root(joint.comm, make)
 
-    def write(self, step: int, load: float) -> None:
-        """Make the last accepted state ``step``, the last one. Collective. Raises `WriteError`."""
+    def write(self, step: int, load: float, *, again: bool = False) -> None:
+        """Make the last accepted state ``step``, the last one; ``again``, if it is not there yet. Collective.
+
+        Raises `WriteError`.
+        """
         joint = self.joint
         u = joint.equilibrium.displacement()
         means = joint.bulk.cell_fields(u)
@@ -62,7 +65,8 @@ class FieldWriter:
 
         def write() -> None:
             assert self._file is not None
-            self._file.write(step, load, arrays | {"displacement": np.pad(nodal, ((0, 0), (0, 1)))})
+            if not again or self._file.accepted < step:
+                self._file.write(step, load, arrays | {"displacement": np.pad(nodal, ((0, 0), (0, 1)))})
             self._write_xdmf(self._file)
 
         on_root(joint.comm, write)

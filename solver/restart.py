@@ -152,7 +152,7 @@ def _same_but_for(folder: Path, own: Scene, scene: Scene, free: tuple[str, ...])
 
 def _keys(scene: Scene) -> dict[str, Any]:
     """Every key of the resolved scene by its dotted name."""
-    found = {}
+    found: dict[str, Any] = {}
     for section, keys in tomllib.loads(resolved(scene)).items():
         if isinstance(keys, dict):
             found |= {f"{section}.{name}": value for name, value in keys.items()}

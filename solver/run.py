@@ -114,7 +114,7 @@ def solve_scene(
 class _Output:
     """Everything that a run writes; rank 0 writes, all ranks take part. Raises `WriteError` on all of them.
 
-    A step counts once the checkpoint has it: the other files follow, and a run that goes on writes its last step anew.
+    A step counts once the checkpoint has it: the other files follow, and a run that goes on writes what they lack.
     """
 
     def __init__(self, folder: Path, joint: Joint, begun: float) -> None:
@@ -132,14 +132,14 @@ class _Output:
             self.steps = comm.bcast(start.done if start else [])
             on_root(comm, lambda: self._prepare(start))
             self._fields = FieldWriter(self.folder, self._order, len(joint.scene.targets), after=len(self.steps))
-            on_root(comm, lambda: replace_text(self.folder / "scene.toml", resolved(joint.scene)))
+            on_root(comm, self._write_scene)
         self._last = perf_counter()
         if not comm.bcast(start is not None):
             on_root(comm, self._write_tables)
             return None, Work()
         with joint.timer("checkpoint"):
             at = resume(self._order, self.folder / CHECKPOINT, start.checkpoint if start else None)
-        self._write(at.measures, at.step, arc_profiles(joint))
+        self._write(at.measures, at.step, arc_profiles(joint), again=True)
         return at.position, at.work
 
     def _prepare(self, start: Start | None) -> None:
@@ -147,10 +147,14 @@ class _Output:
         if start is None:
             with naming(self.folder):
                 clear(self.folder)
+            self._write_scene()
         before = start.report if start else None
         self._history = History(self.folder / "history.csv", scene, self.steps)
         self._report = Report(self.folder / "run.json", self.joint, self._begun, self.steps, before)
         self._contact = ContactWriter(self.folder, len(scene.targets))
+
+    def _write_scene(self) -> None:
+        replace_text(self.folder / "scene.toml", resolved(self.joint.scene))
 
     def _write_tables(self) -> None:
         assert self._report is not None
@@ -171,17 +175,17 @@ class _Output:
         self._write(m, step, profiles)
         return m
 
-    def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
-        """Make ``m`` the last step of all files but the checkpoint. Collective."""
+    def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile], *, again: bool = False) -> None:
+        """Make ``m`` the last step of all files but the checkpoint, ``again`` after a halt. Collective."""
 
         def add() -> None:
             assert self._report is not None
-            self._contact.write(m.step, m.delta, profiles)
+            self._contact.write(m.step, m.delta, profiles, again=again)
             self._history.add(m)
             self._report.add(m, step, profiles)
 
         with self.joint.timer("output"):
-            self._fields.write(m.step, m.delta)
+            self._fields.write(m.step, m.delta, again=again)
             on_root(self.joint.comm, add)
         self.steps.append(m)
 

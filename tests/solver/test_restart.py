@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import tomllib
 
 import pytest
@@ -246,6 +247,21 @@ def test_a_run_with_files_missing_is_refused(tmp_path, damage, said):
         go_on(scene(0.25, 3), folder)
     assert len(str(error.value).splitlines()) == 1
     assert (folder / "checkpoint.h5").read_bytes() == checkpoint
+
+
+def test_a_step_that_only_the_checkpoint_has_is_written(tmp_path):
+    """Killed after the checkpoint and before all other files: they get the step from the restored state."""
+    problem = CASES["plastic"][0]
+    run(problem, tmp_path / "whole")
+    run(problem, tmp_path / "halted", crash=2)
+    shutil.copytree(tmp_path / "halted", tmp_path / "before")
+    shutil.rmtree(tmp_path / "halted")
+    run(problem, tmp_path / "halted", crash=3)
+    shutil.copy(tmp_path / "halted" / "checkpoint.h5", tmp_path / "before")
+    assert accepted_steps(tmp_path / "before") == 3
+    assert len(json.loads((tmp_path / "before" / "run.json").read_text())["steps"]) == 2
+    go_on(problem, tmp_path / "before")
+    same_run(tmp_path / "whole", tmp_path / "before", 1e-12)
 
 
 def test_lost_tables_are_written_anew(tmp_path):
