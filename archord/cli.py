@@ -111,9 +111,20 @@ def solve(
     ] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="run folder [runs/<scene name>]")] = None,
     force: Annotated[bool, typer.Option("--force", help="overwrite the results in the run folder")] = False,
+    restart: Annotated[bool, typer.Option("--restart", help="continue the interrupted run in the run folder")] = False,
+    extend: Annotated[bool, typer.Option("--extend", help="continue the finished run to the scene's load")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but errors")] = False,
 ) -> int:
-    """Solve a scene into a run folder. Under mpirun, all ranks work on it."""
+    """Solve a scene into a run folder. Under mpirun, all ranks work on it.
+
+    With --restart and --extend, the run folder may stand in the place of the scene.
+    """
+    if restart + extend + force > 1:
+        raise click.UsageError("choose one of --force, --restart and --extend")
+    if restart or extend:
+        from archord.continuing import continue_with_progress
+
+        return continue_with_progress(scene, overrides or [], output, extend=extend, quiet=quiet, begun=_begun)
     from archord.progress import solve_with_progress
     from archord.solver.scene_file import load_scene
 

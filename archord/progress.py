@@ -8,15 +8,20 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from archord.ranks import on_terminal
 from archord.solver.scene import Scene
 
+if TYPE_CHECKING:
+    from archord.solver.restart import Start
 
-def solve_with_progress(load: Callable[[], Scene], folder: Path, *, force: bool, quiet: bool, begun: float) -> int:
+
+def solve_with_progress(
+    load: Callable[[], Scene], folder: Path, *, force: bool, quiet: bool, begun: float, start: Start | None = None
+) -> int:
     """Solve the scene that ``load`` gives rank 0 into ``folder`` on all ranks of MPI_COMM_WORLD and report; returns the
-    exit code."""
+    exit code. ``start`` continues the run in ``folder``."""
     from mpi4py import MPI
 
     from archord.solver.ranks import agreed
@@ -34,12 +39,13 @@ def solve_with_progress(load: Callable[[], Scene], folder: Path, *, force: bool,
 
     timer = Timer()
     timer.seconds["start-up"] = perf_counter() - begun
-    report = _Progress(scene, silent=quiet or comm.rank != 0)
+    report = _Progress(scene, silent=quiet or comm.rank != 0, done=start.checkpoint.step if start else 0)
     with report:
         outcome = solve_scene(
             scene,
             folder,
             comm,
+            start=start,
             timer=timer,
             begun=begun,
             on_start=report.start,
@@ -68,7 +74,7 @@ def _shortened(warnings: list[str]) -> list[str]:
 class _Progress:
     """Reports steps as they are accepted."""
 
-    def __init__(self, scene: Scene, silent: bool) -> None:
+    def __init__(self, scene: Scene, silent: bool, done: int = 0) -> None:
         self.scene, self.silent = scene, silent
         self._bar: Any = nullcontext()
         self._task: Any = None
@@ -82,7 +88,7 @@ class _Progress:
                 TextColumn("{task.description}"),
                 TimeElapsedColumn(),
             )
-            self._task = self._bar.add_task("meshing", total=len(scene.targets))
+            self._task = self._bar.add_task("meshing", total=len(scene.targets), completed=done)
 
     def __enter__(self) -> _Progress:
         self._bar.__enter__()

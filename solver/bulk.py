@@ -169,6 +169,10 @@ class Bulk:
         """The points with history of all plastic bodies."""
         return [body.points for body in self._plastic.values()]
 
+    def histories(self) -> dict[int, tuple[np.ndarray, PlasticPoints]]:
+        """Cells ``(n,)`` of this rank and their ``n q`` points with history, by the plastic body's tag."""
+        return {tag: (body.cells, body.points) for tag, body in self._plastic.items()}
+
     def pattern_forms(self) -> list[fem.Form]:
         """Bilinear forms that together span the bulk's matrix pattern."""
         return [*self._elastic_forms, *self._plastic_forms]

@@ -11,7 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from archord.solver.contact_profile import ArcProfile
-from archord.solver.step_file import StepFile
+from archord.solver.step_file import Shapes, StepFile, open_or_create
 
 _FIXED = ("s", "angle", "weight")
 _PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")
@@ -24,11 +24,16 @@ class ContactWriter:
         self._path, self._steps = folder / "contact.h5", steps
         self._file: StepFile | None = None
 
-    def write(self, step: int, load: float, profiles: dict[str, ArcProfile]) -> None:
-        """Add ``step``; the first one makes the file."""
+    def write(self, step: int, load: float, profiles: dict[str, ArcProfile], *, again: bool = False) -> None:
+        """Make this ``step`` the last one; ``again``, if it is not there yet.
+
+        The first call makes the file, or opens that of the steps before. Raises `OSError`, and `SceneError` if that
+        file is not this run's.
+        """
         arrays = {f"{name}/{key}": getattr(p, key) for name, p in profiles.items() for key in _PER_STEP}
         if self._file is None:
-            shapes = {name: (values.shape, "f8") for name, values in arrays.items()}
+            shapes: Shapes = {name: (values.shape, "<f8") for name, values in arrays.items()}
             fixed = {f"{name}/{key}": getattr(p, key) for name, p in profiles.items() for key in _FIXED}
-            self._file = StepFile(self._path, self._steps, shapes, fixed)
-        self._file.write(step, load, arrays)
+            self._file = open_or_create(self._path, self._steps, shapes, fixed, step - 1)
+        if not again or self._file.accepted < step:
+            self._file.write(step, load, arrays)

@@ -246,19 +246,24 @@ class Equilibrium:
             self._failure = str(error)
             f.set(np.nan)
             return
-        if self._pattern_grew:
-            self._A.destroy()
-            self._elastic.destroy()
-            self._make_matrix()
-            if self._border is None:
-                snes.setJacobian(self._guarded(self._jacobian), self._A)
-            else:
-                self._border.replace(self._A)
+        self._follow_pattern()
         free = np.where(self._free_owned, self._force.array_r, 0.0)
         if self._border is None or self.by_force is None:
             f.array[:] = free
         else:
             self._border.join(f, free, self.force_on_level() - self.by_force * self.load)
+
+    def _follow_pattern(self) -> None:
+        """Make the matrix anew where the pairs of the last evaluation slid out of its pattern."""
+        if not self._pattern_grew:
+            return
+        self._A.destroy()
+        self._elastic.destroy()
+        self._make_matrix()
+        if self._border is None:
+            self._snes.setJacobian(self._guarded(self._jacobian), self._A)
+        else:
+            self._border.replace(self._A)
 
     def evaluate(self) -> None:
         """Residual, reactions and trial history at the current displacement and load. Raises `Interrupted` on every
@@ -494,6 +499,15 @@ class Equilibrium:
         """Go back to an accepted state; the history was never touched."""
         self.load, self.level = load, float(state[-1])
         self.u.x.array[:] = state[:-1]
+
+    def resume(self, load: float, state: Array, largest_reaction: float) -> None:
+        """Take up an accepted state of an earlier process, whose history the points have already, and evaluate it."""
+        self.restore(load, state)
+        self.largest_reaction = largest_reaction
+        if self.contact is not None:
+            self.contact.search()
+        self.evaluate()
+        self._follow_pattern()
 
     def commit(self) -> None:
         """Accept the last solve: bulk and contact keep their trial history."""

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import csv
+import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from archord.solver.disk import replace_text
 from archord.solver.measures import Measures
 from archord.solver.scene import Scene
 
@@ -50,23 +53,31 @@ def _columns(scene: Scene) -> list[_Column]:
 
 
 class History:
-    """Writes history.csv row by row; each row is on disk when `add` returns."""
+    """Writes history.csv; ``done`` are the steps that a run which goes on has behind it."""
 
-    def __init__(self, path: Path, scene: Scene) -> None:
+    def __init__(self, path: Path, scene: Scene, done: Sequence[Measures] = ()) -> None:
         self.path = path
         self._columns = _columns(scene)
-        with path.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow([c.heading for c in self._columns])
+        self._rows = [[c.heading for c in self._columns]] + [[c.of(m) for c in self._columns] for m in done]
 
     def add(self, m: Measures) -> None:
-        """Append one step."""
-        with self.path.open("a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow([c.of(m) for c in self._columns])
+        """Append one step. Raises `OSError`."""
+        self._rows.append([c.of(m) for c in self._columns])
+        self.write()
+
+    def write(self) -> None:
+        """Replace the file in one move, so that a reader never sees half a row. Raises `OSError`."""
+        text = io.StringIO(newline="")
+        csv.writer(text).writerows(self._rows)
+        replace_text(self.path, text.getvalue())
 
 
 def read_history(path: str | Path) -> dict[str, list[float]]:
-    """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E* R)"]``, ..."""
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        heading, *rows = list(csv.reader(file))
+    """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E* R)"]``, ...
+
+    A last row that does not end in a line break (a copy cut short) is ignored.
+    """
+    text = Path(path).read_bytes().decode()
+    heading, *rows = csv.reader(io.StringIO(text[: text.rfind("\n") + 1], newline=""))
     names = [h.split(" [")[0] for h in heading]
     return {name: [float(row[i]) for row in rows] for i, name in enumerate(names)}

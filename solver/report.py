@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import platform
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +17,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.solver.contact_profile import ArcProfile
+from archord.solver.disk import replace_text
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures
 from archord.solver.stepping import Step
@@ -27,11 +28,21 @@ _FEW_FACETS = 5
 
 
 class Report:
-    """The content of run.json for ``joint``; ``begun`` is the ``perf_counter`` from which the seconds count."""
+    """The content of run.json for ``joint``; ``begun`` is the ``perf_counter`` from which the seconds count.
 
-    def __init__(self, path: Path, joint: Joint, begun: float) -> None:
+    A run that goes on has the steps ``done`` behind it, and ``before`` is its run.json.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        joint: Joint,
+        begun: float,
+        done: Sequence[Measures] = (),
+        before: dict[str, Any] | None = None,
+    ) -> None:
         self.path, self.joint, self.begun = path, joint, begun
-        self.measures: list[Measures] = []
+        self.measures = list(done)
         self._residual = 0.0
         self.content: dict[str, Any] = {
             "status": "running",
@@ -46,8 +57,25 @@ class Report:
                 "newton": joint.equilibrium.tolerance,
                 "gamma_factor": joint.scene.analysis.gamma_factor,
             },
+            "restarts": [],
             "warnings": [],
             "steps": [],
+        }
+        self._before: dict[str, Any] = before or {}
+        if before is not None:
+            self._go_on(before, len(self.measures))
+
+    def _go_on(self, before: dict[str, Any], done: int) -> None:
+        """Take over what the run's earlier processes noted, and note this one."""
+        now, steps = self.content["started"], before["steps"][:done]
+        restart = {"when": now, "after_step": done + 1, "ranks": self.joint.comm.size, "command": sys.argv}
+        self._residual = max((r[-1][-1] or 0.0 for step in steps if (r := step["residuals"]) and r[-1]), default=0.0)
+        self.content |= {
+            "started": before["started"],
+            "command": before["command"],
+            "restarts": [*before.get("restarts", []), restart],
+            "warnings": [w for w in before["warnings"] if _step_of(w) <= done],
+            "steps": steps,
         }
 
     def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
@@ -68,19 +96,17 @@ class Report:
         self.write()
 
     def write(self) -> None:
-        """Replace run.json in one move, so that a reader never sees half of it."""
+        """Replace run.json in one move, so that a reader never sees half of it. Raises `OSError`."""
         self.content |= {"totals": self._totals(), "seconds": self._seconds(), "error_estimates": self._errors()}
-        new = self.path.with_suffix(".json.new")
-        new.write_text(json.dumps(_finite(self.content), indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(new, self.path)
+        replace_text(self.path, json.dumps(_finite(self.content), indent=1, allow_nan=False) + "\n")
 
     def _totals(self) -> dict[str, int]:
-        counts = self.joint.timer.counts
+        counts, before = self.joint.timer.counts, self._before.get("totals", {})
         return {
             "newton_iterations": sum(m.iterations for m in self.measures),
             "cutbacks": sum(m.cutbacks for m in self.measures),
-            "factorisations": counts.get("assemble bulk", 0),
-            "residual_evaluations": counts.get("return mapping", 0),
+            "factorisations": counts.get("assemble bulk", 0) + before.get("factorisations", 0),
+            "residual_evaluations": counts.get("return mapping", 0) + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.measures),
         }
 
@@ -89,6 +115,8 @@ class Report:
         if "solve" in s:
             s["linear solve"] = s.pop("solve") - sum(s.get(name, 0.0) for name in _INSIDE_SOLVE)
         s["total"] = perf_counter() - self.begun
+        for name, value in self._before.get("seconds", {}).items():
+            s[name] = s.get(name, 0.0) + value
         return {name: round(value, 4) for name, value in s.items()}
 
     def _errors(self) -> dict[str, float]:
@@ -101,6 +129,11 @@ class Report:
             "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / work if work else 0.0,
             "newton_residual": self._residual,
         }
+
+
+def _step_of(warning: str) -> int:
+    """The step that a warning is about."""
+    return int(warning.removeprefix("step ").partition(":")[0])
 
 
 def _finite(value: Any) -> Any:

@@ -1,24 +1,31 @@
-"""A scene solved into a run folder: scene.toml, history.csv, fields.xdmf/.h5, contact.h5 and run.json."""
+"""A scene solved into a run folder: scene.toml, history.csv, fields.xdmf/.h5, contact.h5, checkpoint.h5, run.json."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
 from mpi4py import MPI
 
+from archord.solver.checkpoint import write as write_checkpoint
 from archord.solver.contact_file import ContactWriter
+from archord.solver.contact_profile import ArcProfile
+from archord.solver.disk import WriteError, naming, on_root, replace_text
 from archord.solver.fields import FieldWriter
 from archord.solver.history import History
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures, Work, arc_profiles, measure
+from archord.solver.mesh_order import MeshOrder
 from archord.solver.report import Report
-from archord.solver.run_folder import FILES
+from archord.solver.restart import Start
+from archord.solver.run_folder import CHECKPOINT, clear, occupied
 from archord.solver.scene import Scene
 from archord.solver.scene_file import resolved
+from archord.solver.standing import Standing, halt, resume
 from archord.solver.stepping import Position, Step, StepFailure, march
 from archord.solver.timer import Timer
 
@@ -48,6 +55,7 @@ def solve_scene(
     folder: Path,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
+    start: Start | None = None,
     timer: Timer | None = None,
     begun: float | None = None,
     on_start: Callable[[Joint], None] = lambda joint: None,
@@ -56,84 +64,142 @@ def solve_scene(
 ) -> Outcome:
     """Solve ``scene`` and write everything to the existing ``folder`` (see `run_folder.claim_folder`). Collective.
 
-    ``on_start``, ``on_step`` and ``on_attempt(load, Newton iterations)`` report progress on every rank. ``begun`` is
-    the ``perf_counter`` from which the seconds count. A step that cannot be solved ends the run with status "stopped",
-    Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was accepted before stays.
+    ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``, ``on_step`` and
+    ``on_attempt(load, Newton iterations)`` report progress on every rank. ``begun`` is the ``perf_counter`` from which
+    the seconds count. A step that cannot be solved, or a file that cannot be written, ends the run with status
+    "stopped", Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was accepted before stays. Raises `SceneError` if
+    another process solves into ``folder``, or what is there cannot be continued.
     """
     begun = perf_counter() if begun is None else begun
-    joint = Joint(scene, comm, timer=timer)
-    on_start(joint)
-    output = _Output(folder, joint, begun)
-    work = Work()
+    with ExitStack() as stack:
+        on_root(comm, lambda: stack.enter_context(occupied(folder)) or True)
+        joint = Joint(scene, comm, timer=timer)
+        on_start(joint)
+        output = _Output(folder, joint, begun)
+        status, message, failed, received = "done", "", None, 0
+        try:
+            with Interrupt() as joint.equilibrium.interrupt:
+                position, work = output.begin(start)
 
-    def target_done(step: Step, position: Position) -> None:
-        on_step(output.add(step, work))
+                def target_done(step: Step, position: Position) -> None:
+                    on_step(output.add(step, position, work))
 
-    status, message, failed, received = "done", "", None, 0
-    try:
-        with Interrupt() as joint.equilibrium.interrupt:
-            march(
-                joint.equilibrium,
-                scene.targets,
-                joint.rigid_translation,
-                rules=scene.stepping,
-                from_rest=scene.joint.dR > 0,
-                substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
-                target_done=target_done,
-                attempted=on_attempt,
-            )
-    except StepFailure as failure:
-        status, message, failed = "stopped", str(failure), failure.attempt
-    except Interrupted as interrupted:
-        status, message, received = "interrupted", f"{interrupted} after step {len(output.steps)}", interrupted.number
-    if status == "done" and output.unseen():
-        status, message = "stopped", _UNSEEN
-    warnings = output.finish(status, message, failed)
-    return Outcome(folder, status, message, output.steps, warnings, received)
+                march(
+                    joint.equilibrium,
+                    scene.targets,
+                    joint.rigid_translation,
+                    rules=scene.stepping,
+                    from_rest=scene.joint.dR > 0,
+                    substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
+                    target_done=target_done,
+                    attempted=on_attempt,
+                    start=position,
+                )
+        except StepFailure as failure:
+            status, message, failed = "stopped", str(failure), failure.attempt
+        except WriteError as error:
+            status, message = "stopped", str(error)
+        except Interrupted as interrupted:
+            status, message = "interrupted", f"{interrupted} after step {len(output.steps)}"
+            received = interrupted.number
+        if status == "done" and output.unseen():
+            status, message = "stopped", _UNSEEN
+        try:
+            warnings = output.finish(status, message, failed)
+        except WriteError as error:
+            status, message, warnings = "stopped", message if status == "stopped" else str(error), []
+        return Outcome(folder, status, message, output.steps, warnings, received)
 
 
 class _Output:
-    """Everything that a run writes; rank 0 writes, all ranks take part."""
+    """Everything that a run writes; rank 0 writes, all ranks take part. Raises `WriteError` on all of them.
+
+    A step counts once the checkpoint has it: the other files follow, and a run that goes on writes what they lack.
+    """
 
     def __init__(self, folder: Path, joint: Joint, begun: float) -> None:
-        self.joint = joint
+        self.folder, self.joint = folder, joint
         self.steps: list[Measures] = []
-        self._root = joint.comm.rank == 0
-        n = len(joint.scene.targets)
-        with joint.timer("output"):
-            if self._root:
-                for name in FILES:
-                    (folder / name).unlink(missing_ok=True)
-                (folder / "scene.toml").write_text(resolved(joint.scene), encoding="utf-8")
-                self._history = History(folder / "history.csv", joint.scene)
-                self._report = Report(folder / "run.json", joint, begun)
-                self._report.write()
-                self._contact = ContactWriter(folder, n)
-            self._fields = FieldWriter(folder, joint, n)
-        self._last = perf_counter()
+        self._begun = self._last = begun
+        self._report: Report | None = None
 
-    def add(self, step: Step, work: Work) -> Measures:
+    def begin(self, start: Start | None) -> tuple[Position | None, Work]:
+        """Make the files, or open those of the run that goes on from ``start`` (known on rank 0) and give its state to
+        the joint. Collective."""
+        joint, comm = self.joint, self.joint.comm
+        with joint.timer("output"):
+            self._order = MeshOrder(joint)
+            self.steps = comm.bcast(start.done if start else [])
+            on_root(comm, lambda: self._prepare(start))
+            self._fields = FieldWriter(self.folder, self._order, len(joint.scene.targets), after=len(self.steps))
+            on_root(comm, self._write_scene)
+        self._last = perf_counter()
+        if not comm.bcast(start is not None):
+            on_root(comm, self._write_tables)
+            return None, Work()
+        with joint.timer("checkpoint"):
+            at = resume(self._order, self.folder / CHECKPOINT, start.checkpoint if start else None)
+        self._write(at.measures, at.step, arc_profiles(joint), again=True)
+        return at.position, at.work
+
+    def _prepare(self, start: Start | None) -> None:
+        scene = self.joint.scene
+        if start is None:
+            with naming(self.folder):
+                clear(self.folder)
+            self._write_scene()
+        before = start.report if start else None
+        self._history = History(self.folder / "history.csv", scene, self.steps)
+        self._report = Report(self.folder / "run.json", self.joint, self._begun, self.steps, before)
+        self._contact = ContactWriter(self.folder, len(scene.targets))
+
+    def _write_scene(self) -> None:
+        replace_text(self.folder / "scene.toml", resolved(self.joint.scene))
+
+    def _write_tables(self) -> None:
+        assert self._report is not None
+        self._history.write()
+        self._report.write()
+
+    def add(self, step: Step, position: Position, work: Work) -> Measures:
         """Write an accepted output step, and return its measures. Collective."""
-        with self.joint.timer("output"):
-            profiles = arc_profiles(self.joint)
+        joint = self.joint
+        with joint.timer("output"):
+            profiles = arc_profiles(joint)
             seconds, self._last = perf_counter() - self._last, perf_counter()
             largest = max((abs(m.P) for m in self.steps), default=0.0)
-            m = measure(self.joint, len(self.steps) + 1, step, profiles, work, seconds, largest)
-            self.steps.append(m)
-            self._fields.write(m.step, m.delta)
-            if self._root:
-                self._contact.write(m.step, m.delta, profiles)
-                self._history.add(m)
-                self._report.add(m, step, profiles)
+            m = measure(joint, len(self.steps) + 1, step, profiles, work, seconds, largest)
+        with joint.timer("checkpoint"):
+            checkpoint = halt(self._order, Standing(m, step, position, work))
+            on_root(joint.comm, lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
+        self._write(m, step, profiles)
         return m
+
+    def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile], *, again: bool = False) -> None:
+        """Make ``m`` the last step of all files but the checkpoint, ``again`` after a halt. Collective."""
+
+        def add() -> None:
+            assert self._report is not None
+            self._contact.write(m.step, m.delta, profiles, again=again)
+            self._history.add(m)
+            self._report.add(m, step, profiles)
+
+        with self.joint.timer("output"):
+            self._fields.write(m.step, m.delta, again=again)
+            on_root(self.joint.comm, add)
+        self.steps.append(m)
 
     def unseen(self) -> bool:
         """Whether the pin was pressed into the hole but no contact point ever noticed."""
         return max(m.delta for m in self.steps) > 0 and not any(m.contact_area for m in self.steps)
 
     def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
-        """Note how the run ended; returns the warnings on rank 0."""
-        if not self._root:
-            return []
-        self._report.finish(status, message, failed)
-        return self._report.content["warnings"]
+        """Note how the run ended; returns the warnings on rank 0. Collective."""
+
+        def note() -> list[str]:
+            if self._report is None:
+                return []
+            self._report.finish(status, message, failed)
+            return self._report.content["warnings"]
+
+        return on_root(self.joint.comm, note) or []

@@ -2,12 +2,40 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+from archord.solver.disk import new_name
 from archord.solver.scene import SceneError
 
 FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
+CHECKPOINT = "checkpoint.h5"
+
+
+def clear(folder: Path) -> None:
+    """Remove an old run's files, and what a kill left half done of them. Raises `OSError`."""
+    for name in (CHECKPOINT, *FILES):
+        (folder / name).unlink(missing_ok=True)
+        new_name(folder / name).unlink(missing_ok=True)
+
+
+@contextmanager
+def occupied(folder: Path) -> Iterator[None]:
+    """Keep other processes from writing to ``folder``; a kill ends that, too. Raises `SceneError` if one does."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise SceneError(f"{folder}: another archord is solving into it.") from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def claim_folder(folder: Path, force: bool) -> None:

@@ -348,12 +348,17 @@ class Scene(_Section):
         return self.load.name in ("force", "relative_force")
 
     @property
+    def load_unit(self) -> float:
+        """What the targets of the section load are multiplied by."""
+        scale = {"displacement": self.joint.dR, "relative_force": self.E_star * self.joint.radius}
+        return scale.get(self.load.name, 1.0)
+
+    @property
     def targets(self) -> list[float]:
         """The load at every output step: the displacement of the pin, or the force on it."""
-        scale = {"displacement": self.joint.dR, "relative_force": self.E_star * self.joint.radius}
         out, begin = [], 0.0
         for leg, n in zip(self.load.legs, self.load.leg_steps, strict=True):
-            end = leg * scale.get(self.load.name, 1.0)
+            end = leg * self.load_unit
             out += [begin + (end - begin) * k / n for k in range(1, n)] + [end]
             begin = end
         return out

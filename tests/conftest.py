@@ -8,6 +8,10 @@ import pytest
 from mpi4py import MPI
 
 
+def pytest_addoption(parser):
+    parser.addoption("--kills", type=int, default=12, help="how often test_kill.py kills runs (12)")
+
+
 def pytest_collection_finish():
     """Leave what the imports made out of the collections below: they take a tenth of a second otherwise."""
     gc.collect()

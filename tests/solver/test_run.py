@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from archord.solver.history import read_history
 from archord.solver.run import solve_scene
-from archord.solver.run_folder import FILES, claim_folder
+from archord.solver.run_folder import CHECKPOINT, FILES, claim_folder
 from archord.solver.scene import SceneError
 from archord.solver.scene_file import load_scene
 from tests.solver.solving import scene
@@ -25,7 +25,7 @@ def run(tmp_path_factory):
 
 def test_all_files_are_there_and_say_done(run):
     """The run folder of a finished run."""
-    assert sorted(p.name for p in run.folder.iterdir()) == sorted(FILES)
+    assert sorted(p.name for p in run.folder.iterdir()) == sorted((*FILES, CHECKPOINT))
     report = json.loads((run.folder / "run.json").read_text())
     assert report["status"] == "done"
     assert report["totals"]["accepted_steps"] == 4

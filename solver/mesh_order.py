@@ -1,0 +1,138 @@
+"""Fields and histories in the order of the mesh generator, whatever the number of ranks and their cut of the mesh.
+
+Rank 0 holds what is collected. The points of a body or a contact edge are numbered through: the cell's (facet's) number
+times points per cell, plus the point's. Neither the order of a cell's nodes, from which that of its points follows, nor
+that of a contact edge's points along the curve depends on the ranks.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import fields
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.geometry.basis import Array
+from archord.solver.joint import Joint
+from archord.solver.points import PlasticPoints
+
+Arrays = dict[str, np.ndarray]
+
+
+class Gather:
+    """Brings values of owned entities to rank 0, in the order of their input indices. Collective."""
+
+    def __init__(self, comm: MPI.Comm, index: np.ndarray) -> None:
+        self.comm = comm
+        parts = comm.gather(index)
+        if parts is not None:
+            self.unique, self._slot = np.unique(np.concatenate(parts), return_inverse=True)
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """The values of all ranks on rank 0, nothing elsewhere."""
+        parts = self.comm.gather(values)
+        if parts is None:
+            return np.zeros(0)
+        whole = np.concatenate(parts)
+        ordered = np.empty((len(self.unique), *whole.shape[1:]), dtype=whole.dtype)
+        ordered[self._slot] = whole
+        return ordered
+
+
+class MeshOrder:
+    """The generator's order of the joint's nodes and cells. Collective.
+
+    ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, 6)`` are the mesh in that order, on rank 0.
+    """
+
+    def __init__(self, joint: Joint) -> None:
+        self.joint = joint
+        mesh, V = joint.model.mesh, joint.V
+        self.n_cells = mesh.topology.index_map(2).size_local
+        self._n_local = joint.equilibrium.n_local
+        # displacement dof of every mesh node of this rank: both number the six nodes of a cell alike
+        self._dof = np.zeros(len(mesh.geometry.x), dtype=np.int64)
+        self._dof[mesh.geometry.dofmap.ravel()] = V.dofmap.list.ravel()
+        self._n_owned = mesh.geometry.index_map().size_local
+        self._index = np.asarray(mesh.geometry.input_global_indices)
+        self._cell_index = np.asarray(mesh.topology.original_cell_index)[: self.n_cells]
+        self._nodes = Gather(joint.comm, self._index[: self._n_owned])
+        self.cells = Gather(joint.comm, self._cell_index)
+        self.coordinates = self._nodes(mesh.geometry.x[: self._n_owned])
+        cells = self.cells(self._index[mesh.geometry.dofmap[: self.n_cells]])
+        root = joint.comm.rank == 0
+        self.nodes_of_cell = np.searchsorted(self._nodes.unique, cells) if root else cells
+
+    def mesh_digest(self) -> str:
+        """SHA-256 of coordinates and cells, on rank 0."""
+        return hashlib.sha256(self.coordinates.tobytes() + self.nodes_of_cell.astype("<i8").tobytes()).hexdigest()
+
+    def collect(self, u: Array) -> Array:
+        """Nodal values ``(n_local, k)`` of all ranks on rank 0, nothing elsewhere. Collective."""
+        return self._nodes(u[self._dof[: self._n_owned]])
+
+    def spread(self, whole: Array | None) -> Array:
+        """The inverse of `collect`: this rank's nodal values ``(n_local, k)``, ghosts included. Collective."""
+        comm = self.joint.comm
+        index, whole = comm.bcast((self._nodes.unique, whole) if comm.rank == 0 else None)
+        u = np.zeros((self._n_local, whole.shape[1]))
+        u[self._dof] = whole[np.searchsorted(index, self._index)]
+        return u
+
+    def collect_history(self) -> dict[str, Arrays]:
+        """History of the points that have one, on rank 0: by place, their number and every array of their state."""
+        mine = {}
+        for place, (points, number) in self._points().items():
+            used = _used(points.state)
+            mine[place] = {"point": number[used]} | {k: v[used] for k, v in _arrays(points.state).items()}
+        parts = self.joint.comm.gather(mine)
+        if parts is None:
+            return {}
+        whole = {}
+        for place in sorted({place for part in parts for place in part}):
+            found = [part[place] for part in parts if place in part]
+            arrays = {name: np.concatenate([f[name] for f in found]) for name in found[0]}
+            order = np.argsort(arrays["point"])
+            whole[place] = {name: values[order] for name, values in arrays.items()}
+        return whole
+
+    def spread_history(self, whole: dict[str, Arrays] | None) -> None:
+        """The inverse of `collect_history`: give every point its history. Collective."""
+        stored_at: dict[str, Arrays] = self.joint.comm.bcast(whole)
+        for place, (points, number) in self._points().items():
+            stored = stored_at[place]
+            virgin = type(points.state).virgin(len(number))
+            at = np.searchsorted(stored["point"], number)
+            at[at == len(stored["point"])] = 0
+            here = stored["point"][at] == number if len(stored["point"]) else np.zeros(len(number), dtype=bool)
+            for name, values in _arrays(virgin).items():
+                values[here] = stored[name][at[here]]
+            points.state = points.trial = virgin
+
+    def _points(self) -> dict[str, tuple[PlasticPoints, np.ndarray]]:
+        """All points with history of this rank and their numbers ``(n,)``, by place."""
+        found = {}
+        for tag, (cells, points) in self.joint.bulk.histories().items():
+            found[f"bulk {tag}"] = points, _through(self._cell_index[cells], points)
+        for name, side in self.joint.sides.items():
+            if isinstance(side.points, PlasticPoints):
+                found[f"contact {name}"] = side.points, _through(side.facet, side.points)
+        return found
+
+
+def _through(entity: np.ndarray, points: PlasticPoints) -> np.ndarray:
+    """Numbers ``(n q,)`` of the points of the ``n`` cells or facets numbered ``entity``."""
+    q = len(points.state.peeq) // max(len(entity), 1)
+    return (entity.astype(np.int64)[:, None] * q + np.arange(q)).ravel()
+
+
+def _arrays(state) -> Arrays:
+    return {f.name: getattr(state, f.name) for f in fields(state)}
+
+
+def _used(state) -> np.ndarray:
+    """Which points ``(n,)`` are not what they were at the beginning."""
+    virgin = _arrays(type(state).virgin(len(state.peeq)))
+    changed = [(v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in _arrays(state).items()]
+    return np.logical_or.reduce(changed)

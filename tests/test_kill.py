@@ -1,0 +1,84 @@
+"""kill -9 at random moments: whatever is on disk opens, no accepted step is lost, and the run ends as if never killed.
+
+``pytest tests/test_kill.py --kills 50`` kills more often.
+"""
+
+import os
+import random
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.solver.run_files import accepted_steps, same_run
+from tests.test_cli import ENVIRONMENT, SCENE
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
+OPTIONS = ["--set", "joint.relative_element_size=0.3", "--set", "load.steps=15"]
+
+
+class Run:
+    """An ``archord solve`` in a process of its own; ``printed`` is the last step that it reported."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        command = [sys.executable, "-m", "archord", "solve", *arguments]
+        self.process = subprocess.Popen(
+            command, cwd=folder, env=ENVIRONMENT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        assert self.process.stdout is not None
+        self.first = self.process.stdout.readline()
+        self.begun = time.monotonic()
+        self.printed = 0
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            if line.strip() and line.split()[0].isdigit() and "steps in" not in line:
+                self.printed = int(line.split()[0])
+
+    def end(self, after: float | None = None) -> int:
+        """Wait until it ends, or for ``after`` seconds and kill it; the exit code."""
+        try:
+            self.process.wait(after)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+        code = self.process.wait()
+        self._reader.join()
+        assert self.process.stderr is not None
+        if code not in (0, -9):
+            raise AssertionError(self.process.stderr.read())
+        return code
+
+
+def test_a_run_survives_any_number_of_kills(tmp_path, request):
+    """Killed at random and restarted until the kills are used up; finished runs are compared, and the next begins."""
+    kills, chance = request.config.getoption("--kills"), random.Random(1)
+    whole = Run(tmp_path, SCENE, *OPTIONS, "-o", "whole")
+    assert whole.end() == 0
+    seconds = time.monotonic() - whole.begun
+    assert accepted_steps(tmp_path / "whole") == whole.printed == 15
+    number = killed = finished = steps = 0
+    name, arguments = "run0", [SCENE, *OPTIONS, "-o", "run0"]
+    caught_at = []
+    while killed < kills or steps:
+        run = Run(tmp_path, *arguments)
+        code = run.end(chance.uniform(0, 0.7 * seconds) if killed < kills else None)
+        before, steps = steps, accepted_steps(tmp_path / name) if (tmp_path / name).exists() else 0
+        assert steps >= max(before, run.printed)
+        if code == 0:
+            assert steps == 15
+            same_run(tmp_path / "whole", tmp_path / name, 1e-12)
+            finished, number, steps = finished + 1, number + 1, 0
+            name = f"run{number}"
+            arguments = [SCENE, *OPTIONS, "-o", name]
+        else:
+            killed += 1
+            caught_at.append(steps)
+            arguments = [SCENE, *OPTIONS, "-o", name, "--restart"]
+    assert finished > 0
+    assert len(set(caught_at)) > min(kills, 10) / 2

@@ -1,0 +1,148 @@
+"""``archord solve --restart`` and ``--extend`` as a user runs them: exit codes, sentences, ranks; and a full disk."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+import tomllib
+
+import pytest
+
+from archord.solver.history import read_history
+from tests.solver.run_files import accepted_steps, same_run
+from tests.test_cli import ENVIRONMENT, SCENE, archord
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
+COARSE = ["--set", "joint.relative_element_size=0.2", "--set", "load.steps=12"]
+
+
+def killed(folder, after: int, ranks: int = 0) -> int:
+    """Start a run, kill all its ranks once ``after`` steps are there; the number of accepted steps."""
+    launcher = ["mpirun", "-n", str(ranks)] if ranks else []
+    command = [*launcher, sys.executable, "-m", "archord", "solve", SCENE, *COARSE, "-o", "run"]
+    history = folder / "run" / "history.csv"
+    with subprocess.Popen(
+        command, cwd=folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline and not (history.exists() and len(history.read_text().splitlines()) > after):
+            time.sleep(0.01)
+        process.kill()
+        process.wait()
+    _await_free(folder / "run")
+    return accepted_steps(folder / "run")
+
+
+def _await_free(folder) -> None:
+    """mpirun's ranks outlive it by a moment."""
+    from archord.solver.run_folder import occupied
+    from archord.solver.scene import SceneError
+
+    deadline = time.monotonic() + 30
+    while time.monotonic() < deadline:
+        try:
+            with occupied(folder):
+                return
+        except SceneError:
+            time.sleep(0.1)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The run that nobody disturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    result = archord("solve", SCENE, *COARSE, "-o", "run", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    return folder / "run"
+
+
+def test_a_killed_run_goes_on_and_says_where(tmp_path, whole):
+    """From the run folder, with the steps that are left; a second time there is nothing to do."""
+    steps = killed(tmp_path, 3)
+    assert 3 <= steps < 12
+    result = archord("solve", "run", "--restart", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    lines = result.stdout.splitlines()
+    assert lines[0] == f"continuing run after step {steps} of 12."
+    assert [line.split()[0] for line in lines[3:-1]] == [str(k) for k in range(steps + 1, 13)]
+    same_run(whole, tmp_path / "run", 1e-12)
+    again = archord("solve", SCENE, *COARSE, "-o", "run", "--restart", cwd=tmp_path)
+    assert (again.returncode, again.stdout) == (0, "the run in run is finished: nothing to do.\n")
+
+
+def test_two_ranks_are_continued_by_three(tmp_path, whole):
+    """Killed on two ranks, finished on three, compared with one."""
+    steps = killed(tmp_path, 2, ranks=2)
+    result = archord("solve", SCENE, *COARSE, "-o", "run", "--restart", cwd=tmp_path, ranks=3)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.count(f"continuing run after step {steps} of 12.") == 1
+    same_run(whole, tmp_path / "run", 1e-8, 3e-7)
+    report = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert [(r["after_step"], r["ranks"]) for r in report["restarts"]] == [(steps, 3)]
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["run", "--restart", "--set", "pin.nu=0.31"], "run: was solved with pin.nu = 0.3, the scene says 0.31;"),
+        (["run", "--restart", "-o", "other"], "-o other: does not go with a run folder, run."),
+        (["run", "--restart", "--extend"], "choose one of --force, --restart and --extend"),
+        (["run", "--extend", "--set", "load.displacement=1"], "run: ends at 0.1 already;"),
+        (["nothing", "--restart"], "nothing: cannot be read: No such file or directory."),
+        ([SCENE, "-o", "nothing", "--extend"], "nothing: is not a run folder: scene.toml is missing."),
+    ],
+)
+def test_what_cannot_be_continued_is_refused(tmp_path, whole, ranks, arguments, said):
+    """Exit code 2, one sentence, nothing changed."""
+    (tmp_path / "run").symlink_to(whole)
+    before = {path.name: path.stat().st_mtime_ns for path in whole.iterdir()}
+    result = archord("solve", *arguments, cwd=tmp_path, ranks=ranks)
+    assert result.returncode == 2
+    assert result.stderr.count(said) == 1
+    assert "Traceback" not in result.stderr
+    assert {path.name: path.stat().st_mtime_ns for path in whole.iterdir()} == before
+    assert os.listdir(tmp_path) == ["run"]
+
+
+def test_a_finished_run_is_extended(tmp_path):
+    """Two steps become four; the resolved scene is the whole path."""
+    short = ["--set", "joint.relative_element_size=0.25", "--set", "load.displacement=1", "--set", "load.steps=2"]
+    assert archord("solve", SCENE, *short, "-o", "run", "-q", cwd=tmp_path).returncode == 0
+    longer = ["--set", "load.displacement=2", "--set", "load.steps=4"]
+    result = archord("solve", "run", "--extend", *longer, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines()[0] == "extending run from step 2 to step 4."
+    load = tomllib.loads((tmp_path / "run" / "scene.toml").read_text())["load"]
+    assert (load["displacement"], load["steps"]) == ([1.0, 2.0], [2, 2])
+    assert read_history(tmp_path / "run" / "history.csv")["delta/dR"] == pytest.approx([0.5, 1.0, 1.5, 2.0])
+    assert archord("solve", "run/scene.toml", "-o", "again", "-q", cwd=tmp_path).returncode == 0
+    same_run(tmp_path / "again", tmp_path / "run", 1e-12)
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_a_full_disk_is_one_sentence_and_the_run_can_go_on(tmp_path, whole, ranks):
+    """Exit code 3 on all ranks when a file reaches the limit; with room again the run is finished by --restart."""
+    limit = (whole / "checkpoint.h5").stat().st_size - 2000  # history grows with the plastic zone
+    assert limit > max(path.stat().st_size for path in whole.iterdir() if path.suffix in (".toml", ".csv", ".json"))
+    whole_sizes = {path.name: path.stat().st_size for path in whole.iterdir()}
+    assert min(whole_sizes["fields.h5"], whole_sizes["contact.h5"]) > limit
+    launcher = ["mpirun", "-n", str(ranks)] if ranks else []
+    # Open MPI has large files of its own: the limit comes after its start
+    code = (
+        "import resource, sys; from mpi4py import MPI\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
+        "from archord.cli import run; sys.exit(run(sys.argv[1:]))"
+    )
+    command = [*launcher, sys.executable, "-c", code, "solve", SCENE, *COARSE, "-o", "run"]
+    result = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    assert result.returncode == 3
+    assert result.stderr.count("archord: run/fields.h5 cannot be written: File too large.") == 1
+    assert "Traceback" not in result.stderr
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "stopped"
+    assert accepted_steps(tmp_path / "run") == 0
+    again = archord("solve", "run", "--restart", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert again.stdout.splitlines()[0] == "run holds no accepted step: starting from the beginning."
+    same_run(whole, tmp_path / "run", 1e-12)
