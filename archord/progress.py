@@ -18,7 +18,14 @@ if TYPE_CHECKING:
 
 
 def solve_with_progress(
-    load: Callable[[], Scene], folder: Path, *, force: bool, quiet: bool, begun: float, start: Start | None = None
+    load: Callable[[], Scene],
+    folder: Path,
+    *,
+    force: bool,
+    debug: bool,
+    quiet: bool,
+    begun: float,
+    start: Start | None = None,
 ) -> int:
     """Solve the scene that ``load`` gives rank 0 into ``folder`` on all ranks of MPI_COMM_WORLD and report; returns the
     exit code. ``start`` continues the run in ``folder``."""
@@ -46,6 +53,7 @@ def solve_with_progress(
             folder,
             comm,
             start=start,
+            debug=debug,
             timer=timer,
             begun=begun,
             on_start=report.start,

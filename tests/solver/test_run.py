@@ -123,6 +123,23 @@ def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
         assert file["accepted"][()] == 4
 
 
+def test_a_failing_step_tells_where_and_why(tmp_path):
+    """Every attempt's residuals, flips and plastic increment in run.json; debug.xdmf holds the state they speak of."""
+    problem = scene(0.1, 4, yield_stress=0.002, analysis={"max_iterations": 3}, stepping={"minimum": 0.5})
+    assert solve_scene(problem, tmp_path, MPI.COMM_SELF, debug=True).status == "stopped"
+    failed = json.loads((tmp_path / "run.json").read_text())["failed_step"]
+    assert failed["cutbacks"] == len([a for a in failed["attempts"] if not a["converged"]]) == 2
+    last = failed["attempts"][-1]
+    assert len(last["flips"]) == len(last["residuals"]) > 3
+    assert last["flips"][0] > 0
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "debug.xdmf") as reader:
+        points, _ = reader.read_points_cells()
+        _, nodal, cells = reader.read_data(0)
+    worst = np.linalg.norm(nodal["residual"], axis=1).argmax()
+    assert points[worst, :2] == pytest.approx(last["worst"], abs=1e-12)
+    assert 0 < cells["peeq_increment"][0].max() <= last["plastic_increment"]
+
+
 def test_a_contact_that_no_point_sees_is_no_success(tmp_path):
     """A load far below what the mesh resolves leaves no contact point pressed: stopped, not a joint without force."""
     outcome = solve_scene(scene(0.08, steps=1, load={"displacement": 1e-8}), tmp_path, MPI.COMM_SELF)
