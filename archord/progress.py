@@ -135,7 +135,7 @@ class _Progress:
             self._bar.update(self._task, advance=1, description=text)
             return
         print(
-            f"{m.step:5d}  {m.delta / dR:9.5g}  {m.P / (E * R):11.7f}  {m.eps * 57.29577951:8.3f}  {m.p0 / E:9.6f}  "
+            f"{m.step:5d}  {m.delta / dR:9.5g}  {round(m.P / (E * R), 7) + 0.0:11.7f}  {m.eps * 57.29577951:8.3f}  {m.p0 / E:9.6f}  "
             f"{m.peeq_max:9.2e}  {m.iterations:10d}  {m.cutbacks:8d}",
             flush=True,
         )

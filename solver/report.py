@@ -190,7 +190,7 @@ def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residu
     if joint.scene.joint.model == "block" and any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc")
     touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
-    if m.P and touching < _FEW_FACETS:
+    if 0 < touching < _FEW_FACETS:
         said.append(
             f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
         )
