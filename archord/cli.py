@@ -16,6 +16,7 @@ import click
 import typer
 
 from archord import law_commands
+from archord.benchmark_commands import benchmark
 from archord.deck_commands import export_deck
 from archord.fit_commands import fit
 from archord.reproduce_commands import reproduce
@@ -141,6 +142,7 @@ def picture(
 app.command()(fit)
 app.command()(reproduce)
 app.command("export-deck")(export_deck)
+app.add_typer(benchmark, name="benchmark")
 
 
 @app.command("scene")
