@@ -24,14 +24,15 @@ _TINY_LOAD = 0.02  # delta/dR up to which the contact is tiny
 
 
 def fine_scene(scene: Scene) -> Scene:
-    """The joint of ``scene`` with equal elements of 2.5 %R (0.25 %R for tiny contacts), the default gamma factor and,
-    if it can yield, at least 20 and at least twice as many steps."""
+    """The joint of ``scene`` with equal elements of 2.5 %R (0.25 %R for tiny contacts) or half as large, the default
+    gamma factor and, if it can yield, at least 20 and at least twice as many steps."""
     load, joint = scene.load, scene.joint
     data = scene.model_dump(exclude_none=True)
     tiny = not scene.force_controlled and 0 < max(scene.targets) <= _TINY_LOAD * joint.dR
     for key in ("element_size", "size_ratio"):
         data["joint"].pop(key, None)
-    data["joint"] |= {"relative_element_size": _TINY if tiny else _SIZE} | ({"growth": 1.0} if tiny else {})
+    size = _TINY if tiny else min(_SIZE, joint.h / joint.radius / 2) if joint.size_ratio == 1 else _SIZE
+    data["joint"] |= {"relative_element_size": size} | ({"growth": 1.0} if tiny else {})
     data["analysis"].pop("gamma_factor")
     if scene.plastic:
         data["load"]["steps"] = [max(20, 2 * n) for n in load.leg_steps]

@@ -156,7 +156,7 @@ def not_finite(folder: Path) -> list[str]:
 
     def visit(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and not np.all(np.isfinite(item[()])):
-            found.append(f"{file.name}: {name}")
+            found.append(f"{Path(data.filename).name}: {name}")
 
     for file in (folder / "fields.h5", folder / "contact.h5"):
         if file.exists():

@@ -52,7 +52,8 @@ class Report:
     def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
         """Note an accepted output step."""
         self.measures.append(m)
-        self._residual = max(self._residual, step.residual)
+        if m.contact_area:
+            self._residual = max(self._residual, step.residual)
         self.content["warnings"] += _warnings(self.joint, profiles, m, step.residual)
         self.content["steps"].append(
             asdict(m) | {"substeps": step.substeps, "residuals": [a.residuals for a in step.attempts]}
@@ -147,13 +148,13 @@ def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residu
     if joint.scene.joint.model == "block" and any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc")
     touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
-    if m.P and touching < _FEW_FACETS:
+    if m.contact_area and touching < _FEW_FACETS:
         said.append(
             f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
         )
     if abs(m.delta) > 0.1 * joint.scene.joint.radius:
         said.append("delta exceeds 0.1 R, too much for small-strain theory")
-    if residual > 1e-8:
+    if residual > 1e-8 and m.contact_area:
         said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
     if m.force_balance > 1e-8:
         said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")

@@ -128,7 +128,7 @@ class _Output:
 
     def unseen(self) -> bool:
         """Whether the pin was pressed into the hole but no contact point ever noticed."""
-        return max(m.delta for m in self.steps) > 0 and not any(m.P for m in self.steps)
+        return max(m.delta for m in self.steps) > 0 and not any(m.contact_area for m in self.steps)
 
     def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
         """Note how the run ended; returns the warnings on rank 0."""
