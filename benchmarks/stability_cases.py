@@ -51,7 +51,7 @@ class Case:
     stops: str = ""
     warns: str = ""
     budget: int = 400
-    seconds: float = 60.0
+    seconds: float = 120.0
 
 
 def same_as(case: str, tolerance: float, why: str, factor: float = 1.0, quantity: str = "P/(E* R)") -> Expected:
@@ -120,7 +120,10 @@ def _bodies() -> Iterable[Case]:
     for nu in (-0.9, 0.0, 0.45, 0.499, 0.4999):
         yield _case(f"nu = {nu:g}", group, **poisson(nu))
     yield _case("nu = 0.4999, plane stress", group, **both(E=2.0, nu=0.4999), analysis={"plane": "stress"})
-    yield _case("nu = 0.4999, plastic", group, **poisson(0.4999, yield_stress=0.002), steps=10)
+    yield _case("nu = 0.499, plastic", group, fine(0.01), **poisson(0.499, yield_stress=0.002), steps=10, budget=1000)
+    yield _case("nu = 0.4999, plastic", group, same_as("nu = 0.499, plastic", 0.01, "nu = 0.499"),
+                **poisson(0.4999, yield_stress=0.002), steps=10, budget=1000)  # fmt: skip
+    yield _case("nu = 0.4999, rigid pin", group, pin=RIGID, block={"E": 1.0, "nu": 0.4999})
 
 
 def _geometry() -> Iterable[Case]:
@@ -189,31 +192,36 @@ def _loads() -> Iterable[Case]:
 def _strength() -> Iterable[Case]:
     group = "yield stress"
     for strength in (1e-5, 1e-4, 1e-3, 1e-2):
-        budget = 2000 if strength < 1e-4 else 600
-        yield _case(f"sigY/E* = {_short(strength)}", group, fine(0.01), steps=8, yield_stress=strength,
-                    budget=budget)  # fmt: skip
+        for hardening, name in ((0.0, ""), (1e-4 * E, ", H = 1e-4 E"), (E, ", H = E")):
+            title = f"sigY/E* = {_short(strength)}"
+            expected = fine(0.01)
+            if strength < 1e-4 and hardening < E:
+                # the fine mesh takes too long here; sigY is ten times what such hardening adds
+                expected = same_as(title + ("" if hardening else ", H = 1e-4 E"), 0.03, "little hardening or none")
+            if (strength, hardening) == (1e-2, 1e-4 * E):
+                continue
+            bodies = both(E=E, nu=0.3, yield_stress=strength, hardening=hardening)
+            yield _case(title + name, group, expected, steps=8, budget=2000 if strength < 1e-4 else 600, **bodies)
     elastic = same_as("E_pin/E_block = 1", 1e-9, "never yields")
     yield _case("sigY/E* = 0.1", group, elastic, yield_stress=0.1)
-    for strength in (1e-5, 1e-3):
-        for hardening, name in ((1e-4 * E, "1e-4 E"), (E, "E")):
-            bodies = both(E=E, nu=0.3, yield_stress=strength, hardening=hardening)
-            title = f"sigY/E* = {_short(strength)}, H = {name}"
-            yield _case(title, group, fine(0.01), steps=8, budget=2000 if strength < 1e-4 else 600, **bodies)
     plane: dict[str, Any] = {"analysis": {"plane": "stress"}}
-    yield _case("sigY/E* = 0.002, plane stress", group, fine(0.01), steps=8, **plane,
-                **both(E=2.0, nu=0.3, yield_stress=0.002))  # fmt: skip
-    yield _case("sigY/E* = 1e-5, plane stress", group, fine(0.01), steps=8, budget=2000, **plane,
-                **both(E=2.0, nu=0.3, yield_stress=1e-5))  # fmt: skip
+    for strength in (2e-3, 1e-4, 1e-5):
+        expected = fine(0.01)
+        if strength < 1e-4:
+            expected = same_as("sigY/E* = 1e-4, plane stress", 0.1, "fully plastic: P goes with sigY", 0.1)
+        bodies = both(E=2.0, nu=0.3, yield_stress=strength)
+        title = f"sigY/E* = {_short(strength)}, plane stress"
+        yield _case(title, group, expected, steps=8, budget=2000, **plane, **bodies)
     group = "limit load"
     soft = {"E": E, "nu": 0.3, "yield_stress": 0.001}
     push = {"displacement": 6.0, "steps": 12}
     yield _case("fully plastic pin", group, fine(0.02), pin=soft, load=push, budget=1000)
     yield _case("fully plastic pin, plane stress", group, fine(0.02), pin=soft, load=push, budget=1000, **plane)
-    held = same_as("fully plastic pin, far", 0.02, "plateau of displacement control")
     yield _case("fully plastic pin, far", group, fine(0.02), pin=soft, load={"displacement": 20.0, "steps": 20},
                 budget=1500)  # fmt: skip
+    held = same_as("fully plastic pin, plane stress", 0.1, "plateau at 6 dR, which goes on rising")
     yield _case("force beyond the pin's limit load", group, held, stops="last load that held", pin=soft,
-                load=_by_force(0.01, 8), stepping={"minimum": 0.01}, budget=1500)  # fmt: skip
+                load=_by_force(0.004, 8), stepping={"minimum": 0.02}, budget=1500, **plane)  # fmt: skip
     yield _case("force beyond the joint's limit load", group, stops="last load that held", yield_stress=0.002,
                 load=_by_force(0.04, 4), stepping={"minimum": 0.01}, budget=1500, element_size=0.2)  # fmt: skip
 
@@ -265,7 +273,8 @@ def _pairs() -> Iterable[Case]:
                 same_as("E_pin/E_block = 1e-6", 0.02, "P/dR of concentric circles", scaled), joint=thin,
                 **moduli(1e-6))  # fmt: skip
     yield _case("dR/R = 1e-6, one step", group, same_as("dR/R = 1e-6", 1e-6, "elastic: any path"), joint=thin, load=one)
-    yield _case("dR/R = 1e-6, nu = 0.4999", group, joint=thin, **poisson(0.4999))
+    yield _case("dR/R = 1e-6, nu = 0.4999", group, same_as("nu = 0.4999", 0.02, "P goes with dR", scaled),
+                joint=thin, **poisson(0.4999))  # fmt: skip
     yield _case("dR/R = 1e-6, gamma factor 1e4", group, same_as("dR/R = 1e-6", 0.002, "gamma factor 0.5"), joint=thin,
                 analysis={"gamma_factor": 1e4})  # fmt: skip
     yield _case("dR/R = 1e-6, sigY/E* = 4e-7", group, same_as("plastic, E* = R = 1", 0.01, "P/dR, sigY/dR", scaled),
@@ -281,9 +290,14 @@ def _pairs() -> Iterable[Case]:
                 load={"displacement": 0.2})  # fmt: skip
     yield _case("nu = 0.4999, gamma factor 1e4", group, same_as("nu = 0.4999", 0.002, "gamma factor 0.5"),
                 analysis={"gamma_factor": 1e4}, **poisson(0.4999))  # fmt: skip
-    yield _case("nu = 0.4999, E_pin/E_block = 1e6", group, **moduli(1e6, 0.4999))
-    yield _case("nu = 0.4999, plastic, one step", group, fine(0.02), load=one, **poisson(0.4999, yield_stress=0.002))
-    yield _case("nu = 0.4999, E_pin/E_block = 1e-6, one step", group, load=one, **moduli(1e-6, 0.4999))
+    yield _case("nu = 0.4999, E_pin/E_block = 1e6", group, same_as("nu = 0.4999, rigid pin", 0.005, "a rigid pin"),
+                **moduli(1e6, 0.4999))  # fmt: skip
+    yield _case("nu = 0.4999, plastic, one step", group, same_as("nu = 0.499, plastic", 0.02, "nu = 0.499"),
+                load=one, **poisson(0.4999, yield_stress=0.002))  # fmt: skip
+    yield _case("nu = 0.499, E_pin/E_block = 1e-6", group, **moduli(1e-6, 0.499))
+    yield _case("nu = 0.4999, E_pin/E_block = 1e-6, one step", group,
+                same_as("nu = 0.499, E_pin/E_block = 1e-6", 0.005, "nu = 0.499"), load=one,
+                **moduli(1e-6, 0.4999))  # fmt: skip
     yield _case("gamma factor 1e4, plastic, one step", group, fine(0.02), load=one, analysis={"gamma_factor": 1e4},
                 yield_stress=0.002)  # fmt: skip
     yield _case("gamma factor 1e4, rigid pin", group, same_as("rigid pin", 0.002, "gamma factor 0.5"), pin=RIGID,

@@ -1,7 +1,8 @@
 """Fine-mesh values for the stability benchmark: ``python3 -m archord.benchmarks.stability_fine [PATTERN]``.
 
-Solves the joints of the cases (all, or those whose name or group contains PATTERN) again on fine meshes and writes
-``stability_fine.json``: by case the quantities of the last step, the element size over R and the number of steps.
+Solves the joints of the cases (those that are missing, or those whose name or group contains PATTERN) again on fine
+meshes and writes ``stability_fine.json``: by case the quantities of the last step, the element size over R and the
+number of steps.
 """
 
 from __future__ import annotations
@@ -57,9 +58,11 @@ def _solve(case: Case) -> dict[str, float]:
 def main(pattern: str = "") -> None:
     """Solve what is asked for and write after each."""
     known = cases()
-    wanted = [
-        c for c in known.values() if any(e.value == FINE for e in c.expected) and pattern in f"{c.group}: {c.name}"
-    ]
+    compared = [c for c in known.values() if any(e.value == FINE for e in c.expected)]
+    if pattern:
+        wanted = [c for c in compared if pattern in f"{c.group}: {c.name}"]
+    else:
+        wanted = [c for c in compared if c.name not in read_fine()]
     for case in wanted:
         begun = perf_counter()
         try:

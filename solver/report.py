@@ -23,6 +23,7 @@ from archord.solver.stepping import Step
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact")
 _ARC_FULL = 0.99  # share of the arc's end facet in contact from which the modelled arc is too short
 _FEW_FACETS = 5
+_ROUGH = 0.01  # of the clearance
 
 
 class Report:
@@ -45,7 +46,7 @@ class Report:
                 "newton": joint.equilibrium.tolerance,
                 "gamma_factor": joint.scene.analysis.gamma_factor,
             },
-            "warnings": [],
+            "warnings": _rough_arcs(joint),
             "steps": [],
         }
 
@@ -141,6 +142,22 @@ def _model(joint: Joint) -> dict[str, Any]:
         "pin": "rigid" if scene.pin.rigid else "deformable",
         "contact_shares": [pair.share for pair in joint.contact.pairings],
     }
+
+
+def _rough_arcs(joint: Joint) -> list[str]:
+    """A warning if the parabolic facets depart too much from their circles for the clearance.
+
+    A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``. Equal facets that
+    face each other are off alike, which leaves the gap as it is.
+    """
+    geometry = joint.scene.joint
+    if not joint.scene.pin.rigid and geometry.size_ratio == 1:
+        return []
+    lengths = [np.diff(side.curve.arc_length(np.array([0.0, 1.0]))).max() for side in joint.sides.values()]
+    off = (1 - np.cos(max(lengths) / geometry.radius / 2)) ** 2 / 8 * geometry.radius / abs(geometry.dR)
+    if off <= _ROUGH:
+        return []
+    return [f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"]
 
 
 def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
