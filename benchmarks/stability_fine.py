@@ -49,6 +49,8 @@ def _solve(case: Case) -> dict[str, float]:
     scene = fine_scene(case.scene)
     with tempfile.TemporaryDirectory() as folder:
         outcome = solve_scene(scene, Path(folder))
+    if outcome.status == "interrupted":
+        raise KeyboardInterrupt
     if outcome.status != "done":
         raise RuntimeError(f"{case.name}: {outcome.message}")
     mesh = {"element_size/R": scene.joint.h / scene.joint.radius, "steps": len(outcome.steps)}

@@ -51,10 +51,6 @@ class Result:
     not_finite: list[str] = field(default_factory=list)
 
 
-class _OutOfTime(Exception):
-    pass
-
-
 def solve_case(case: Case, folder: Path) -> Result:
     """Solve ``case`` into its run folder below ``folder`` on this rank; errors become part of the result.
 
@@ -74,7 +70,7 @@ def solve_case(case: Case, folder: Path) -> Result:
             raise StepFailure(f"more than the {case.budget} Newton iterations allowed", Step(load))
 
     def out_of_time(number, frame) -> None:
-        raise _OutOfTime(f"more than the {case.seconds:g} s allowed")
+        raise TimeoutError
 
     before = signal.signal(signal.SIGALRM, out_of_time)
     signal.setitimer(signal.ITIMER_REAL, case.seconds)
@@ -83,7 +79,9 @@ def solve_case(case: Case, folder: Path) -> Result:
         outcome = solve_scene(case.scene, run, MPI.COMM_SELF, on_start=started, on_attempt=attempted)
         status, message = outcome.status, outcome.message
     except Exception as error:
-        status, message = "failed", f"{type(error).__name__}: {error}".removeprefix("_OutOfTime: ")
+        status, message = "failed", f"{type(error).__name__}: {error}"
+        if perf_counter() - begun >= case.seconds:
+            message = f"more than the {case.seconds:g} s allowed"
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
@@ -136,7 +134,7 @@ def _energy_limit(scene: Scene, steps: list[Measures]) -> float:
     if scene.joint.dR < 0:
         return math.inf
     P, delta = np.array([0.0] + [m.P for m in steps]), np.array([0.0] + [m.delta for m in steps])
-    largest = max(abs(m.work) for m in steps)
+    largest = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
     return float(np.abs(np.diff(P) * np.diff(delta)).sum() / 2 / largest) if largest else 0.0
 
 

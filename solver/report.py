@@ -21,7 +21,6 @@ from archord.solver.measures import Measures
 from archord.solver.stepping import Step
 
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact")
-_ARC_FULL = 0.99  # share of the arc's end facet in contact from which the modelled arc is too short
 _FEW_FACETS = 5
 _ROUGH = 0.01  # of the clearance
 
@@ -96,7 +95,7 @@ class Report:
         if not self.measures:
             return {}
         m = self.measures[-1]
-        work = max(abs(m.work) for m in self.measures)
+        work = max((abs(m.work) for m in self.measures if m.contact_area), default=0.0)
         return {
             "force_balance": max(m.force_balance for m in self.measures),
             "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / work if work else 0.0,
@@ -162,8 +161,8 @@ def _rough_arcs(joint: Joint) -> list[str]:
 
 def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
     said = []
-    if joint.scene.joint.model == "block" and any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
-        said.append("the contact reaches the end of the modelled quarter arc")
+    if joint.scene.joint.model == "block" and any(p.in_contact[-1] > 0 for p in profiles.values()):
+        said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
     touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
     if m.contact_area and touching < _FEW_FACETS:
         said.append(
