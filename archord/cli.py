@@ -17,6 +17,7 @@ import click
 import typer
 
 from archord import law_commands
+from archord.benchmark_commands import benchmark
 from archord.deck_commands import export_deck
 from archord.fit_commands import fit
 from archord.ranks import launcher_rank, run_on_ranks
@@ -154,6 +155,7 @@ def picture(
 app.command()(fit)
 app.command()(reproduce)
 app.command("export-deck")(export_deck)
+app.add_typer(benchmark, name="benchmark")
 
 
 @app.command("scene")

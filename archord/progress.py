@@ -134,8 +134,9 @@ class _Progress:
             text = f"delta/dR {m.delta / dR:.4g}, P/(E* R) {m.P / (E * R):.6g}, {m.iterations} iterations"
             self._bar.update(self._task, advance=1, description=text)
             return
+        P = round(m.P / (E * R), 7) + 0.0  # no minus before a zero
         print(
-            f"{m.step:5d}  {m.delta / dR:9.5g}  {round(m.P / (E * R), 7) + 0.0:11.7f}  {m.eps * 57.29577951:8.3f}  {m.p0 / E:9.6f}  "
+            f"{m.step:5d}  {m.delta / dR:9.5g}  {P:11.7f}  {m.eps * 57.29577951:8.3f}  {m.p0 / E:9.6f}  "
             f"{m.peeq_max:9.2e}  {m.iterations:10d}  {m.cutbacks:8d}",
             flush=True,
         )
