@@ -17,6 +17,7 @@ import click
 import typer
 
 from archord import law_commands
+from archord.benchmark_commands import benchmark
 from archord.deck_commands import export_deck
 from archord.fit_commands import fit
 from archord.ranks import launcher_rank, run_on_ranks
@@ -113,6 +114,9 @@ def solve(
     force: Annotated[bool, typer.Option("--force", help="overwrite the results in the run folder")] = False,
     restart: Annotated[bool, typer.Option("--restart", help="continue the interrupted run in the run folder")] = False,
     extend: Annotated[bool, typer.Option("--extend", help="continue the finished run to the scene's load")] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="write the fields of a step that cannot be solved to debug.xdmf")
+    ] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but errors")] = False,
 ) -> int:
     """Solve a scene into a run folder. Under mpirun, all ranks work on it.
@@ -124,13 +128,15 @@ def solve(
     if restart or extend:
         from archord.continuing import continue_with_progress
 
-        return continue_with_progress(scene, overrides or [], output, extend=extend, quiet=quiet, begun=_begun)
+        return continue_with_progress(
+            scene, overrides or [], output, extend=extend, debug=debug, quiet=quiet, begun=_begun
+        )
     from archord.progress import solve_with_progress
     from archord.solver.scene_file import load_scene
 
     folder = output or Path("runs") / scene.stem
     return solve_with_progress(
-        lambda: load_scene(scene, overrides or []), folder, force=force, quiet=quiet, begun=_begun
+        lambda: load_scene(scene, overrides or []), folder, force=force, debug=debug, quiet=quiet, begun=_begun
     )
 
 
@@ -149,6 +155,7 @@ def picture(
 app.command()(fit)
 app.command()(reproduce)
 app.command("export-deck")(export_deck)
+app.add_typer(benchmark, name="benchmark")
 
 
 @app.command("scene")

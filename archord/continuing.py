@@ -9,7 +9,7 @@ from archord.solver.scene_file import load_scene
 
 
 def continue_with_progress(
-    source: Path, overrides: list[str], output: Path | None, *, extend: bool, quiet: bool, begun: float
+    source: Path, overrides: list[str], output: Path | None, *, extend: bool, debug: bool, quiet: bool, begun: float
 ) -> int:
     """Continue the run of ``source``, a scene file or the run folder itself; returns the exit code. Collective.
 
@@ -35,4 +35,6 @@ def continue_with_progress(
         print(f"{planned.said}.", flush=True)
     if planned.finished:
         return 0
-    return solve_with_progress(lambda: planned.scene, folder, force=True, quiet=quiet, begun=begun, start=planned.start)
+    return solve_with_progress(
+        lambda: planned.scene, folder, force=True, debug=debug, quiet=quiet, begun=begun, start=planned.start
+    )

@@ -41,7 +41,7 @@ def fit(
     from archord.solver.output_file import check_output, writing
     from archord.solver.scene import SceneError
 
-    runs = [read_run(folder) for folder in folders]
+    runs = [read_run(folder).loading() for folder in folders]
     calibration = calibrate(runs, load_range or (0.0, math.inf), confidence, hold_k)
     law = calibration.law()
     # checked and written before anything is printed: a file that cannot be written is one sentence alone

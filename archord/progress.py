@@ -18,7 +18,14 @@ if TYPE_CHECKING:
 
 
 def solve_with_progress(
-    load: Callable[[], Scene], folder: Path, *, force: bool, quiet: bool, begun: float, start: Start | None = None
+    load: Callable[[], Scene],
+    folder: Path,
+    *,
+    force: bool,
+    debug: bool,
+    quiet: bool,
+    begun: float,
+    start: Start | None = None,
 ) -> int:
     """Solve the scene that ``load`` gives rank 0 into ``folder`` on all ranks of MPI_COMM_WORLD and report; returns the
     exit code. ``start`` continues the run in ``folder``."""
@@ -46,6 +53,7 @@ def solve_with_progress(
             folder,
             comm,
             start=start,
+            debug=debug,
             timer=timer,
             begun=begun,
             on_start=report.start,
@@ -126,8 +134,9 @@ class _Progress:
             text = f"delta/dR {m.delta / dR:.4g}, P/(E* R) {m.P / (E * R):.6g}, {m.iterations} iterations"
             self._bar.update(self._task, advance=1, description=text)
             return
+        P = round(m.P / (E * R), 7) + 0.0  # no minus before a zero
         print(
-            f"{m.step:5d}  {m.delta / dR:9.5g}  {m.P / (E * R):11.7f}  {m.eps * 57.29577951:8.3f}  {m.p0 / E:9.6f}  "
+            f"{m.step:5d}  {m.delta / dR:9.5g}  {P:11.7f}  {m.eps * 57.29577951:8.3f}  {m.p0 / E:9.6f}  "
             f"{m.peeq_max:9.2e}  {m.iterations:10d}  {m.cutbacks:8d}",
             flush=True,
         )

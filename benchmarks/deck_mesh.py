@@ -60,7 +60,7 @@ def deck_mesh(scene: Scene, elements: Elements) -> PlaneMesh:
     """The mesh that archord solves ``scene`` on, with a pin even if it is rigid, on this rank alone."""
     joint = scene.joint
     sizes = (joint.radius, joint.dR, joint.W, joint.h, joint.growth)
-    mesh = quadratic_triangles(quarter_joint(MPI.COMM_SELF, *sizes))
+    mesh = quadratic_triangles(quarter_joint(MPI.COMM_SELF, *sizes, size_ratio=joint.size_ratio))
     return mesh if elements == "quadratic" else linear_triangles(mesh)
 
 

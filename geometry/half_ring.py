@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.fenicsx import gmsh_to_mesh
-from archord.geometry.joint_mesh import Cells, Facets, JointMesh, on_circle, tag_and_size
+from archord.geometry.joint_mesh import Cells, Facets, JointMesh, edges_on, on_circle, tag_and_size
 
 
 def half_ring(
@@ -24,15 +24,16 @@ def half_ring(
     growth: float,
     core_radius: float,
     *,
+    size_ratio: float = 1.0,
     partitioner=None,
 ) -> JointMesh:
-    """Mesh the half joint with second-order curved triangles, ``element_size`` long on both arcs.
+    """Mesh the half joint with second-order curved triangles, ``element_size`` long on the hole's arc and
+    ``size_ratio`` times that on the pin's.
 
     Away from the arcs they grow by ``growth`` per unit of distance, to a third of ``core_radius`` at the pin's centre.
     Lengths share one unit. Collective over ``comm``; rank 0 meshes.
     """
     hole, outer, size, core = (1 + clearance / radius, *(v / radius for v in (outer_radius, element_size, core_radius)))
-    n_edges = max(2, math.ceil(math.pi / 2 / size))
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
@@ -55,11 +56,14 @@ def half_ring(
         faces[Cells.BLOCK] = geo.addPlaneSurface([geo.addCurveLoop(loop)])
         curves[Facets.PIN_ARC], curves[Facets.HOLE_ARC] = pin_arcs, hole_arcs
         curves[Facets.BLOCK_HELD], curves[Facets.SYMMETRY] = edge, [*axis, below, above]
-        for arc in (*pin_arcs, *hole_arcs):
-            geo.mesh.setTransfiniteCurve(arc, n_edges + 1)
-        from_arcs = f"{size!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
+        from_arcs = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
         from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
-        tag_and_size(gmsh, faces, curves, f"Min({from_arcs}, {from_core})")
+        sizes = {}
+        for body, arcs, on_arc in ((Cells.PIN, pin_arcs, size_ratio * size), (Cells.BLOCK, hole_arcs, size)):
+            for arc in arcs:
+                geo.mesh.setTransfiniteCurve(arc, edges_on(math.pi / 2, on_arc) + 1)
+            sizes[body] = f"Min({on_arc!r} + {from_arcs}, {from_core})"
+        tag_and_size(gmsh, faces, curves, sizes)
 
     def exact(x: np.ndarray, tag: int) -> np.ndarray:
         radii = {Facets.PIN_ARC: 1.0, Facets.HOLE_ARC: hole, Facets.BLOCK_HELD: outer}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -37,17 +38,32 @@ class JointMesh:
     facets: MeshTags
 
 
-def tag_and_size(gmsh, faces: dict[Cells, int], curves: dict[Facets, list[int]], size: str) -> None:
-    """Make the physical groups of ``faces`` and ``curves``, and ``size`` (an expression in x, y) the element size."""
+def tag_and_size(gmsh, faces: dict[Cells, int], curves: dict[Facets, list[int]], sizes: dict[Cells, str]) -> None:
+    """Make the physical groups of ``faces`` and ``curves``, and ``sizes`` (expressions in x, y) the element sizes of
+    the bodies."""
     gmsh.model.geo.synchronize()
     for tag, face in faces.items():
         gmsh.model.addPhysicalGroup(2, [face], tag)
     for edge, lines in curves.items():
         if lines:
             gmsh.model.addPhysicalGroup(1, lines, edge)
-    field = gmsh.model.mesh.field.add("MathEval")
-    gmsh.model.mesh.field.setString(field, "F", size)
-    gmsh.model.mesh.field.setAsBackgroundMesh(field)
+    field, parts = gmsh.model.mesh.field, []
+    for size in dict.fromkeys(sizes[tag] for tag in faces):
+        parts.append(field.add("MathEval"))
+        field.setString(parts[-1], "F", size)
+    if len(parts) > 1:
+        for i, tag in enumerate(faces):
+            whole, parts[i] = parts[i], field.add("Restrict")
+            field.setNumber(parts[i], "InField", whole)
+            field.setNumbers(parts[i], "SurfacesList", [faces[tag]])
+        parts.append(field.add("Min"))
+        field.setNumbers(parts[-1], "FieldsList", parts[:-1])
+    field.setAsBackgroundMesh(parts[-1])
+
+
+def edges_on(angle: float, size: float) -> int:
+    """Number of edges, at least two, of an arc of unit radius over ``angle`` [rad], none longer than ``size``."""
+    return max(2, math.ceil(angle / size))
 
 
 def on_circle(x: Array, centre: tuple[float, float], radius: float) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.fenicsx import gmsh_to_mesh
-from archord.geometry.joint_mesh import Cells, Facets, JointMesh, on_circle, tag_and_size
+from archord.geometry.joint_mesh import Cells, Facets, JointMesh, edges_on, on_circle, tag_and_size
 
 
 def quarter_joint(
@@ -24,20 +24,21 @@ def quarter_joint(
     element_size: float,
     growth: float,
     *,
+    size_ratio: float = 1.0,
     rigid_pin: bool = False,
     partitioner=None,
 ) -> JointMesh:
     """Mesh the quarter joint with second-order curved triangles.
 
-    ``element_size`` is the edge length on both arcs; away from them it grows by ``growth`` per unit of distance.
-    Lengths share one unit. A rigid pin is not meshed. ``partitioner`` is a dolfinx cell partitioner (tests use it to
-    cut the mesh in unusual ways). Collective over ``comm``; rank 0 meshes.
+    ``element_size`` is the edge length on the hole's arc, ``size_ratio`` times that the one on the pin's; away from
+    them it grows by ``growth`` per unit of distance. Lengths share one unit. A rigid pin is not meshed.
+    ``partitioner`` is a dolfinx cell partitioner (tests use it to cut the mesh in unusual ways). Collective over
+    ``comm``; rank 0 meshes.
     """
     hole, width, size = 1.0 + clearance / radius, block_size / radius, element_size / radius
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
-        n_edges = max(2, math.ceil(math.pi / 2 / size))
         far = (-hole, 0.0, hole)
         faces: dict[Cells, int] = {}
         curves: dict[Facets, list[int]] = {facet: [] for facet in Facets}
@@ -48,7 +49,7 @@ def quarter_joint(
             faces[Cells.PIN] = geo.addPlaneSurface([geo.addCurveLoop([arc, top, axis])])
             curves[Facets.PIN_ARC], curves[Facets.PIN_TOP] = [arc], [top]
             curves[Facets.SYMMETRY] += [axis]
-            geo.mesh.setTransfiniteCurve(arc, n_edges + 1)
+            geo.mesh.setTransfiniteCurve(arc, edges_on(math.pi / 2, size_ratio * size) + 1)
         centre = geo.addPoint(0, 0, 0)
         bottom, side = geo.addPoint(0, far[0], 0), geo.addPoint(far[2], 0, 0)
         corners = [geo.addPoint(x, y, 0) for x, y in ((width, 0), (width, -width), (0, -width))]
@@ -57,8 +58,10 @@ def quarter_joint(
         faces[Cells.BLOCK] = geo.addPlaneSurface([geo.addCurveLoop([arc, *edges])])
         curves[Facets.HOLE_ARC], curves[Facets.BLOCK_HELD] = [arc], [edges[0]]
         curves[Facets.SYMMETRY] += [edges[-1]]
-        geo.mesh.setTransfiniteCurve(arc, n_edges + 1)
-        tag_and_size(gmsh, faces, curves, f"{size!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})")
+        geo.mesh.setTransfiniteCurve(arc, edges_on(math.pi / 2, size) + 1)
+        from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
+        on_arc = {Cells.PIN: size_ratio * size, Cells.BLOCK: size}
+        tag_and_size(gmsh, faces, curves, {body: f"{value!r} + {from_arc}" for body, value in on_arc.items()})
 
     def exact(x: np.ndarray, tag: int) -> np.ndarray:
         if tag == Facets.PIN_ARC:

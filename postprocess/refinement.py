@@ -105,7 +105,14 @@ def group(runs: list[RunCurve]) -> list[Refined]:
 def _without_mesh(scene: Scene) -> tuple:
     """Everything of a scene but its element size and its words."""
     joint = scene.joint
-    sizes = (joint.radius, joint.dR / joint.radius, joint.W / joint.radius, joint.growth, scene.target)
+    sizes = (
+        joint.radius,
+        joint.dR / joint.radius,
+        joint.W / joint.radius,
+        joint.growth,
+        joint.size_ratio,
+        scene.target,
+    )
     rounded = tuple(float(f"{size:.9g}") for size in sizes)
     return (*rounded, tuple(scene.load.leg_steps), tuple(scene.load.legs),
             scene.pin.model_dump_json(), scene.block.model_dump_json(),

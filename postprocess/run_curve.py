@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +47,13 @@ class RunCurve:
         """Yield stress of the weaker body; None if neither yields."""
         given = [s.yield_stress for s in (self.scene.pin, self.scene.block) if s.yield_stress is not None]
         return min(given, default=None)
+
+    def loading(self) -> RunCurve:
+        """The steps at which the pin is deeper in the hole than ever before; unloading and what it repeats left out."""
+        deepest = np.maximum.accumulate([0.0, *self.delta])[:-1]
+        first = self.delta > deepest * (1 + 1e-9)
+        curves = {name: getattr(self, name)[first] for name in ("delta", "P", "p0", "eps", "peeq_max")}
+        return replace(self, **curves)
 
     def joint(self, k: float, c: float | None = None) -> LawJoint:
         """The joint with these coefficients; elastic without ``c``."""

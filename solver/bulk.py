@@ -46,6 +46,7 @@ class CellFields:
     von_mises: Array
     mean_stress: Array
     peeq: Array | None
+    peeq_increment: Array | None  # since the last step accepted
 
 
 def _voigt(u):
@@ -249,15 +250,16 @@ class Bulk:
         """Cell means of stress measures and PEEQ at ``u`` ``(n_nodes, 2)``."""
         n = self.V.mesh.topology.index_map(2).size_local
         mises, mean = np.zeros(n), np.zeros(n)
-        peeq = np.zeros(n)
+        peeq, increment = np.zeros(n), np.zeros(n)
         for data in self._plastic.values():
             mises[data.cells] = _cell_mean(data.weight, von_mises(data.stress))
             mean[data.cells] = _cell_mean(data.weight, mean_stress(data.stress))
             peeq[data.cells] = _cell_mean(data.weight, data.points.trial.peeq)
+            increment[data.cells] = _cell_mean(data.weight, data.points.trial.peeq - data.points.state.peeq)
         for cells, weight, _, sigma in self._elastic_points(u):
             mises[cells] = _cell_mean(weight, von_mises(sigma))
             mean[cells] = _cell_mean(weight, mean_stress(sigma))
-        return CellFields(mises, mean, peeq if self.plastic else None)
+        return CellFields(mises, mean, *((peeq, increment) if self.plastic else (None, None)))
 
     def _elastic_points(self, u: Array) -> Iterator[tuple[np.ndarray, Array, Array, Array]]:
         """Cells ``(n,)``, weights ``(n, q)``, strains ``(n q, 3)`` and stresses ``(n q, 4)`` of each elastic body."""

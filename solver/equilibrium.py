@@ -477,15 +477,16 @@ class Equilibrium:
 
     def _worst_place(self) -> tuple[float, float] | None:
         """Where the residual is largest, over all ranks."""
-        size = np.linalg.norm(self.residual(), axis=1)
+        size = np.linalg.norm(self.residual()[: self.n_owned], axis=1)
         at = int(np.argmax(size)) if len(size) else 0
         x = self.V.tabulate_dof_coordinates()[at, :2] if len(size) else np.zeros(2)
         found = [(s, p) for s, p in self.comm.allgather((size[at] if len(size) else -1.0, tuple(x))) if np.isfinite(s)]
         return max(found)[1] if found else None
 
     def residual(self) -> Array:
-        """Residual forces ``(n_owned, 2)`` at the last evaluation, zero where displacements are prescribed."""
-        return np.where(self._free_owned, self._force.array_r, 0.0).reshape(-1, 2)
+        """Residual forces ``(n_local, 2)`` at the last evaluation, zero at prescribed displacements and ghosts."""
+        owned = np.where(self._free_owned, self._force.array_r, 0.0).reshape(-1, 2)
+        return np.pad(owned, ((0, self.n_local - self.n_owned), (0, 0)))
 
     def displacement(self) -> Array:
         """A copy of the nodal displacements ``(n_local, 2)``."""

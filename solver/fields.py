@@ -1,4 +1,5 @@
-"""fields.xdmf and fields.h5: the joint's fields over the steps, for ParaView and pyvista.
+"""fields.xdmf and fields.h5: the joint's fields over the steps, for ParaView and pyvista. debug.xdmf and debug.h5: the
+last state that a solve without success tried, with its residual forces and increments of PEEQ.
 
 Displacements are nodal on the curved second-order mesh; stress measures, PEEQ and the contact are means over cells. The
 arrays are in the order of the mesh generator, whatever the number of ranks. Rank 0 writes.
@@ -6,6 +7,7 @@ arrays are in the order of the mesh generator, whatever the number of ranks. Ran
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -22,26 +24,30 @@ _VTK_ORDER = [0, 1, 2, 5, 3, 4]  # VTK counts edge nodes from the edge between t
 class FieldWriter:
     """Writes ``folder``/fields.xdmf and .h5, with room for ``steps`` steps; goes on ``after`` some that are there.
 
-    Collective. Raises `WriteError`, and `SceneError` if the files that should go on are not this run's.
+    With ``debug`` the files are debug.xdmf and .h5, and hold what tells why a solve fails. Collective.
+    Raises `WriteError`, and `SceneError` if the files that should go on are not this run's.
     """
 
-    def __init__(self, folder: Path, order: MeshOrder, steps: int, *, after: int = 0) -> None:
+    def __init__(self, folder: Path, order: MeshOrder, steps: int, *, after: int = 0, debug: bool = False) -> None:
         joint = order.joint
-        self.joint, self.order, self.path = joint, order, folder / "fields.xdmf"
+        self.joint, self.order = joint, order
+        self.path = folder / ("debug.xdmf" if debug else "fields.xdmf")
+        self._data_path = self.path.with_suffix(".h5")
+        self.nodal = ["displacement", "residual"] if debug else ["displacement"]
         body = np.zeros(order.n_cells, dtype=np.int8)
         own = joint.model.cells.indices < order.n_cells
         body[joint.model.cells.indices[own]] = joint.model.cells.values[own]
         body_of = order.cells(body)
         self.names = ["von_mises", "mean_stress", "contact_state", "contact_pressure"]
         if joint.bulk.plastic:
-            self.names.insert(1, "peeq")
+            self.names[1:1] = ["peeq", "peeq_increment"] if debug else ["peeq"]
 
         def make() -> StepFile:
             cells = order.nodes_of_cell[:, _VTK_ORDER]
             shapes: Shapes = {name: ((len(cells),), "<f8") for name in self.names}
-            shapes["displacement"] = ((len(order.coordinates), 3), "<f8")
+            shapes |= {name: ((len(order.coordinates), 3), "<f8") for name in self.nodal}
             fixed = {"mesh/coordinates": order.coordinates, "mesh/cells": cells, "mesh/body": body_of}
-            file = open_or_create(folder / "fields.h5", steps, shapes, fixed, after)
+            file = open_or_create(self._data_path, steps, shapes, fixed, after)
             if not after:
                 self._write_xdmf(file)
             return file
@@ -57,16 +63,16 @@ class FieldWriter:
         u = joint.equilibrium.displacement()
         means = joint.bulk.cell_fields(u)
         values: dict[str, Array | None] = {"von_mises": means.von_mises, "mean_stress": means.mean_stress}
-        if means.peeq is not None:
-            values["peeq"] = means.peeq
+        values |= {"peeq": means.peeq, "peeq_increment": means.peeq_increment}
         values["contact_state"], values["contact_pressure"] = self._contact_on_cells()
         arrays = {name: self.order.cells(np.asarray(values[name])) for name in self.names}
-        nodal = self.order.collect(u)
+        on_nodes = {"displacement": u, "residual": joint.equilibrium.residual()}
+        nodal = {name: self.order.collect(on_nodes[name]) for name in self.nodal}
 
         def write() -> None:
             assert self._file is not None
             if not again or self._file.accepted < step:
-                self._file.write(step, load, arrays | {"displacement": np.pad(nodal, ((0, 0), (0, 1)))})
+                self._file.write(step, load, arrays | {k: np.pad(v, ((0, 0), (0, 1))) for k, v in nodal.items()})
             self._write_xdmf(self._file)
 
         on_root(joint.comm, write)
@@ -97,28 +103,27 @@ class FieldWriter:
     def _grid(self, shapes: Shapes, step: int, time: float) -> str:
         n_nodes, n_cells = shapes["displacement"][0][0], shapes["von_mises"][0][0]
         at = step_name(step)
-        cell = "".join(_attribute(n, "Scalar", "Cell", f"{n_cells}", f"{n}/{at}") for n in self.names)
+        data = partial(_data, self._data_path.name)
+        cell = "".join(_attribute(n, "Scalar", "Cell", data(f"{n_cells}", f"{n}/{at}")) for n in self.names)
+        nodal = "".join(_attribute(n, "Vector", "Node", data(f"{n_nodes} 3", f"{n}/{at}")) for n in self.nodal)
         return (
             f'<Grid Name="{escape(f"step {step}")}" GridType="Uniform">\n<Time Value="{time!r}"/>\n'
             f'<Topology TopologyType="Triangle_6" NumberOfElements="{n_cells}">'
-            f"{_data(f'{n_cells} 6', 'mesh/cells', 'Int', 8)}</Topology>\n"
-            f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", "mesh/coordinates")}</Geometry>\n'
-            + _attribute("displacement", "Vector", "Node", f"{n_nodes} 3", f"displacement/{at}")
+            f"{data(f'{n_cells} 6', 'mesh/cells', 'Int', 8)}</Topology>\n"
+            f'<Geometry GeometryType="XYZ">{data(f"{n_nodes} 3", "mesh/coordinates")}</Geometry>\n'
+            + nodal
             + cell
-            + _attribute("body", "Scalar", "Cell", f"{n_cells}", "mesh/body", "Char", 1)
+            + _attribute("body", "Scalar", "Cell", data(f"{n_cells}", "mesh/body", "Char", 1))
             + "</Grid>\n"
         )
 
 
-def _attribute(
-    name: str, rank: str, centre: str, dimensions: str, path: str, kind: str = "Float", precision: int = 8
-) -> str:
-    data = _data(dimensions, path, kind, precision)
+def _attribute(name: str, rank: str, centre: str, data: str) -> str:
     return f'<Attribute Name="{name}" AttributeType="{rank}" Center="{centre}">{data}</Attribute>\n'
 
 
-def _data(dimensions: str, path: str, kind: str = "Float", precision: int = 8) -> str:
+def _data(file: str, dimensions: str, path: str, kind: str = "Float", precision: int = 8) -> str:
     return (
         f'<DataItem Dimensions="{dimensions}" NumberType="{kind}" Precision="{precision}" Format="HDF">'
-        f"fields.h5:/{path}</DataItem>"
+        f"{file}:/{path}</DataItem>"
     )

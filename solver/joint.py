@@ -71,8 +71,10 @@ class Joint:
         g = self.scene.joint
         sizes = (g.radius, g.dR, g.W, g.h, g.growth)
         if g.model == "ring":
-            return half_ring(self.comm, *sizes, self.scene.load.core_radius * g.radius, partitioner=partitioner)
-        return quarter_joint(self.comm, *sizes, rigid_pin=self.scene.pin.rigid, partitioner=partitioner)
+            core = self.scene.load.core_radius * g.radius
+            return half_ring(self.comm, *sizes, core, size_ratio=g.size_ratio, partitioner=partitioner)
+        rigid = self.scene.pin.rigid
+        return quarter_joint(self.comm, *sizes, size_ratio=g.size_ratio, rigid_pin=rigid, partitioner=partitioner)
 
     def _core_force(self) -> Array:
         """Downward nodal forces ``(n_owned, 2)`` of half a unit force, spread over the core as ``1 - (r/core)^2``."""

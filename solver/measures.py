@@ -19,7 +19,8 @@ class Measures:
     ``contact_area`` is the arc length in contact, the mean of both sides; ``peeq_max`` the largest value at a
     quadrature point, which grows without bound under mesh refinement where perfect plasticity localises. ``work`` is
     the integral of ``P`` over ``delta`` by the trapezoidal rule. ``force_balance`` is the largest difference between
-    the forces at pin, contact and block, over the largest ``P`` so far.
+    the forces at pin, contact and block, over the largest ``P`` so far, or over ``E* delta``, about what it would be in
+    contact, where nothing touches: what is left there is round-off.
     """
 
     step: int
@@ -79,7 +80,8 @@ def measure(
     comm.Allreduce(MPI.IN_PLACE, total)
     forces = joint.forces()
     P = forces["pin"]
-    scale = max(abs(P), largest_force)
+    area = 2 * float(np.mean([(p.weight * (p.raw_pressure > 0)).sum() for p in arcs]))
+    scale = max(abs(P), largest_force, 0.0 if area else joint.scene.E_star * abs(joint.delta()))
     eps = float(np.mean([semi_angle(p) for p in arcs]))
     return Measures(
         step=number,
@@ -87,7 +89,7 @@ def measure(
         P=P,
         p0=peak_pressure(arcs, eps),
         eps=eps,
-        contact_area=2 * float(np.mean([(p.weight * (p.raw_pressure > 0)).sum() for p in arcs])),
+        contact_area=area,
         peeq_max=comm.allreduce(largest, op=MPI.MAX),
         peeq_integral=2 * total[0],
         elastic_energy=2 * total[1],

@@ -23,8 +23,8 @@ from archord.solver.measures import Measures
 from archord.solver.stepping import Step
 
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact")
-_ARC_FULL = 0.99  # share of the arc's end facet in contact from which the modelled arc is too short
 _FEW_FACETS = 5
+_ROUGH = 0.01  # of the clearance
 
 
 class Report:
@@ -58,7 +58,7 @@ class Report:
                 "gamma_factor": joint.scene.analysis.gamma_factor,
             },
             "restarts": [],
-            "warnings": [],
+            "warnings": _rough_arcs(joint),
             "steps": [],
         }
         self._before: dict[str, Any] = before or {}
@@ -81,7 +81,8 @@ class Report:
     def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
         """Note an accepted output step."""
         self.measures.append(m)
-        self._residual = max(self._residual, step.residual)
+        if m.contact_area:
+            self._residual = max(self._residual, step.residual)
         self.content["warnings"] += _warnings(self.joint, profiles, m, step.residual)
         self.content["steps"].append(
             asdict(m) | {"substeps": step.substeps, "residuals": [a.residuals for a in step.attempts]}
@@ -123,7 +124,7 @@ class Report:
         if not self.measures:
             return {}
         m = self.measures[-1]
-        work = max(abs(m.work) for m in self.measures)
+        work = max((abs(m.work) for m in self.measures if m.contact_area), default=0.0)
         return {
             "force_balance": max(m.force_balance for m in self.measures),
             "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / work if work else 0.0,
@@ -132,8 +133,8 @@ class Report:
 
 
 def _step_of(warning: str) -> int:
-    """The step that a warning is about."""
-    return int(warning.removeprefix("step ").partition(":")[0])
+    """The step that a warning is about; 0 if it is about the joint."""
+    return int(warning.removeprefix("step ").partition(":")[0]) if warning.startswith("step ") else 0
 
 
 def _finite(value: Any) -> Any:
@@ -185,18 +186,34 @@ def _model(joint: Joint) -> dict[str, Any]:
     }
 
 
+def _rough_arcs(joint: Joint) -> list[str]:
+    """A warning if the parabolic facets depart too much from their circles for the clearance.
+
+    A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``. Equal facets that
+    face each other are off alike, which leaves the gap as it is.
+    """
+    geometry = joint.scene.joint
+    if not joint.scene.pin.rigid and geometry.size_ratio == 1:
+        return []
+    lengths = [np.diff(side.curve.arc_length(np.array([0.0, 1.0]))).max() for side in joint.sides.values()]
+    off = (1 - np.cos(max(lengths) / geometry.radius / 2)) ** 2 / 8 * geometry.radius / abs(geometry.dR)
+    if off <= _ROUGH:
+        return []
+    return [f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"]
+
+
 def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
     said = []
-    if joint.scene.joint.model == "block" and any(p.in_contact[-1] >= _ARC_FULL for p in profiles.values()):
-        said.append("the contact reaches the end of the modelled quarter arc")
+    if joint.scene.joint.model == "block" and any(p.in_contact[-1] > 0 for p in profiles.values()):
+        said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
     touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
-    if m.P and touching < _FEW_FACETS:
+    if m.contact_area and 0 < touching < _FEW_FACETS:
         said.append(
             f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
         )
     if abs(m.delta) > 0.1 * joint.scene.joint.radius:
         said.append("delta exceeds 0.1 R, too much for small-strain theory")
-    if residual > 1e-8:
+    if residual > 1e-8 and m.contact_area:
         said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
     if m.force_balance > 1e-8:
         said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")

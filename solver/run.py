@@ -56,6 +56,7 @@ def solve_scene(
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
     start: Start | None = None,
+    debug: bool = False,
     timer: Timer | None = None,
     begun: float | None = None,
     on_start: Callable[[Joint], None] = lambda joint: None,
@@ -66,7 +67,8 @@ def solve_scene(
 
     ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``, ``on_step`` and
     ``on_attempt(load, Newton iterations)`` report progress on every rank. ``begun`` is the ``perf_counter`` from which
-    the seconds count. A step that cannot be solved, or a file that cannot be written, ends the run with status
+    the seconds count. ``debug`` writes the fields of a step that cannot be solved to debug.xdmf. A step that cannot be
+    solved, or a file that cannot be written, ends the run with status
     "stopped", Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was accepted before stays. Raises `SceneError` if
     another process solves into ``folder``, or what is there cannot be continued.
     """
@@ -93,6 +95,7 @@ def solve_scene(
                     substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
                     target_done=target_done,
                     attempted=on_attempt,
+                    gave_up=output.debug if debug else lambda load: None,
                     start=position,
                 )
         except StepFailure as failure:
@@ -189,9 +192,13 @@ class _Output:
             on_root(self.joint.comm, add)
         self.steps.append(m)
 
+    def debug(self, load: float) -> None:
+        """Write the state that the last solve left, without success at ``load``. Collective."""
+        FieldWriter(self.folder, self._order, 1, debug=True).write(1, load)
+
     def unseen(self) -> bool:
         """Whether the pin was pressed into the hole but no contact point ever noticed."""
-        return max(m.delta for m in self.steps) > 0 and not any(m.P for m in self.steps)
+        return max(m.delta for m in self.steps) > 0 and not any(m.contact_area for m in self.steps)
 
     def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
         """Note how the run ended; returns the warnings on rank 0. Collective."""

@@ -12,12 +12,13 @@ from archord.solver.disk import new_name
 from archord.solver.scene import SceneError
 
 FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
+DEBUG = ("debug.xdmf", "debug.h5")
 CHECKPOINT = "checkpoint.h5"
 
 
 def clear(folder: Path) -> None:
     """Remove an old run's files, and what a kill left half done of them. Raises `OSError`."""
-    for name in (CHECKPOINT, *FILES):
+    for name in (CHECKPOINT, *FILES, *DEBUG):
         (folder / name).unlink(missing_ok=True)
         new_name(folder / name).unlink(missing_ok=True)
 

@@ -85,10 +85,16 @@ class JointGeometry(_Section):
         default=None,
     )
     element_size: Positive | None = _key(
-        "edge length of the elements on both arcs, 1e-4 to 0.5 times R", "length", default=None
+        "edge length of the elements on the arcs, 1e-4 to 0.5 times R", "length", default=None
     )
     relative_element_size: Positive | None = _key(
         "element_size / R, instead of element_size: 1e-4 to 0.5; 0.04 if both are absent", default=None, example=0.04
+    )
+    size_ratio: float = _key(
+        "element size on the pin's arc over that on the hole's, which then is element_size",
+        default=1.0,
+        ge=0.01,
+        le=100,
     )
     growth: float = _key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
 
@@ -106,6 +112,8 @@ class JointGeometry(_Section):
         if not 1e-4 <= self.h / self.radius <= 0.5:
             name = "element_size" if self.element_size is not None else "relative_element_size"
             raise ValueError(f"{name}|must be between 1e-4 and 0.5 times the radius")
+        if not 1e-4 <= self.size_ratio * self.h / self.radius <= 0.5:
+            raise ValueError("size_ratio|must leave the pin's elements between 1e-4 and 0.5 times the radius")
         if 2 * (self.radius + self.dR) > self.W:
             raise ValueError("block_size|must be at least twice the radius of the hole")
         if self.W / self.radius > _WIDEST:
@@ -143,7 +151,7 @@ class JointGeometry(_Section):
 
     @property
     def h(self) -> float:
-        """Element size on the arcs."""
+        """Element size on the arcs, or on the hole's alone (see `size_ratio`)."""
         return (self.relative_element_size or 0.04) * self.radius if self.element_size is None else self.element_size
 
 

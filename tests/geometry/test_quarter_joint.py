@@ -8,6 +8,7 @@ from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.geometry.half_ring import half_ring
 from archord.geometry.joint_mesh import Cells, Facets
 from archord.geometry.quarter_joint import quarter_joint
 from archord.solver.scene import JointGeometry
@@ -95,6 +96,32 @@ def test_edges_of_the_arcs_have_the_element_size(size):
         lengths = edge_lengths(joint, tag)
         assert lengths.max() <= size * (1 + DR)
         assert lengths.min() >= size * (1 - 1 / len(lengths)) * 0.99
+
+
+@pytest.mark.parametrize("ring", [False, True], ids=["quarter joint", "half ring"])
+@pytest.mark.parametrize(("size", "size_ratio"), [(0.2, 0.05), (0.01, 20.0)])
+def test_pin_and_block_can_have_elements_of_their_own(ring, size, size_ratio):
+    """1:20 and 20:1: each arc has its own edges, each body its own number of triangles, none of them a sliver."""
+    if ring:
+        joint = half_ring(MPI.COMM_SELF, R, DR, W, size, GROWTH, 0.5, size_ratio=size_ratio)
+    else:
+        joint = quarter_joint(MPI.COMM_SELF, R, DR, W, size, GROWTH, size_ratio=size_ratio)
+    for tag, longest in ((Facets.HOLE_ARC, size), (Facets.PIN_ARC, size_ratio * size)):
+        lengths = edge_lengths(joint, tag)
+        assert 0.85 * longest < lengths.min() < lengths.max() <= longest * (1 + DR)
+    numbers = [len(joint.cells.find(body)) for body in Cells]
+    assert (numbers[0] > 4 * numbers[1]) == (size_ratio < 1)
+    corners = joint.mesh.geometry.x[joint.mesh.geometry.dofmap[:, :3], :2]
+    edge, following = (np.roll(corners, -i, axis=1) - corners for i in (1, 2))
+    cosine = (edge * following).sum(axis=-1) / np.linalg.norm(edge, axis=-1) / np.linalg.norm(following, axis=-1)
+    assert np.degrees(np.arccos(cosine)).min() > 15
+
+
+def test_equal_sizes_make_the_same_mesh_as_none(joint):
+    """A ratio next to 1 takes the way of two fields: the same triangles up to their places' last digits."""
+    other = quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH, size_ratio=1 + 1e-14)
+    assert len(other.cells.values) == len(joint.cells.values)
+    np.testing.assert_allclose(other.mesh.geometry.x, joint.mesh.geometry.x, atol=1e-6)
 
 
 def test_edges_grow_with_the_distance(joint):

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -92,3 +93,13 @@ def test_no_picture_loads_no_plotting_library(runs, tmp_path):
     code = f"import sys; from archord.cli import run; run(['fit', {str(runs['elastic'])!r}]); print('matplotlib' in sys.modules)"  # noqa: E501
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.splitlines()[-1] == "False"
+
+
+def test_unloading_is_left_out(runs):
+    """Of a way there, back and further, the steps on new ground remain."""
+    curve = read_run(runs["elastic"])
+    there, back = np.arange(len(curve.delta)), np.arange(len(curve.delta))[::-1]
+    path = np.concatenate([there[:5], back[4:], there])
+    loop = replace(curve, **{name: getattr(curve, name)[path] for name in ("delta", "P", "p0", "eps", "peeq_max")})
+    np.testing.assert_array_equal(loop.loading().delta, curve.delta)
+    np.testing.assert_array_equal(loop.loading().P, curve.P)

@@ -123,6 +123,23 @@ def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
         assert file["accepted"][()] == 4
 
 
+def test_a_failing_step_tells_where_and_why(tmp_path):
+    """Every attempt's residuals, flips and plastic increment in run.json; debug.xdmf holds the state they speak of."""
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5}, stepping={"minimum": 1.0})
+    assert solve_scene(problem, tmp_path, MPI.COMM_SELF, debug=True).status == "stopped"
+    failed = json.loads((tmp_path / "run.json").read_text())["failed_step"]
+    assert failed["cutbacks"] == len([a for a in failed["attempts"] if not a["converged"]]) == 1
+    last = failed["attempts"][-1]
+    assert len(last["flips"]) == len(last["residuals"]) > 3
+    assert sum(sum(a["flips"]) for a in failed["attempts"]) > 0
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "debug.xdmf") as reader:
+        points, _ = reader.read_points_cells()
+        _, nodal, cells = reader.read_data(0)
+    worst = np.linalg.norm(nodal["residual"], axis=1).argmax()
+    assert points[worst, :2] == pytest.approx(last["worst"], abs=1e-12)
+    assert 0 < cells["peeq_increment"][0].max() <= last["plastic_increment"]
+
+
 def test_a_contact_that_no_point_sees_is_no_success(tmp_path):
     """A load far below what the mesh resolves leaves no contact point pressed: stopped, not a joint without force."""
     outcome = solve_scene(scene(0.08, steps=1, load={"displacement": 1e-8}), tmp_path, MPI.COMM_SELF)
@@ -174,3 +191,44 @@ def test_results_are_not_overwritten_by_accident(tmp_path):
     assert (tmp_path / "new" / "history.csv").read_text() == "kept"
     with pytest.raises(SceneError, match="is a file"):
         claim_folder(tmp_path / "new" / "history.csv", True)
+
+
+def test_a_pin_that_touches_nothing_has_no_warnings(tmp_path):
+    """Lifted: what is left of P is round-off, and no reason to doubt the solution."""
+    outcome = solve_scene(scene(0.2, 2, load={"displacement": -1.0}), tmp_path, MPI.COMM_SELF)
+    assert (outcome.status, outcome.warnings) == ("done", [])
+    assert max(m.force_balance for m in outcome.steps) < 1e-8
+    assert json.loads((tmp_path / "run.json").read_text())["error_estimates"]["newton_residual"] < 1e-8
+
+
+def test_a_contact_smaller_than_the_mesh_can_see_stops_the_run(tmp_path):
+    """Pressed by less than the first contact point's gap: no force but round-off, and a sentence."""
+    outcome = solve_scene(scene(0.2, 2, load={"displacement": 1e-7}), tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "stopped"
+    assert "no contact point was ever pressed" in outcome.message
+
+
+def test_a_contact_that_reaches_the_end_of_the_arc_is_named(tmp_path):
+    """At 100 dR the whole arc touches; at 2 dR it does not."""
+    for load, said in ((2.0, False), (100.0, True)):
+        folder = tmp_path / str(load)
+        folder.mkdir()
+        thin = scene(0.2, 2, joint={"clearance": 0.001}, load={"displacement": load})
+        outcome = solve_scene(thin, folder, MPI.COMM_SELF)
+        assert any("contact reaches the end of the modelled quarter arc" in w for w in outcome.warnings) == said
+
+
+def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):
+    """Where the run says nothing, P of a rigid pin is within 3 % of that on elements half as long."""
+    force, said = [], []
+    for i, size in enumerate((0.16, 0.08, 0.04, 0.02)):
+        folder = tmp_path / str(i)
+        folder.mkdir()
+        thin = scene(size, 1, joint={"clearance": 1e-6}, pin={"rigid": True}, block={"E": 0.91, "nu": 0.3})
+        outcome = solve_scene(thin, folder, MPI.COMM_SELF)
+        force.append(outcome.steps[-1].P)
+        said.append(any("too long for the clearance" in w for w in outcome.warnings))
+    error = abs(np.array(force[:-1]) / force[-1] - 1)
+    assert said == [True, True, False, False]
+    assert error[0] > 0.1
+    assert error[2] < 0.01

@@ -1,0 +1,120 @@
+"""The stability benchmark: its command, its table of cases, and what makes a line wrong."""
+
+import csv
+import math
+import os
+import re
+from dataclasses import replace
+
+import h5py
+import pytest
+
+from archord.benchmarks.stability import chosen, judge, with_references
+from archord.benchmarks.stability_cases import FINE, cases, same_as
+from archord.benchmarks.stability_fine import fine_scene, read_fine
+from archord.benchmarks.stability_run import Result, not_finite, slug, solve_case
+from archord.cli import run
+
+alone = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="only rank 0 prints")
+
+
+@alone
+def test_three_cases_through_the_command(tmp_path, capsys):
+    """Two loads of zero and one that must stop: table, summary and heat map, exit code 0."""
+    assert run(["benchmark", "stability", "--only", "zero*", "-o", str(tmp_path / "b")]) == 0
+    assert "2 converged of the 2" in capsys.readouterr().out
+    assert run(["benchmark", "stability", "--only", "pulled*", "-q", "-o", str(tmp_path / "c")]) == 0
+    assert capsys.readouterr().out == ""
+    with (tmp_path / "c" / "stability.csv").open(newline="", encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert (row["status"], row["verdict"]) == ("stopped", "stops, as it must")
+    assert "come free" in row["message"]
+    assert (tmp_path / "b" / "stability.png").read_bytes().startswith(b"\x89PNG")
+    assert "| zero force | done |" in (tmp_path / "b" / "stability.md").read_text(encoding="utf-8")
+    assert run(["benchmark", "stability", "--only", "nothing like it"]) == 2
+    assert "no case has such a name or group; groups are modulus ratio" in capsys.readouterr().err
+
+
+def done(name, **values):
+    """A faultless result with these quantities."""
+    return Result(name, "done", "", 1.0, steps=4, quantities={"P/(E* R)": 0.01} | values)
+
+
+def a_case(**changes):
+    return replace(cases()["E_pin/E_block = 1"], **changes)
+
+
+def test_the_table_is_whole():
+    """At least 60 scenes; what a case is compared with exists and is another one; no loop of references."""
+    table = cases()
+    assert len(table) >= 60
+    assert len({slug(name) for name in table}) == len(table)
+    for case in table.values():
+        assert case.expected or case.stops
+        for expected in case.expected:
+            assert expected.value == FINE or isinstance(expected.value, float) or expected.value in table
+            assert expected.value != case.name
+            assert expected.value != FINE or expected.quantity in read_fine()[case.name]
+
+
+def test_fine_scenes_are_the_same_joint_on_a_finer_mesh():
+    """Same material, load and clearance, smaller elements of one size; more steps where a body can yield."""
+    for case in cases().values():
+        if any(e.value == FINE for e in case.expected):
+            scene = fine_scene(case.scene)
+            assert (scene.pin, scene.block, scene.load.legs) == (case.scene.pin, case.scene.block, case.scene.load.legs)
+            assert scene.joint.dR == case.scene.joint.dR
+            assert scene.joint.size_ratio == 1
+            assert scene.joint.h <= 0.025 * scene.joint.radius
+            assert not scene.plastic or len(scene.targets) >= 20
+
+
+def test_a_pattern_brings_what_it_is_compared_with():
+    """--only solves the references too, in the table's order."""
+    assert chosen("E_pin/E_block = 1e6")[0] == "E_pin/E_block = 1e6"
+    names = with_references(["E_pin/E_block = 1e6"])
+    assert names == ["E_pin/E_block = 1e6", "rigid pin"]
+    assert chosen("GAMMA") == chosen("*gamma*")
+
+
+def test_verdicts():
+    """Each check alone turns a good line into a wrong one."""
+    other = a_case(name="b", expected=(same_as("a", 1e-3, "a law"),))
+    results = {"a": done("a"), "b": done("b")}
+    assert judge(other, results, {}).verdict == "converges"
+    for change, said in (
+        ({"quantities": {"P/(E* R)": 0.0101}}, "P/\\(E\\* R\\) is 0.0101, not 0.01 \\(a law\\)"),
+        ({"quantities": {"P/(E* R)": math.nan}}, "is nan"),
+        ({"balance": 1e-7}, "forces differ by 1.0e-07 of P"),
+        ({"balance": math.nan}, "forces differ"),
+        ({"energy": 0.1, "energy_limit": 0.05}, "energy is off"),
+        ({"not_finite": ["run.json: NaN"]}, "not finite: run.json: NaN"),
+        ({"status": "stopped", "message": "no equilibrium"}, "stopped: no equilibrium"),
+        ({"status": "failed", "message": "TypeError: x"}, "failed: TypeError: x"),
+    ):
+        line = judge(other, results | {"b": replace(done("b"), **change)}, {})
+        assert len(line.faults) == 1
+        assert re.search(said, line.verdict)
+    assert judge(replace(other, warns="end of"), results, {}).faults == ['does not warn "end of"']
+    stops = replace(other, stops="come free", expected=())
+    assert judge(stops, results, {}).faults == ["went on"]
+    stopped = replace(done("b"), status="stopped", message="the pin has come free")
+    assert judge(stops, results | {"b": stopped}, {}).verdict == "stops, as it must"
+
+
+def test_a_budget_and_a_time_limit_end_a_case(tmp_path):
+    """With the sentence that says so, and what was reached before."""
+    short = solve_case(a_case(name="short", budget=8), tmp_path)
+    assert (short.status, short.message, short.steps) == ("stopped", "more than the 8 Newton iterations allowed", 1)
+    late = solve_case(a_case(name="late", seconds=0.01), tmp_path)
+    assert (late.status, late.message) == ("failed", "more than the 0.01 s allowed")
+
+
+def test_a_nan_is_found_wherever_it_is(tmp_path):
+    """In a table, in a report, deep in a file."""
+    (tmp_path / "run.json").write_text('{"a": [1, NaN]}', encoding="utf-8")
+    (tmp_path / "history.csv").write_text("step,P [N/mm]\n1,inf\n", encoding="utf-8")
+    with h5py.File(tmp_path / "contact.h5", "w") as file:
+        file["pin/gap"] = [1.0, math.nan]
+        file["pin/s"] = [1.0, 2.0]
+    assert not_finite(tmp_path) == ["run.json: NaN", "history.csv: P", "contact.h5: pin/gap"]
