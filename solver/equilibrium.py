@@ -120,9 +120,7 @@ class Equilibrium:
         self.largest_reaction = 0.0  # norm, of all accepted states
         materials = [body.material for body in bulk.bodies]
         stiffness = max(float(elastic_tangent(m.E, m.nu, m.plane)[0, 0]) for m in materials)
-        rate = max(float(np.max(np.abs(s.rate), initial=0.0)) for s in supports)
-        rigid = 0.0 if rigid_rate is None else float(np.abs(rigid_rate).max())
-        self._stiffest = stiffness * self.comm.allreduce(max(rate, rigid), op=MPI.MAX)
+        self._stiffest = stiffness
         self._border: Bordered | None = None
         self._make_matrix()
         if by_force is not None:
@@ -355,8 +353,8 @@ class Equilibrium:
         return call
 
     def _bulk_noise(self) -> float:
-        """Round-off of the bulk's residual: forces that a rigid motion of the size of the load leaves."""
-        return 1e-13 * self._stiffest * abs(self.level)
+        """Round-off of the bulk's residual: forces that a rigid motion of the size of the displacement leaves."""
+        return 1e-13 * self._stiffest * self.comm.allreduce(np.abs(self.u.x.array).max(initial=0.0), op=MPI.MAX)
 
     def _test(self, snes, iteration, norms):
         norm = norms[2]
