@@ -220,8 +220,10 @@ def _strength() -> Iterable[Case]:
     push = {"displacement": 6.0, "steps": 12}
     yield _case("fully plastic pin", group, fine(0.02), pin=soft, load=push, budget=1000)
     yield _case("fully plastic pin, plane stress", group, fine(0.02), pin=soft, load=push, budget=1000, **plane)
-    yield _case("fully plastic pin, far", group, fine(0.02), pin=soft, load={"displacement": 20.0, "steps": 20},
-                budget=1500)  # fmt: skip
+    for size, name, other in ((COARSE, "", ", elements of 20 %R"), (0.2, ", elements of 20 %R", "")):
+        like = same_as(f"fully plastic pin, far{other}", 0.02, "another mesh")
+        yield _case(f"fully plastic pin, far{name}", group, like, pin=soft, load={"displacement": 20.0, "steps": 20},
+                    budget=1500, element_size=size)  # fmt: skip
     held = same_as("fully plastic pin, plane stress", 0.1, "plateau at 6 dR, which goes on rising")
     yield _case("force beyond the pin's limit load", group, held, stops="last load that held", pin=soft,
                 load=_by_force(0.004, 8), stepping={"minimum": 0.02}, budget=1500, **plane)  # fmt: skip
