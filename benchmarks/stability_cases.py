@@ -145,10 +145,10 @@ def _geometry() -> Iterable[Case]:
         )
         yield Case(f"{kind}, E* dR/P = {load:g}", group, persson_joint(load, size, steps), expected)
 
-    stiff = [persson_joint(-0.1, COARSE, 4, **moduli(ratio)) for ratio in (1e3, 1e6)]
-    name, why = "interference, E_pin/E_block = 1e3", "a rigid pin, nearly"
+    stiff = [persson_joint(-0.1, COARSE, 4, **moduli(ratio)) for ratio in (1e2, 1e6)]
+    name, why = "interference, E_pin/E_block = 1e2", "a rigid pin, nearly"
     yield Case(name, group, stiff[0], (fine(0.02, "eps"), fine(0.02, "p0/P")))
-    like = (same_as(name, 0.01, why, quantity="eps"), same_as(name, 0.01, why, quantity="p0/P"))
+    like = (same_as(name, 0.03, why, quantity="eps"), same_as(name, 0.03, why, quantity="p0/P"))
     yield Case("interference, E_pin/E_block = 1e6", group, stiff[1], like)
 
 
@@ -208,13 +208,15 @@ def _strength() -> Iterable[Case]:
     elastic = same_as("E_pin/E_block = 1", 1e-9, "never yields")
     yield _case("sigY/E* = 0.1", group, elastic, yield_stress=0.1)
     plane: dict[str, Any] = {"analysis": {"plane": "stress"}}
-    for strength in (2e-3, 1e-4, 1e-5):
-        expected = fine(0.01)
-        if strength < 1e-4:
-            expected = same_as("sigY/E* = 1e-4, plane stress", 0.1, "fully plastic: P goes with sigY", 0.1)
+    for strength, expected, size in (
+        (2e-3, fine(0.01), COARSE),
+        (1e-4, same_as("sigY/E* = 1e-4, plane stress, elements of 20 %R", 0.03, "another mesh"), COARSE),
+        (1e-4, same_as("sigY/E* = 1e-4, plane stress", 0.03, "another mesh"), 0.2),
+        (1e-5, same_as("sigY/E* = 1e-4, plane stress", 0.1, "fully plastic: P goes with sigY", 0.1), COARSE),
+    ):
         bodies = both(E=2.0, nu=0.3, yield_stress=strength)
-        title = f"sigY/E* = {_short(strength)}, plane stress"
-        yield _case(title, group, expected, steps=8, budget=2000, **plane, **bodies)
+        title = f"sigY/E* = {_short(strength)}, plane stress" + (", elements of 20 %R" if size > COARSE else "")
+        yield _case(title, group, expected, steps=8, budget=2000, element_size=size, **plane, **bodies)
     group = "limit load"
     soft = {"E": E, "nu": 0.3, "yield_stress": 0.001}
     push = {"displacement": 6.0, "steps": 12}
