@@ -300,10 +300,7 @@ def _pairs() -> Iterable[Case]:
                 **moduli(1e6, 0.4999))  # fmt: skip
     yield _case("nu = 0.4999, plastic, one step", group, same_as("nu = 0.499, plastic", 0.02, "nu = 0.499"),
                 load=one, **poisson(0.4999, yield_stress=0.002))  # fmt: skip
-    yield _case("nu = 0.499, E_pin/E_block = 1e-6", group, **moduli(1e-6, 0.499))
-    yield _case("nu = 0.4999, E_pin/E_block = 1e-6, one step", group,
-                same_as("nu = 0.499, E_pin/E_block = 1e-6", 0.005, "nu = 0.499"), load=one,
-                **moduli(1e-6, 0.4999))  # fmt: skip
+    yield _case("nu = 0.499, E_pin/E_block = 1e-6, one step", group, load=one, **moduli(1e-6, 0.499))
     yield _case("gamma factor 1e4, plastic, one step", group, fine(0.02), load=one, analysis={"gamma_factor": 1e4},
                 yield_stress=0.002)  # fmt: skip
     yield _case("gamma factor 1e4, rigid pin", group, same_as("rigid pin", 0.002, "gamma factor 0.5"), pin=RIGID,
@@ -315,8 +312,8 @@ def _pairs() -> Iterable[Case]:
     weak = moduli(1e4)
     weak["block"] |= {"yield_stress": 1e-3}
     yield _case("E_pin/E_block = 1e4, plastic block", group, fine(0.01), steps=8, budget=600, **weak)
-    yield _case("delta/dR = 100, sigY/E* = 0.01", group, fine(0.02), joint={"clearance": 0.001}, yield_stress=0.01,
-                load={"displacement": 100.0, "steps": 20}, budget=1000)  # fmt: skip
+    yield _case("delta/dR = 20, sigY/E* = 0.01", group, fine(0.02), joint={"clearance": 0.001}, yield_stress=0.01,
+                load={"displacement": 20.0, "steps": 10}, budget=1000)  # fmt: skip
 
 
 def cases() -> dict[str, Case]:
