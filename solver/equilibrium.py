@@ -77,7 +77,8 @@ class Equilibrium:
 
     ``rigid_rate`` moves a rigid pin with the level; ``applied`` are nodal forces ``(n_owned, 2)`` per unit of load.
     The level is the load, or with ``by_force`` what makes the forces of supports and rigid pin, along their rates,
-    sum up to ``by_force`` times the load. ``load_name`` is for messages.
+    sum up to ``by_force`` times the load. ``load_name`` is for messages, ``travel`` the displacement to be expected, which
+    limits what counts as round-off: an iterate that flew away is none.
     """
 
     def __init__(
@@ -91,6 +92,7 @@ class Equilibrium:
         applied: Array | None = None,
         by_force: float | None = None,
         load_name: str = "delta",
+        travel: float = np.inf,
         tolerance: float = 1e-10,
         max_iterations: int = 25,
         timer: Timer | None = None,
@@ -120,7 +122,7 @@ class Equilibrium:
         self.largest_reaction = 0.0  # norm, of all accepted states
         materials = [body.material for body in bulk.bodies]
         stiffness = max(float(elastic_tangent(m.E, m.nu, m.plane)[0, 0]) for m in materials)
-        self._stiffest = stiffness
+        self._stiffest, self.travel = stiffness, travel
         self._border: Bordered | None = None
         self._make_matrix()
         if by_force is not None:
@@ -354,7 +356,8 @@ class Equilibrium:
 
     def _bulk_noise(self) -> float:
         """Round-off of the bulk's residual: forces that a rigid motion of the size of the displacement leaves."""
-        return 1e-13 * self._stiffest * self.comm.allreduce(np.abs(self.u.x.array).max(initial=0.0), op=MPI.MAX)
+        largest = self.comm.allreduce(np.abs(self.u.x.array).max(initial=0.0), op=MPI.MAX)
+        return 1e-13 * self._stiffest * min(largest, self.travel)
 
     def _test(self, snes, iteration, norms):
         norm = norms[2]

@@ -62,6 +62,7 @@ class Joint:
                 applied=self._core_force() if geometry.model == "ring" else None,
                 by_force=0.5 if scene.force_controlled and geometry.model == "block" else None,
                 load_name="P" if scene.force_controlled else "delta",
+                travel=self._travel(),
                 tolerance=analysis.tolerance,
                 max_iterations=analysis.max_iterations,
                 timer=self.timer,
@@ -87,6 +88,11 @@ class Joint:
         vector.scatter_reverse(InsertMode.add)
         self._core = -2 * vector.array[: 2 * self.V.dofmap.index_map.size_local].reshape(-1, 2)
         return -self._core / 2
+
+    def _travel(self) -> float:
+        """Size of the displacements to be expected."""
+        largest = max(map(abs, self.scene.targets))
+        return abs(self.scene.joint.dR) + largest / (self.scene.E_star if self.scene.force_controlled else 1.0)
 
     def _supports(self) -> list[Support]:
         supports = [

@@ -76,7 +76,7 @@ def test_bad_input_is_one_sentence(runs, tmp_path, capsys, arguments, said):
     folders = runs | {name: tmp_path / name for name in ("empty", "begun", "broken")}
     (tmp_path / "empty").mkdir()
     history = (runs["elastic"] / "history.csv").read_text()
-    for name, text in (("begun", history.splitlines()[0]), ("broken", history + "1,2\n")):
+    for name, text in (("begun", history.splitlines()[0] + "\n"), ("broken", history + "1,2\n")):
         (tmp_path / name).mkdir()
         (tmp_path / name / "scene.toml").write_text((runs["elastic"] / "scene.toml").read_text())
         (tmp_path / name / "history.csv").write_text(text)
