@@ -71,7 +71,7 @@ class Contact:
         one_sided: int | None = None,
     ) -> None:
         self.sides = sides
-        self.kinematics = kinematics
+        self.kinematics, self.gamma_factor = kinematics, gamma_factor
         self.rigid_motion = np.zeros(2)
         self.flips = 0  # points of this rank that opened or closed at the last evaluation
         self.comm = sides[0].comm
@@ -99,6 +99,12 @@ class Contact:
         """Forget where the pairs were: the next evaluation searches them anew, over whole curves."""
         for pair in self.pairings:
             pair.search()
+
+    def use_gamma_factor(self, factor: float) -> None:
+        """Another ``gamma_factor`` than that of the contact, for the time being."""
+        for pair in self.pairings:
+            pair.gamma *= factor / self.gamma_factor
+        self.gamma_factor = factor
 
     def hold(self) -> None:
         """Keep all points on the facets they were last paired with, until `search`: the forces become smooth."""

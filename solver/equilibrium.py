@@ -9,6 +9,7 @@ tolerance has no unit.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -23,11 +24,13 @@ from archord.geometry.fenicsx import create_vector
 from archord.materials.elasticity import elastic_tangent
 from archord.solver.bordered import Bordered, direct_solver
 from archord.solver.bulk import Bulk, assemble, matrix
-from archord.solver.contact import Contact
+from archord.solver.contact import GAMMA_FACTOR, Contact
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.points import PlasticPoints
 from archord.solver.timer import Timer
 
+_STIFF_CONTACT = 5.0  # gamma factor above which it is raised by and by where a solve fails
+_GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 _CIRCLING = 4  # the same where no contact point opens or closes
 
@@ -77,8 +80,8 @@ class Equilibrium:
 
     ``rigid_rate`` moves a rigid pin with the level; ``applied`` are nodal forces ``(n_owned, 2)`` per unit of load.
     The level is the load, or with ``by_force`` what makes the forces of supports and rigid pin, along their rates,
-    sum up to ``by_force`` times the load. ``load_name`` is for messages, ``travel`` the displacement to be expected, which
-    limits what counts as round-off: an iterate that flew away is none.
+    sum up to ``by_force`` times the load. ``load_name`` is for messages, ``travel`` the displacement to be expected,
+    which limits what counts as round-off: an iterate that flew away is none.
     """
 
     def __init__(
@@ -104,6 +107,7 @@ class Equilibrium:
         self.tolerance, self.max_iterations = tolerance, max_iterations
         self.timer = timer or Timer()
         self.interrupt = Interrupt()
+        self._by_and_by = False
         self.u = fem.Function(V, name="displacement")
         self.load = self.level = 0.0
         index_map = V.dofmap.index_map
@@ -384,6 +388,31 @@ class Equilibrium:
         return bool(before) and min(recent) > 0.5 * min(before)
 
     def solve(self, load: float, guess: Array, *, elastic_first: bool = False) -> Newton:
+        """Solve at ``load`` as `solve_at_once`; where a large gamma makes that fail, raise gamma to it by and by.
+
+        The limit hardly depends on gamma, but points open and close for many iterations where it is large.
+        """
+        contact, result = self.contact, None
+        wanted = 0.0 if contact is None else contact.gamma_factor
+        if contact is None or wanted <= _STIFF_CONTACT:
+            return self.solve_at_once(load, guess, elastic_first=elastic_first)
+        if not self._by_and_by:
+            result = self.solve_at_once(load, guess, elastic_first=elastic_first)
+            if result.converged:
+                return result
+        stages = math.ceil(math.log(wanted / GAMMA_FACTOR, _GAMMA_RATIO))
+        for factor in np.geomspace(GAMMA_FACTOR, wanted, stages + 1):
+            contact.use_gamma_factor(float(factor))
+            result = self.solve_at_once(load, guess, elastic_first=elastic_first).after(result)
+            guess, elastic_first = self.state(), False
+            if not result.converged:
+                break
+        contact.use_gamma_factor(wanted)
+        assert result is not None
+        self._by_and_by |= result.converged
+        return result
+
+    def solve_at_once(self, load: float, guess: Array, *, elastic_first: bool = False) -> Newton:
         """Solve at ``load`` from ``guess``, shaped like `state`, whose prescribed values are replaced.
 
         ``elastic_first`` finds the equilibrium of points that cannot yield (further) before the one asked for; if that
@@ -393,20 +422,20 @@ class Equilibrium:
         points = self._plastic_points()
         yielding = self.comm.allreduce(len(points)) > 0
         if not yielding:
-            return self._run_elastic(guess)
+            return self._run_either_way(guess)
         before = None
         if elastic_first:
             for p in points:
                 p.elastic_only = True
-            before = self._run_elastic(guess)
+            before = self._run_either_way(guess)
             for p in points:
                 p.elastic_only = False
             if before.converged:
                 guess = self.state()
-        return self._run(guess).after(before)
+        return self._run_either_way(guess).after(before)
 
-    def _run_elastic(self, guess: Array) -> Newton:
-        """Without plasticity the problem is nearly linear by pieces, and full steps find the right ones where the line
+    def _run_either_way(self, guess: Array) -> Newton:
+        """The problem is nearly linear by pieces, where it is smooth, and full steps find the right ones where the line
         search, which wants a smaller residual in every step, creeps: large gamma, nearly incompressible bodies."""
         result = self._run(guess)
         if result.converged or (self._border is not None and self._border.came_free):
