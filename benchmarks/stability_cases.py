@@ -239,7 +239,7 @@ def _mesh() -> Iterable[Case]:
     yield _case("elements of 10 %R in one step", group, same_as("elements of 0.2 %R", 0.002, "fine mesh"),
                 load={"displacement": 2.0, "steps": 1})  # fmt: skip
     yield _case("elements of 0.2 %R", group, same_as(whole, 0.002, "coarse mesh"), element_size=0.002,
-                joint={"growth": 1.0}, load={"displacement": 2.0, "steps": 1})  # fmt: skip
+                joint={"growth": 0.5}, load={"displacement": 2.0, "steps": 1})  # fmt: skip
     yield _case("elements of 40 %R", group, fine(0.02), element_size=0.4)
     yield _case("pin:block = 1:20", group, fine(), element_size=0.2, joint={"size_ratio": 0.05})
     yield _case("pin:block = 20:1", group, fine(), element_size=0.01, joint={"size_ratio": 20.0})
@@ -299,7 +299,7 @@ def _pairs() -> Iterable[Case]:
     yield _case("nu = 0.4999, E_pin/E_block = 1e6", group, same_as("nu = 0.4999, rigid pin", 0.005, "a rigid pin"),
                 **moduli(1e6, 0.4999))  # fmt: skip
     yield _case("nu = 0.4999, plastic, one step", group, same_as("nu = 0.499, plastic", 0.02, "nu = 0.499"),
-                load=one, **poisson(0.4999, yield_stress=0.002))  # fmt: skip
+                load=one, budget=1000, **poisson(0.4999, yield_stress=0.002))  # fmt: skip
     yield _case("nu = 0.499, E_pin/E_block = 1e-6, one step", group, load=one, **moduli(1e-6, 0.499))
     yield _case("gamma factor 1e4, plastic, one step", group, fine(0.02), load=one, analysis={"gamma_factor": 1e4},
                 yield_stress=0.002)  # fmt: skip

@@ -63,11 +63,15 @@ class Curve:
         """Shape functions and their first and second derivatives, each ``(..., p + 1)``, at ``xi`` ``(...)``."""
         k = np.arange(self.degree + 1)
         zero = np.zeros_like(xi)[..., None]
-        powers = xi[..., None] ** k
+        powers = np.ones((*xi.shape, self.degree + 1))
+        for i in k[1:]:
+            powers[..., i] = powers[..., i - 1] * xi
         first = np.concatenate([zero, powers[..., :-1] * k[1:]], axis=-1)
         second = np.concatenate([zero, first[..., :-1] * k[1:]], axis=-1)
-        c = self._coefficients.T
-        return powers @ c, first @ c, second @ c
+        # one product of two matrices: numpy would multiply point by point
+        p = np.stack([powers, first, second]).reshape(-1, self.degree + 1) @ self._coefficients.T
+        value, slope, bend = p.reshape(3, *powers.shape)
+        return value, slope, bend
 
     def arc_length(self, xi: Array) -> Array:
         """Length ``(n, m)`` along the curve from its start to ``xi`` ``(m,)``, or ``(n, m)``, of each facet."""

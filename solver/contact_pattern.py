@@ -62,5 +62,6 @@ class ContactPattern:
                 all_pairs(trace[facet], there)
                 all_pairs(there, own[facet])
                 all_pairs(there, there)
-        unique = np.unique(np.stack([np.concatenate(rows), np.concatenate(columns)]), axis=1)
-        return unique[0], unique[1]
+        row, column = np.concatenate(rows), np.concatenate(columns)
+        size = 1 + max(row.max(), column.max())
+        return np.divmod(np.unique(row * size + column), size)
