@@ -497,7 +497,10 @@ class Equilibrium:
             return Newton(True, "converged", iterations, self._residuals, None, self._flips)
         reason = self._failure or _REASONS.get(code, f"SNES reason {code}")
         if self._border is not None and self._border.came_free:
-            reason = "nothing resists the force, the pin has come free"
+            pressed = self.load > 0 and self.contact is not None and self.contact.n_active() > 0
+            reason = (
+                "the joint has no stiffness left" if pressed else "nothing resists the force, the pin has come free"
+            )
         increment = max((p.increment() for p in self._plastic_points()), default=0.0)
         increment = self.comm.allreduce(increment, op=MPI.MAX)
         return Newton(False, reason, iterations, self._residuals, self._worst_place(), self._flips, increment)

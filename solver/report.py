@@ -206,8 +206,8 @@ def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residu
     said = []
     if joint.scene.joint.model == "block" and any(p.in_contact[-1] > 0 for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
-    touching = min(int((p.in_contact > 0).sum()) for p in profiles.values())
-    if m.contact_area and 0 < touching < _FEW_FACETS:
+    touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
+    if m.contact_area and touching < _FEW_FACETS:
         said.append(
             f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
         )
