@@ -40,6 +40,7 @@ class Bordered:
         self._stale, self.came_free = True, False
         self._x, self._y = A.createVecs()
         self._along_b = np.zeros(self._n)
+        self._ksp = PETSc.KSP()
         size = (self._n + self._extra, None)
         self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=comm)
         self.matrix.setUp()
@@ -48,6 +49,7 @@ class Bordered:
     def replace(self, A: PETSc.Mat) -> None:
         """Border another matrix ``A`` of the same size."""
         self._A, self._stale = A, True
+        self._ksp.destroy()
         self._ksp = PETSc.KSP().create(self.comm)
         direct_solver(self._ksp, A)
 

@@ -224,7 +224,8 @@ class Equilibrium:
         symmetric."""
         action = create_vector(self.V.dofmap.index_map, 2)
         self.bulk.add_action(self._direction, action)
-        bulk = action.array_r.reshape(-1, 2)
+        bulk = action.array_r.reshape(-1, 2).copy()
+        action.destroy()
         d = self.comm.allreduce(float((bulk * self._rate[: self.n_owned]).sum()))
         b, c = bulk.copy(), bulk.copy()
         if blocks is not None:
