@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx.mesh import Mesh
 
+from archord.kernels.compiled import library, pointer
+
 Array = npt.NDArray[np.float64]
 
-BULK_QUADRATURE_DEGREE = 2  # three points a triangle: full rank for P2, and no volumetric locking
 CONTACT_POINTS = 4  # Gauss points a contact facet
 
 
@@ -56,7 +57,7 @@ def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) 
     inverse[..., 0, 0], inverse[..., 1, 1] = J[..., 1, 1] / det, J[..., 0, 0] / det
     inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1] / det, -J[..., 1, 0] / det
     gradient = np.einsum(f"j{at},nqji->nqai", table[1:], inverse)
-    return CellBasis(table[0], gradient, point, J)
+    return CellBasis(table[0], np.ascontiguousarray(gradient), point, J)
 
 
 def _tabulate(degree: int, X: Array) -> Array:
@@ -65,9 +66,14 @@ def _tabulate(degree: int, X: Array) -> Array:
     return table.reshape(3, *X.shape[:-1], table.shape[-1])
 
 
-def bulk_quadrature() -> tuple[Array, Array]:
+def bulk_quadrature_degree(degree: int) -> int:
+    """Degree of the bulk rule for displacements of the given ``degree``: full rank, and no volumetric locking."""
+    return 2 * degree - 2
+
+
+def bulk_quadrature(degree: int) -> tuple[Array, Array]:
     """Points ``(q, 2)`` and weights ``(q,)`` of the bulk rule on the reference triangle."""
-    return basix.make_quadrature(basix.CellType.triangle, BULK_QUADRATURE_DEGREE)
+    return basix.make_quadrature(basix.CellType.triangle, bulk_quadrature_degree(degree))
 
 
 def strain_matrix(gradient: Array) -> Array:
@@ -78,7 +84,14 @@ def strain_matrix(gradient: Array) -> Array:
     return B
 
 
-def strain(gradient: Array, u: Array) -> Array:
-    """Strain ``(n, q, 3)`` from gradients ``(n, q, a, 2)`` and nodal displacements ``(n, a, 2)``."""
-    grad = np.einsum("nqaj,nai->nqij", gradient, u, optimize=True)
-    return np.stack([grad[..., 0, 0], grad[..., 1, 1], grad[..., 0, 1] + grad[..., 1, 0]], axis=-1)
+_STRAINS = """void strains(int32_t n, int32_t q, int32_t a, const double *gradient, const int32_t *dofs,
+    const double *u, double *strain);"""
+
+
+def strain(gradient: Array, dofs: npt.NDArray[np.int32], u: Array) -> Array:
+    """Strain ``(n, q, 3)`` from gradients ``(n, q, a, 2)``, nodes ``(n, a)`` and nodal displacements ``(nodes, 2)``."""
+    n, q, a, _ = gradient.shape
+    result = np.empty((n, q, 3))
+    arguments = map(pointer, (gradient, dofs, u, result))
+    library("strain", _STRAINS).strains(n, q, a, *arguments)
+    return result

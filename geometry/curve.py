@@ -11,12 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from archord.kernels.compiled import library, pointer
+
 Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
+Index = npt.NDArray[np.integer]
 
 _END_MARGIN = 0.05  # a polynomial facet may be continued by this much beyond a free end of its curve
 _CONTINUED = 0.5  # and a facet by this much where points are to stay on theirs
-_NEWTON_STEPS = 30
+_PROTOTYPE = """int32_t closest_points(int32_t m, const double *x, const double *outward, int32_t n_facets, int32_t p,
+    const double *X, const double *coefficients, const int32_t *home, int32_t reach, double margin, double end_margin,
+    int32_t *facet, double *xi, double *point, double *normal, double *tangent, double *bend, double *shape,
+    double *slope, uint8_t *slides, uint8_t *found, int32_t *lost);"""
 
 
 class ProjectionError(RuntimeError):
@@ -46,7 +51,7 @@ class Projection:
 def lagrange(degree: int) -> Array:
     """Monomial coefficients ``(degree + 1, degree + 1)`` of the Lagrange polynomials of equispaced nodes in [0, 1]."""
     nodes = np.linspace(0.0, 1.0, degree + 1)
-    return np.linalg.inv(np.vander(nodes, increasing=True)).T
+    return np.ascontiguousarray(np.linalg.inv(np.vander(nodes, increasing=True)).T)
 
 
 class Curve:
@@ -120,58 +125,25 @@ class Curve:
     def _project(
         self, x: Array, outward: Array, displacement: Array, home: Index, reach: int = 1, margin: float = 0.0
     ) -> Projection:
-        m = len(x)
-        by_facet = (self.X + displacement)[self.connectivity]
-        facet = np.clip(home[:, None] + np.arange(-reach, reach + 1), 0, self.n_facets - 1)
-        xi = np.where(facet < home[:, None], 1.0, np.where(facet > home[:, None], 0.0, 0.5))
-        low = np.where(facet == 0, -_END_MARGIN, -margin)
-        high = np.where(facet == self.n_facets - 1, 1.0 + _END_MARGIN, 1.0 + margin)
-        control = by_facet[facet]
-        target = x[:, None, :]
-        for _ in range(_NEWTON_STEPS):
-            N, dN, ddN = self.shapes(xi)
-            y, t, k = (np.einsum("mca,mcai->mci", s, control) for s in (N, dN, ddN))
-            d = target - y
-            speed2 = (t * t).sum(-1)
-            # beyond the centre of curvature the distance is no longer convex: fall back to the first-order metric
-            metric = speed2 - (d * k).sum(-1)
-            metric = np.where(metric > 0.1 * speed2, metric, speed2)
-            new = np.clip(xi + (d * t).sum(-1) / metric, low, high)
-            moved = np.abs(new - xi).max(initial=0.0)
-            xi = new
-            if moved < 1e-14:
-                break
-        N, dN, ddN = self.shapes(xi)
-        y, t, k = (np.einsum("mca,mcai->mci", s, control) for s in (N, dN, ddN))
-        d = target - y
-        best = np.argmin((d * d).sum(-1), axis=1)
-        pick = (np.arange(m), best)
-        facet, xi, d, t, k = facet[pick], xi[pick], d[pick], t[pick], k[pick]
-        speed = np.linalg.norm(t, axis=1)
-        normal = np.stack([t[:, 1], -t[:, 0]], axis=1) / speed[:, None]
-        along = (d * t).sum(1) / speed**2  # what is left of the Newton step, in xi
-        clamped = (xi <= low[pick]) | (xi >= high[pick])
-        first, last = facet == 0, facet == self.n_facets - 1
-        beyond = (first & (xi <= -_END_MARGIN) & (along < 0)) | (last & (xi >= 1 + _END_MARGIN) & (along > 0))
-        lost = ~clamped & (np.abs(along) > 1e-9 * (1 + np.linalg.norm(d, axis=1) / speed))
-        if lost.any():
-            at = x[lost][0]
-            message = f"{lost.sum()} contact points found no closest point, the first at ({at[0]:g}, {at[1]:g})"
+        m, k = len(x), self.degree + 1
+        displaced = self.X + displacement
+        facet, lost = np.empty(m, dtype=np.int32), np.zeros(1, dtype=np.int32)
+        xi, bend, shape, slope = np.empty(m), np.empty(m), np.empty((m, k)), np.empty((m, k))
+        point, normal, tangent = (np.empty((m, 2)) for _ in range(3))
+        slides, found = np.empty(m, dtype=bool), np.empty(m, dtype=bool)
+        x, outward, home = np.ascontiguousarray(x), np.ascontiguousarray(outward), home.astype(np.int32, copy=False)
+        curve = (displaced, self._coefficients, home)
+        results = (facet, xi, point, normal, tangent, bend, shape, slope, slides, found, lost)
+        n_lost = library("closest_point", _PROTOTYPE).closest_points(
+            m, pointer(x), pointer(outward), self.n_facets, self.degree, *map(pointer, curve), reach, margin,
+            _END_MARGIN, *map(pointer, results),
+        )  # fmt: skip
+        if n_lost:
+            at = x[lost[0]]
+            message = f"{n_lost} contact points found no closest point, the first at ({at[0]:g}, {at[1]:g})"
             raise ProjectionError(message)
-        facing = (normal * outward).sum(1) < 0
-        return Projection(
-            found=~beyond & facing,
-            point=y[pick],
-            normal=normal,
-            tangent=t,
-            bend=(normal * k).sum(1),
-            slides=~clamped,
-            nodes=self.connectivity[facet],
-            shape=N[pick],
-            slope=dN[pick],
-            facet=facet,
-            xi=xi,
-        )
+        nodes = self.connectivity[facet]
+        return Projection(found, point, normal, tangent, bend, slides, nodes, shape, slope, facet, xi)
 
 
 class RigidCircle:
@@ -196,6 +168,6 @@ class RigidCircle:
             nodes=np.zeros((m, 1), dtype=np.int64),
             shape=np.ones((m, 1)),
             slope=np.zeros((m, 1)),
-            facet=np.zeros(m, dtype=np.int64),
+            facet=np.zeros(m, dtype=np.int32),
             xi=np.zeros(m),
         )

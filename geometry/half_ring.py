@@ -25,6 +25,7 @@ def half_ring(
     core_radius: float,
     *,
     size_ratio: float = 1.0,
+    degree: int = 2,
     partitioner=None,
 ) -> JointMesh:
     """Mesh the half joint with second-order curved triangles, ``element_size`` long on the hole's arc and
@@ -69,4 +70,4 @@ def half_ring(
         radii = {Facets.PIN_ARC: 1.0, Facets.HOLE_ARC: hole, Facets.BLOCK_HELD: outer}
         return on_circle(x, (0.0, 0.0), radii[Facets(tag)]) if tag in radii else x
 
-    return JointMesh(*gmsh_to_mesh(comm, build, exact, scale=radius, partitioner=partitioner))
+    return JointMesh(*gmsh_to_mesh(comm, build, exact, order=degree, scale=radius, partitioner=partitioner))

@@ -25,6 +25,7 @@ def quarter_joint(
     growth: float,
     *,
     size_ratio: float = 1.0,
+    degree: int = 2,
     rigid_pin: bool = False,
     partitioner=None,
 ) -> JointMesh:
@@ -68,4 +69,4 @@ def quarter_joint(
             return on_circle(x, (0.0, 1 - hole), 1.0)
         return on_circle(x, (0.0, 0.0), hole) if tag == Facets.HOLE_ARC else x
 
-    return JointMesh(*gmsh_to_mesh(comm, build, exact, scale=radius, partitioner=partitioner))
+    return JointMesh(*gmsh_to_mesh(comm, build, exact, order=degree, scale=radius, partitioner=partitioner))

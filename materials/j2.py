@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from archord.kernels.compiled import library, pointer
 from archord.materials.elasticity import Array, Plane, elastic_tangent, lame
 
 
@@ -63,37 +64,22 @@ class J2Material:
         return self.yield_stress * peeq + 0.5 * self.hardening * peeq**2
 
 
+_PROTOTYPE = """int32_t radial_return(int32_t n, const double *strain, const double *old_plastic,
+    const double *old_peeq, double lam, double mu, double yield_stress, double hardening, const double *elastic,
+    double *stress, double *moduli, double *plastic, double *peeq);"""
+
+
 def _radial_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Array, Array, PlasticState]:
     """Plane strain: ``d_peeq = (q - sigma_y) / (3 mu + H)`` scales the trial deviator by ``1 - 3 mu d_peeq / q``."""
-    lam, mu = lame(m.E, m.nu)
-    elastic = -old.plastic_strain
-    elastic[:, 0] += strain[:, 0]
-    elastic[:, 1] += strain[:, 1]
-    elastic[:, 3] += 0.5 * strain[:, 2]
-    pressure = (lam + 2 * mu / 3) * elastic[:, :3].sum(axis=1)
-    deviator = 2 * mu * elastic
-    deviator[:, :3] -= deviator[:, :3].mean(axis=1, keepdims=True)
-    stress = deviator.copy()
-    stress[:, :3] += pressure[:, None]
-    tangent = np.broadcast_to(elastic_tangent(m.E, m.nu, "strain"), (len(strain), 3, 3)).copy()
-    q = np.sqrt(1.5 * ((deviator[:, :3] ** 2).sum(axis=1) + 2 * deviator[:, 3] ** 2))
-
-    p = np.flatnonzero(q > m.yield_stress + m.hardening * old.peeq)
-    if not len(p):
-        return stress, tangent, old
-    plastic_strain, peeq = old.plastic_strain.copy(), old.peeq.copy()
-    d_peeq = (q[p] - m.yield_stress - m.hardening * peeq[p]) / (3 * mu + m.hardening)
-    scale = 3 * mu * d_peeq / q[p]
-    peeq[p] += d_peeq
-    plastic_strain[p] += (1.5 * d_peeq / q[p])[:, None] * deviator[p]
-    stress[p] -= scale[:, None] * deviator[p]
-
-    normal = deviator[p][:, [0, 1, 3]] * (np.sqrt(1.5) / q[p])[:, None]
-    shear_loss = 2 * mu * (3 * mu / (3 * mu + m.hardening) - scale)
-    deviatoric = np.array([[2 / 3, -1 / 3, 0.0], [-1 / 3, 2 / 3, 0.0], [0.0, 0.0, 0.5]])
-    tangent[p] -= (2 * mu * scale)[:, None, None] * deviatoric
-    tangent[p] -= shear_loss[:, None, None] * normal[:, :, None] * normal[:, None, :]
-    return stress, tangent, PlasticState(plastic_strain, peeq)
+    n, strain = len(strain), np.ascontiguousarray(strain, dtype=float)
+    stress, tangent = np.empty((n, 4)), np.empty((n, 3, 3))
+    new = PlasticState(np.empty((n, 4)), np.empty(n))
+    inputs = map(pointer, (strain, old.plastic_strain, old.peeq))
+    outputs = map(pointer, (stress, tangent, new.plastic_strain, new.peeq))
+    elastic, moduli = elastic_tangent(m.E, m.nu, "strain"), lame(m.E, m.nu)
+    radial_return = library("radial_return", _PROTOTYPE).radial_return
+    yielding = radial_return(n, *inputs, *moduli, m.yield_stress, m.hardening, pointer(elastic), *outputs)
+    return stress, tangent, new if yielding else old
 
 
 def _projected_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Array, Array, PlasticState]:

@@ -18,7 +18,7 @@ from dolfinx.fem import petsc as fem_petsc
 from dolfinx.mesh import MeshTags
 from petsc4py import PETSc
 
-from archord.geometry.basis import BULK_QUADRATURE_DEGREE, Array, bulk_quadrature, cell_basis, strain
+from archord.geometry.basis import Array, bulk_quadrature, bulk_quadrature_degree, cell_basis, strain
 from archord.materials.elasticity import Elastic, elastic_stress, elastic_tangent, mean_stress, von_mises
 from archord.solver.points import PlasticPoints, material_points
 
@@ -103,8 +103,9 @@ class _PlasticBody:
     """Quadrature data of one plastic body: gradients, weights, points with history."""
 
     def __init__(self, V: fem.FunctionSpace, cells: np.ndarray, material) -> None:
-        X, w = bulk_quadrature()
-        basis = cell_basis(V.mesh, V.element.basix_element.degree, cells, X)
+        degree = V.element.basix_element.degree
+        X, w = bulk_quadrature(degree)
+        basis = cell_basis(V.mesh, degree, cells, X)
         self.cells = cells
         self.dofs = V.dofmap.list[cells]
         self.gradient = basis.gradient
@@ -119,6 +120,8 @@ class Bulk:
     def __init__(self, V: fem.FunctionSpace, tags: MeshTags, bodies: list[Body]) -> None:
         self.V = V
         self.bodies = bodies
+        self.degree = V.element.basix_element.degree
+        rule = bulk_quadrature_degree(self.degree)
         n_owned = V.mesh.topology.index_map(2).size_local
         cells = {body.tag: tags.find(body.tag) for body in bodies}
         self.cells = {tag: c[c < n_owned] for tag, c in cells.items()}
@@ -136,16 +139,16 @@ class Bulk:
                 for value in elastic_tangent(m.E, m.nu, m.plane)[[0, 0, 2], [0, 1, 2]]
             )
             dx = ufl.Measure(
-                "dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": BULK_QUADRATURE_DEGREE}
+                "dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": rule}
             )
             eu, ev = _voigt(u), _voigt(v)
             sigma = ufl.as_vector([c11 * eu[0] + c12 * eu[1], c12 * eu[0] + c11 * eu[1], c33 * eu[2]])
             self._elastic_forms.append(fem.form(ufl.inner(sigma, ev) * dx(1)))
         if self._plastic:
             cell = V.mesh.basix_cell()
-            metadata = {"quadrature_degree": BULK_QUADRATURE_DEGREE, "quadrature_rule": "default"}
+            metadata = {"quadrature_degree": rule, "quadrature_rule": "default"}
             element = {
-                shape: basix.ufl.quadrature_element(cell, shape, degree=BULK_QUADRATURE_DEGREE)
+                shape: basix.ufl.quadrature_element(cell, shape, degree=rule)
                 for shape in ((3,), (3, 3))
             }
             self._sigma = fem.Function(fem.functionspace(V.mesh, element[(3,)]))
@@ -181,7 +184,7 @@ class Bulk:
     def update(self, u: Array) -> None:
         """Return-map the plastic bodies at the nodal displacements ``u`` ``(n_nodes, 2)`` of this rank."""
         for body in self._plastic.values():
-            eps = strain(body.gradient, u[body.dofs]).reshape(-1, 3)
+            eps = strain(body.gradient, body.dofs, u).reshape(-1, 3)
             body.stress, tangent = body.points.update(eps)
             n, q = body.weight.shape
             sigma = self._sigma.x.array.reshape(-1, q, 3)
@@ -263,13 +266,13 @@ class Bulk:
 
     def _elastic_points(self, u: Array) -> Iterator[tuple[np.ndarray, Array, Array, Array]]:
         """Cells ``(n,)``, weights ``(n, q)``, strains ``(n q, 3)`` and stresses ``(n q, 4)`` of each elastic body."""
-        X, w = bulk_quadrature()
+        X, w = bulk_quadrature(self.degree)
         for body in self.bodies:
             m = body.material
             if isinstance(m, Elastic):
                 cells = self.cells[body.tag]
-                basis = cell_basis(self.V.mesh, self.V.element.basix_element.degree, cells, X)
-                eps = strain(basis.gradient, u[self.V.dofmap.list[cells]]).reshape(-1, 3)
+                basis = cell_basis(self.V.mesh, self.degree, cells, X)
+                eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)
                 yield cells, basis.measure * w, eps, elastic_stress(eps, m.E, m.nu, m.plane)
 
 

@@ -37,7 +37,7 @@ from archord.solver.contact_pairing import Kinematics, Pairing
 from archord.solver.contact_pattern import ContactPattern
 from archord.solver.contact_segments import segment_rule
 from archord.solver.contact_side import ContactSide
-from archord.solver.contact_tangent import entries
+from archord.solver.contact_tangent import ContactTangent
 from archord.solver.points import PlasticPoints
 
 GAMMA_FACTOR = 0.5  # twice the bound of coercivity; larger values stiffen the edge of the contact and cost iterations
@@ -94,6 +94,7 @@ class Contact:
                 if pair.side is sides[0]:
                     pair.projection = replace(pair.projection, normal=-pair.side.outward.reshape(-1, 2))
         self._pattern = ContactPattern(self.comm, self.pairings)
+        self._tangent: ContactTangent | None = None
 
     def search(self) -> None:
         """Forget where the pairs were: the next evaluation searches them anew, over whole curves."""
@@ -128,7 +129,10 @@ class Contact:
                 failure = str(error)
                 break
         self._raise_together(failure)
-        return self.kinematics == "current" and self._pattern.extend()
+        grew = self.kinematics == "current" and self._pattern.extend()
+        if grew:
+            self._tangent = None
+        return grew
 
     def _raise_together(self, failure: str | None) -> None:
         """Raise `ProjectionError` on every rank if any rank reports a ``failure``, and forget the pairs."""
@@ -159,11 +163,12 @@ class Contact:
         for side in self.sides:
             side.add_to_owned(side.sum_over_ranks(on_curve[id(side)]), force)
 
-    def tangent(self) -> tuple[np.ndarray, np.ndarray, Array]:
-        """Derivative of what `add_force` adds: blocks ``(n, 2, 2)`` at ``rows`` and ``columns`` ``(n,)`` in global
-        dofs, some places several times. Returns ``(rows, columns, blocks)``."""
-        rows, columns, values = zip(*(entries(pair) for pair in self.pairings), strict=True)
-        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+    @property
+    def tangent(self) -> ContactTangent:
+        """Derivative of what `add_force` adds; another one whenever the pattern had to grow."""
+        if self._tangent is None:
+            self._tangent = ContactTangent(self.pairings, self._pattern.reach)
+        return self._tangent
 
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
         """Block ``(rows, columns)`` in global dofs that the contact may fill, the same on every rank."""

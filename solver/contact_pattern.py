@@ -17,13 +17,13 @@ class ContactPattern:
     def __init__(self, comm: MPI.Comm, pairings: list[Pairing]) -> None:
         self.comm, self.pairings = comm, pairings
         # per pairing, first and last opposite facet of every facet of the curve; empty: first > last
-        self._reach = [np.tile([np.iinfo(np.int64).max, -1], (p.side.curve.n_facets, 1)) for p in pairings]
+        self.reach = [np.tile([np.iinfo(np.int64).max, -1], (p.side.curve.n_facets, 1)) for p in pairings]
         self.extend()
 
     def extend(self) -> bool:
         """Widen the ranges to hold the pairs of the last evaluation; True if any rank had to."""
         grew = False
-        for pair, reach in zip(self.pairings, self._reach, strict=True):
+        for pair, reach in zip(self.pairings, self.reach, strict=True):
             if isinstance(pair.opposite, ContactSide):
                 grew |= self._widen(pair, pair.opposite.curve.n_facets - 1, reach)
         return grew
@@ -50,7 +50,7 @@ class ContactPattern:
             rows.append(np.repeat(r, c.shape[1], axis=1).ravel())
             columns.append(np.tile(c, (1, r.shape[1])).ravel())
 
-        for pair, reach in zip(self.pairings, self._reach, strict=True):
+        for pair, reach in zip(self.pairings, self.reach, strict=True):
             own = pair.side.curve_cell_dofs
             trace = pair.side.curve_dofs[pair.side.curve.connectivity]
             all_pairs(trace, own)

@@ -31,7 +31,7 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     segments = max(len(b) for b in breaks) - 1
     ends = np.array([_refined(b, segments) for b in breaks])
     # three points are exact for a quadratic pressure against quadratic shape functions, but for the curve's measure
-    x, w = np.polynomial.legendre.leggauss(CONTACT_POINTS if segments == 1 else 3)
+    x, w = np.polynomial.legendre.leggauss(own.degree + 2 if segments == 1 else own.degree + 1)
     length = np.diff(ends, axis=1)[:, :, None]
     xi = ends[:, :-1, None] + length * (x + 1) / 2
     return xi.reshape(own.n_facets, -1), (length * w / 2).reshape(own.n_facets, -1)

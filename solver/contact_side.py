@@ -62,9 +62,9 @@ class ContactSide:
         sort = np.argsort(facet)
         self.facet = facet[sort]
         self.cells = cells[sort]
-        self.cell_dofs = cell_dofs[sort]
+        self.cell_dofs = cell_dofs[sort].astype(np.int32)
         self.cell_global = global_dofs[sort]
-        self.trace = trace[sort]
+        self.trace = trace[sort].astype(np.int32)
         self._flipped = flipped[sort]
         self._local_facet = local_facets[sort]
         owned = self.curve_dofs - index_map.local_range[0]
@@ -94,7 +94,7 @@ class ContactSide:
         length = np.linalg.norm(tangent, axis=-1)
         self.weight = length * w[self.facet]
         self.outward = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
-        self.point, self.gradient, self.shape = basis.point, basis.gradient, basis.shape
+        self.point, self.gradient, self.shape = basis.point, basis.gradient, np.ascontiguousarray(basis.shape)
         self.points = material_points(self.material, self.weight.size)
 
     def _trace_inequality(self) -> Array:
@@ -107,7 +107,7 @@ class ContactSide:
         if not len(self.cells):
             return np.zeros(0)
         C = self.points.elastic_tangent
-        X, w = bulk_quadrature()
+        X, w = bulk_quadrature(self.degree)
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
         B = strain_matrix(basis.gradient)
         energy = np.einsum("nq,nqia,ij,nqjb->nab", basis.measure * w, B, C, B, optimize=True)
@@ -149,10 +149,9 @@ class ContactSide:
 
     def deform(self, u: Array) -> tuple[Array, Array, Array]:
         """Own displacement ``(n, q, 2)``, stress ``(n, q, 4)`` and tangent ``(n, q, 3, 3)`` at the contact points."""
-        nodal = u[self.cell_dofs]
-        displacement = np.einsum("nqa,nai->nqi", self.shape, nodal)
+        displacement = self.shape @ u[self.cell_dofs]
         n, q = self.weight.shape
-        stress, tangent = self.points.update(strain(self.gradient, nodal).reshape(-1, 3))
+        stress, tangent = self.points.update(strain(self.gradient, self.cell_dofs, u).reshape(-1, 3))
         return displacement, stress.reshape(n, q, 4), tangent.reshape(n, q, 3, 3)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -17,6 +18,7 @@ from archord.solver.bulk import Body, Bulk
 from archord.solver.contact import Contact
 from archord.solver.contact_side import ContactSide
 from archord.solver.equilibrium import Equilibrium, Support
+from archord.solver.newton import NewtonSolver
 from archord.solver.scene import Scene
 from archord.solver.timer import Timer
 
@@ -36,7 +38,9 @@ class Joint:
         with self.timer("mesh"):
             self.model = self._mesh(partitioner)
         with self.timer("setup"):
-            self.V = fem.functionspace(self.model.mesh, ("Lagrange", 2, (2,)))
+            self.V = fem.functionspace(self.model.mesh, basix.ufl.element(
+                    "P", "triangle", analysis.degree, shape=(2,), lagrange_variant=basix.LagrangeVariant.equispaced
+                ))
             solids = {Cells.PIN: scene.pin.solid, Cells.BLOCK: scene.block}
             materials = {tag: s.material(analysis.plane) for tag, s in solids.items() if s is not None}
             self.bulk = Bulk(self.V, self.model.cells, [Body(tag, m) for tag, m in materials.items()])
@@ -63,9 +67,10 @@ class Joint:
                 by_force=0.5 if scene.force_controlled and geometry.model == "block" else None,
                 load_name="P" if scene.force_controlled else "delta",
                 travel=self._travel(),
-                tolerance=analysis.tolerance,
-                max_iterations=analysis.max_iterations,
                 timer=self.timer,
+            )
+            self.solver = NewtonSolver(
+                self.equilibrium, tolerance=analysis.tolerance, max_iterations=analysis.max_iterations
             )
 
     def _mesh(self, partitioner) -> JointMesh:
@@ -73,9 +78,9 @@ class Joint:
         sizes = (g.radius, g.dR, g.W, g.h, g.growth)
         if g.model == "ring":
             core = self.scene.load.core_radius * g.radius
-            return half_ring(self.comm, *sizes, core, size_ratio=g.size_ratio, partitioner=partitioner)
+            return half_ring(self.comm, *sizes, core, size_ratio=g.size_ratio, degree=self.scene.analysis.degree, partitioner=partitioner)
         rigid = self.scene.pin.rigid
-        return quarter_joint(self.comm, *sizes, size_ratio=g.size_ratio, rigid_pin=rigid, partitioner=partitioner)
+        return quarter_joint(self.comm, *sizes, size_ratio=g.size_ratio, degree=self.scene.analysis.degree, rigid_pin=rigid, partitioner=partitioner)
 
     def _core_force(self) -> Array:
         """Downward nodal forces ``(n_owned, 2)`` of half a unit force, spread over the core as ``1 - (r/core)^2``."""

@@ -15,12 +15,14 @@ class ElasticPoints:
     def __init__(self, material: Elastic) -> None:
         self.material = material
         self.elastic_tangent = elastic_tangent(material.E, material.nu, material.plane)
+        self._tangent = np.empty((0, 3, 3))
 
     def update(self, strain: Array) -> tuple[Array, Array]:
         """Stress ``(n, 4)`` and tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``."""
         m = self.material
-        tangent = np.broadcast_to(self.elastic_tangent, (len(strain), 3, 3))
-        return elastic_stress(strain, m.E, m.nu, m.plane), tangent
+        if len(self._tangent) != len(strain):
+            self._tangent = np.tile(self.elastic_tangent, (len(strain), 1, 1))
+        return elastic_stress(strain, m.E, m.nu, m.plane), self._tangent
 
     def commit(self) -> None:
         """Nothing to keep."""

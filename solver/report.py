@@ -54,7 +54,7 @@ class Report:
             "mesh": _mesh(joint),
             "model": _model(joint),
             "tolerances": {
-                "newton": joint.equilibrium.tolerance,
+                "newton": joint.solver.tolerance,
                 "gamma_factor": joint.scene.analysis.gamma_factor,
             },
             "restarts": [],

@@ -87,7 +87,7 @@ def solve_scene(
                     on_step(output.add(step, position, work))
 
                 march(
-                    joint.equilibrium,
+                    joint.solver,
                     scene.targets,
                     joint.rigid_translation,
                     rules=scene.stepping,

@@ -9,9 +9,9 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.solver.checkpoint import Checkpoint, collect, restore
-from archord.solver.equilibrium import Newton
 from archord.solver.measures import Measures, Work
 from archord.solver.mesh_order import MeshOrder
+from archord.solver.newton import Newton
 from archord.solver.scene_file import resolved
 from archord.solver.stepping import Position, Step
 

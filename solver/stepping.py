@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.solver.equilibrium import Equilibrium, Newton
+from archord.solver.newton import Newton, NewtonSolver
 from archord.solver.scene import Stepping
 
 _PREDICTOR_LIMIT = 4.0  # an increment is not extrapolated to more than this many times its length
@@ -92,7 +92,7 @@ class Position:
 
 
 def march(
-    equilibrium: Equilibrium,
+    solver: NewtonSolver,
     targets: Sequence[float],
     first_guess: Callable[[float], Array],
     *,
@@ -114,6 +114,7 @@ def march(
     equilibrium before the first step (a pin too large for its hole), whose increment then says nothing about the next.
     Raises `StepFailure`.
     """
+    equilibrium = solver.equilibrium
     at = start or Position()
     size = StepSize(rules)
     size.length = at.size or size.length
@@ -125,8 +126,8 @@ def march(
             end = size.within(passed)
             load = target if end == 1 else begun + end * (target - begun)
             stride = load - at.load
-            guess, fresh = _guess(at, state, stride, load, first_guess)
-            result = equilibrium.solve(load, guess, elastic_first=fresh)
+            guess, afar = _guess(at, state, stride, load, first_guess)
+            result = solver.solve(load, guess, afar=afar)
             record.iterations += result.iterations
             record.attempts.append(result)
             attempted(load, result.iterations)

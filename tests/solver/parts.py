@@ -21,6 +21,7 @@ from archord.solver.bulk import Body, Bulk
 from archord.solver.contact import Contact
 from archord.solver.contact_side import ContactSide
 from archord.solver.equilibrium import Equilibrium, Support
+from archord.solver.newton import NewtonSolver
 
 E, NU = 1.82, 0.3
 YIELD_STRESS = 0.01
@@ -181,8 +182,9 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> tuple[Me
 def solve(V, bulk: Bulk, supports: list[Support], contact: Contact | None, loads) -> Equilibrium:
     """Step through ``loads`` from rest and return the equilibrium at the last; every step must converge."""
     problem = Equilibrium(V, bulk, supports, contact)
+    solver = NewtonSolver(problem)
     for load in loads:
-        result = problem.solve(load, problem.state())
+        result = solver.solve(load, problem.state())
         assert result.converged, result.reason
         problem.commit()
     return problem

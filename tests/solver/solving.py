@@ -37,7 +37,7 @@ def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Sol
         solution.steps.append(measure(joint, len(solution.steps) + 1, step, profiles, work, 0.0, largest))
 
     march(
-        joint.equilibrium,
+        joint.solver,
         scene.targets,
         joint.rigid_translation,
         rules=scene.stepping,

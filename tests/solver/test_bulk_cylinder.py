@@ -10,6 +10,7 @@ from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.materials.j2 import J2Material
 from archord.solver.bulk import Body, Bulk
 from archord.solver.equilibrium import Equilibrium, Support
+from archord.solver.newton import NewtonSolver
 from tests.solver.parts import INNER, ON_X, ON_Y, OUTER, coordinates, edge_nodes, internal_force, quarter_annulus, space
 
 A, B = 1.0, 2.0
@@ -41,9 +42,10 @@ class Cylinder:
         supports = [Support("wall", k, self.inner, self.radial[self.inner, k]) for k in range(2)]
         supports += [Support("x", 1, edge_nodes(V, facets, ON_X)), Support("y", 0, edge_nodes(V, facets, ON_Y))]
         self.problem = Equilibrium(V, self.bulk, supports)
+        self.solver = NewtonSolver(self.problem)
 
     def step(self, wall: float) -> None:
-        result = self.problem.solve(wall, self.problem.state())
+        result = self.solver.solve(wall, self.problem.state())
         assert result.converged, result.reason
         self.u = self.problem.displacement()
         force = internal_force(self.bulk, self.u)

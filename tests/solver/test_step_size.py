@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from archord.solver.equilibrium import Newton
+from archord.solver.newton import Newton
 from archord.solver.scene import Stepping
 from archord.solver.stepping import StepFailure, StepSize, march
 
