@@ -7,7 +7,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Annotated
 
-import typer
+from archord.plain_typer import typer
 
 benchmark = typer.Typer(no_args_is_help=True, help="Benchmarks of the solver.", rich_markup_mode=None)
 

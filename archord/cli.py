@@ -14,12 +14,12 @@ from time import perf_counter
 from typing import Annotated
 
 import click
-import typer
 
 from archord import law_commands
 from archord.benchmark_commands import benchmark
 from archord.deck_commands import export_deck
 from archord.fit_commands import fit
+from archord.plain_typer import typer
 from archord.ranks import launcher_rank, run_on_ranks
 from archord.reproduce_commands import reproduce
 

@@ -6,7 +6,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from archord.plain_typer import typer
 
 
 class Elements(StrEnum):

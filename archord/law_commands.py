@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from archord.plain_typer import typer
 
 if TYPE_CHECKING:
     from archord.postprocess.law import Law, Outside

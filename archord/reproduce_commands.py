@@ -7,7 +7,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Annotated
 
-import typer
+from archord.plain_typer import typer
 
 
 def reproduce(

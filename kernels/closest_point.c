@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdint.h>
 
-enum { MOST = 5, STEPS = 30 }; /* nodes of a facet (degree 4), Newton iterations */
+enum { MOST = 5 }; /* nodes of a facet (degree 4) */
 
 typedef struct {
     double y[2], t[2], k[2]; /* position, first and second derivative */
@@ -40,10 +40,10 @@ static Frame frame(int p, const double *coefficients, const double *X, double xi
 
 /* Newton's method on one facet, kept between low and high. */
 static double closest_on_facet(int p, const double *coefficients, const double *X, const double *x, double xi,
-                               double low, double high)
+                               double low, double high, int32_t steps)
 {
     double N[MOST], dN[MOST];
-    for (int step = 0; step < STEPS; step++) {
+    for (int step = 0; step < steps; step++) {
         const Frame f = frame(p, coefficients, X, xi, N, dN);
         const double d[2] = {x[0] - f.y[0], x[1] - f.y[1]};
         const double speed2 = f.t[0] * f.t[0] + f.t[1] * f.t[1];
@@ -63,22 +63,22 @@ static double closest_on_facet(int p, const double *coefficients, const double *
 /* Returns the number of points that found none, and the first of them in lost. */
 int32_t closest_points(int32_t m, const double *x, const double *outward, int32_t n_facets, int32_t p,
                        const double *X, const double *coefficients, const int32_t *home, int32_t reach, double margin,
-                       double end_margin, int32_t *facet, double *xi, double *point, double *normal, double *tangent,
+                       double end_margin, int32_t steps, int32_t *facet, double *xi, double *point, double *normal, double *tangent,
                        double *bend, double *shape, double *slope, uint8_t *slides, uint8_t *found, int32_t *lost)
 {
     int32_t n_lost = 0;
     for (int32_t i = 0; i < m; i++, x += 2, outward += 2) {
         double least = INFINITY, N[MOST], dN[MOST], low_best = 0, high_best = 1;
-        for (int32_t step = -reach; step <= reach; step++) {
-            const int32_t wanted = home[i] + step;
+        for (int32_t away = -reach; away <= reach; away++) {
+            const int32_t wanted = home[i] + away;
             const int32_t k = wanted < 0 ? 0 : wanted >= n_facets ? n_facets - 1 : wanted;
             const double low = k == 0 ? -end_margin : -margin;
             const double high = 1 + (k == n_facets - 1 ? end_margin : margin);
             const double start = k < home[i] ? 1.0 : k > home[i] ? 0.0 : 0.5;
-            const double at = closest_on_facet(p, coefficients, X + 2 * p * k, x, start, low, high);
+            const double at = closest_on_facet(p, coefficients, X + 2 * p * k, x, start, low, high, steps);
             const Frame f = frame(p, coefficients, X + 2 * p * k, at, N, dN);
             const double d2 = (x[0] - f.y[0]) * (x[0] - f.y[0]) + (x[1] - f.y[1]) * (x[1] - f.y[1]);
-            if (d2 < least || step == -reach) {
+            if (d2 < least || away == -reach) {
                 least = d2, facet[i] = k, xi[i] = at, low_best = low, high_best = high;
             }
         }

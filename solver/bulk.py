@@ -112,6 +112,7 @@ class _PlasticBody:
         self.weight = basis.measure * w
         self.points = material_points(material, self.weight.size)
         self.stress = np.zeros((self.weight.size, 4))
+        self.yielding = cells[:0]  # cells that had a point off its elastic tangent at the last update
 
 
 class Bulk:
@@ -125,44 +126,44 @@ class Bulk:
         n_owned = V.mesh.topology.index_map(2).size_local
         cells = {body.tag: tags.find(body.tag) for body in bodies}
         self.cells = {tag: c[c < n_owned] for tag, c in cells.items()}
-        u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-        self._elastic_forms, self._plastic_forms, self._force_forms = [], [], []
+        v = ufl.TestFunction(V)
         self._plastic: dict[int, _PlasticBody] = {}
         for body in bodies:
-            domain = [(1, self.cells[body.tag])]
             if body.plastic:
                 self._plastic[body.tag] = _PlasticBody(V, self.cells[body.tag], body.material)
-                continue
-            m = body.material
-            c11, c12, c33 = (
-                fem.Constant(V.mesh, float(value))
-                for value in elastic_tangent(m.E, m.nu, m.plane)[[0, 0, 2], [0, 1, 2]]
-            )
-            dx = ufl.Measure(
-                "dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": rule}
-            )
-            eu, ev = _voigt(u), _voigt(v)
-            sigma = ufl.as_vector([c11 * eu[0] + c12 * eu[1], c12 * eu[0] + c11 * eu[1], c33 * eu[2]])
-            self._elastic_forms.append(fem.form(ufl.inner(sigma, ev) * dx(1)))
+        forms = {body.tag: self._elastic_form(body, ufl.TrialFunction(V)) for body in bodies}
+        self._elastic_forms = [fem.form(form) for form in forms.values()]
+        self._force_forms = []
         if self._plastic:
-            cell = V.mesh.basix_cell()
-            metadata = {"quadrature_degree": rule, "quadrature_rule": "default"}
-            element = {
-                shape: basix.ufl.quadrature_element(cell, shape, degree=rule)
-                for shape in ((3,), (3, 3))
-            }
+            cell, metadata = V.mesh.basix_cell(), {"quadrature_degree": rule, "quadrature_rule": "default"}
+            element = {shape: basix.ufl.quadrature_element(cell, shape, degree=rule) for shape in ((3,), (3, 3))}
             self._sigma = fem.Function(fem.functionspace(V.mesh, element[(3,)]))
-            self._tangent = fem.Function(fem.functionspace(V.mesh, element[(3, 3)]))
+            self._softening = fem.Function(fem.functionspace(V.mesh, element[(3, 3)]))
             domain = [(1, np.sort(np.concatenate([p.cells for p in self._plastic.values()])))]
-            self._plastic_dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
-            self._force_forms.append(fem.form(ufl.inner(self._sigma, _voigt(v)) * self._plastic_dx))
-            self._plastic_forms.append(fem.form(self._plastic_tangent(u, v)))
-        self._action_form: fem.Form | None = None
+            dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
+            self._force_forms.append(fem.form(ufl.inner(self._sigma, _voigt(v)) * dx))
+            self._softened = self._softening_form(ufl.TrialFunction(V), dx)
+            self._softening_kernel = fem.compile_form(V.mesh.comm, self._softened)
+        self._action_forms: list[fem.Form] | None = None
+        self._elastic_of = forms
         self.stiffness = None
-        if self._elastic_forms:
-            self.stiffness = matrix(V, self._elastic_forms)
-            assemble(self.stiffness, self._elastic_forms)
+        elastic = [form for body, form in zip(bodies, self._elastic_forms, strict=True) if not body.plastic]
+        if elastic:
+            self.stiffness = matrix(V, elastic)
+            assemble(self.stiffness, elastic)
             self.stiffness.assemble()
+
+    def _elastic_form(self, body: Body, u) -> ufl.Form:
+        """Virtual work of the elastic stresses of ``u`` in ``body``."""
+        m, mesh = body.material, self.V.mesh
+        c11, c12, c33 = (
+            fem.Constant(mesh, float(value)) for value in elastic_tangent(m.E, m.nu, m.plane)[[0, 0, 2], [0, 1, 2]]
+        )
+        domain, rule = [(1, self.cells[body.tag])], bulk_quadrature_degree(self.degree)
+        dx = ufl.Measure("dx", mesh, subdomain_data=domain, metadata={"quadrature_degree": rule})
+        eu, ev = _voigt(u), _voigt(ufl.TestFunction(self.V))
+        sigma = ufl.as_vector([c11 * eu[0] + c12 * eu[1], c12 * eu[0] + c11 * eu[1], c33 * eu[2]])
+        return ufl.inner(sigma, ev) * dx(1)
 
     @property
     def plastic(self) -> bool:
@@ -179,7 +180,7 @@ class Bulk:
 
     def pattern_forms(self) -> list[fem.Form]:
         """Bilinear forms that together span the bulk's matrix pattern."""
-        return [*self._elastic_forms, *self._plastic_forms]
+        return self._elastic_forms
 
     def update(self, u: Array) -> None:
         """Return-map the plastic bodies at the nodal displacements ``u`` ``(n_nodes, 2)`` of this rank."""
@@ -189,8 +190,9 @@ class Bulk:
             n, q = body.weight.shape
             sigma = self._sigma.x.array.reshape(-1, q, 3)
             sigma[body.cells] = body.stress[:, [0, 1, 3]].reshape(n, q, 3)
-            stiffness = self._tangent.x.array.reshape(-1, q, 9)
-            stiffness[body.cells] = tangent.reshape(n, q, 9)
+            softening = (tangent - body.points.elastic_tangent).reshape(n, -1)
+            self._softening.x.array.reshape(-1, 9 * q)[body.cells] = softening
+            body.yielding = body.cells[softening.any(axis=1)]
 
     def add_force(self, u: PETSc.Vec, force: PETSc.Vec) -> None:
         """Add the internal force of the displacement ``u`` (last passed to `update`) to ``force``."""
@@ -202,27 +204,35 @@ class Bulk:
         force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def add_action(self, direction: fem.Function, out: PETSc.Vec) -> None:
-        """Add the tangent of the last `update`, applied to the displacement ``direction``, to ``out``."""
+        """Add the tangent of the last `update`, applied to ``direction`` (always the same function), to ``out``."""
         if self.stiffness is not None:
             self.stiffness.multAdd(direction.x.petsc_vec, out, out)
-        if self._plastic and self._action_form is None:
-            u, v = direction, ufl.TestFunction(self.V)
-            self._action_form = fem.form(self._plastic_tangent(u, v))
-        if self._action_form is not None:
+        if self._action_forms is None:
+            elastic = [ufl.action(self._elastic_of[tag], direction) for tag in self._plastic]
+            softened = [ufl.action(self._softened, direction)] if self._plastic else []
+            self._action_forms = [fem.form(form) for form in elastic + softened]
+        for form in self._action_forms:
             with out.localForm() as local:
-                fem_petsc.assemble_vector(local, self._action_form)
+                fem_petsc.assemble_vector(local, form)
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
-    def _plastic_tangent(self, u, v) -> ufl.Form:
-        return ufl.inner(ufl.dot(self._tangent, _voigt(u)), _voigt(v)) * self._plastic_dx
+    def _softening_form(self, u, dx: ufl.Measure) -> ufl.Form:
+        v = ufl.TestFunction(self.V)
+        return ufl.inner(ufl.dot(self._softening, _voigt(u)), _voigt(v)) * dx
 
     def assemble_elastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
-        """Add the stiffness of the elastic bodies to ``A``."""
+        """Add the elastic stiffness of all bodies to ``A``."""
         assemble(A, self._elastic_forms, bcs)
 
-    def assemble_plastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
-        """Add the consistent tangent of the plastic bodies to ``A``."""
-        assemble(A, self._plastic_forms, bcs)
+    def assemble_softening(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
+        """Add to ``A`` what the consistent tangent lacks to the elastic stiffness, in the cells that yield."""
+        if not self._plastic:
+            return
+        cells = np.sort(np.concatenate([body.yielding for body in self._plastic.values()]))
+        domains = {fem.IntegralType.cell: [(1, cells)]}
+        coefficients = {self._softening: self._softening}
+        form = fem.create_form(self._softening_kernel, [self.V, self.V], self.V.mesh, domains, coefficients, {})
+        assemble(A, [form], bcs)
 
     def commit(self) -> None:
         """Accept the history of the last `update`."""

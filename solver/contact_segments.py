@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from archord.geometry.basis import CONTACT_POINTS
 from archord.geometry.curve import Array, Curve
 
 _SHORTEST = 1e-6  # breaks nearer than this, in xi, are one

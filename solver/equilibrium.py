@@ -27,6 +27,7 @@ from archord.solver.points import PlasticPoints
 from archord.solver.tangent_matrix import TangentMatrix
 from archord.solver.timer import Timer
 
+
 @dataclass(frozen=True)
 class Support:
     """A prescribed displacement: component ``axis`` of the block dofs ``dofs`` of this rank is ``rate * level``.

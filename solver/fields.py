@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -107,7 +106,7 @@ class FieldWriter:
         cell = "".join(_attribute(n, "Scalar", "Cell", data(f"{n_cells}", f"{n}/{at}")) for n in self.names)
         nodal = "".join(_attribute(n, "Vector", "Node", data(f"{n_nodes} 3", f"{n}/{at}")) for n in self.nodal)
         return (
-            f'<Grid Name="{escape(f"step {step}")}" GridType="Uniform">\n<Time Value="{time!r}"/>\n'
+            f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>\n'
             f'<Topology TopologyType="Triangle_6" NumberOfElements="{n_cells}">'
             f"{data(f'{n_cells} 6', 'mesh/cells', 'Int', 8)}</Topology>\n"
             f'<Geometry GeometryType="XYZ">{data(f"{n_nodes} 3", "mesh/coordinates")}</Geometry>\n'

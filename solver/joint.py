@@ -38,9 +38,12 @@ class Joint:
         with self.timer("mesh"):
             self.model = self._mesh(partitioner)
         with self.timer("setup"):
-            self.V = fem.functionspace(self.model.mesh, basix.ufl.element(
+            self.V = fem.functionspace(
+                self.model.mesh,
+                basix.ufl.element(
                     "P", "triangle", analysis.degree, shape=(2,), lagrange_variant=basix.LagrangeVariant.equispaced
-                ))
+                ),
+            )
             solids = {Cells.PIN: scene.pin.solid, Cells.BLOCK: scene.block}
             materials = {tag: s.material(analysis.plane) for tag, s in solids.items() if s is not None}
             self.bulk = Bulk(self.V, self.model.cells, [Body(tag, m) for tag, m in materials.items()])
@@ -76,11 +79,10 @@ class Joint:
     def _mesh(self, partitioner) -> JointMesh:
         g = self.scene.joint
         sizes = (g.radius, g.dR, g.W, g.h, g.growth)
+        options = {"size_ratio": g.size_ratio, "degree": self.scene.analysis.degree, "partitioner": partitioner}
         if g.model == "ring":
-            core = self.scene.load.core_radius * g.radius
-            return half_ring(self.comm, *sizes, core, size_ratio=g.size_ratio, degree=self.scene.analysis.degree, partitioner=partitioner)
-        rigid = self.scene.pin.rigid
-        return quarter_joint(self.comm, *sizes, size_ratio=g.size_ratio, degree=self.scene.analysis.degree, rigid_pin=rigid, partitioner=partitioner)
+            return half_ring(self.comm, *sizes, self.scene.load.core_radius * g.radius, **options)
+        return quarter_joint(self.comm, *sizes, rigid_pin=self.scene.pin.rigid, **options)
 
     def _core_force(self) -> Array:
         """Downward nodal forces ``(n_owned, 2)`` of half a unit force, spread over the core as ``1 - (r/core)^2``."""

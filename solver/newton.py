@@ -69,6 +69,7 @@ class NewtonSolver:
         self._by_and_by = False
         self._raised: BaseException | None = None
         self._failure = ""
+        self._renewed = True  # the last factorisation is of another matrix
         self._snes = self._make_snes()
 
     def _make_snes(self) -> PETSc.SNES:

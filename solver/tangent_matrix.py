@@ -75,7 +75,8 @@ class TangentMatrix:
         if self.contact is None:
             return
         tangent, size = self.contact.tangent, self._index_map.size_global
-        near, at = np.unique(np.concatenate([tangent.rows, tangent.columns]), return_inverse=True)
+        places = np.concatenate([tangent.rows, tangent.columns])
+        near = np.unique(places)
         whole = np.unique(np.concatenate(self.comm.allgather(near)))
         values = np.zeros((2, len(whole), 2))
         start, n = self._index_map.local_range[0], self._index_map.size_local
@@ -86,7 +87,7 @@ class TangentMatrix:
         if self._rigid_rate is not None:
             values[1, whole == size] = self._rigid_rate
         self._near, (free, self._rate_near) = whole, values
-        row, column = np.split(np.searchsorted(whole, near)[at], 2)
+        row, column = np.split(np.searchsorted(whole, places), 2)
         self._row, self._column = row, column
         self._in_matrix = (tangent.rows < size) & (tangent.columns < size)
         self._free = free[row, :, None] * free[column, None, :]
@@ -95,7 +96,7 @@ class TangentMatrix:
         """Assemble ``A``."""
         with self.timer("assemble bulk"):
             self._elastic.copy(self.A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            self.bulk.assemble_plastic(self.A, self._bcs)
+            self.bulk.assemble_softening(self.A, self._bcs)
         with self.timer("assemble contact"):
             if self.contact is not None:
                 self._contact_blocks = self.contact.tangent.blocks()

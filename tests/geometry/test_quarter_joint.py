@@ -37,7 +37,7 @@ def edge_lengths(joint, tag):
 def area(joint, tag, comm=MPI.COMM_SELF):
     n_owned = joint.mesh.topology.index_map(2).size_local
     cells = joint.cells.find(tag)
-    X, w = bulk_quadrature()
+    X, w = bulk_quadrature(2)
     return comm.allreduce(float((cell_basis(joint.mesh, 2, cells[cells < n_owned], X).measure @ w).sum()))
 
 

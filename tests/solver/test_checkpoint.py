@@ -36,7 +36,7 @@ def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
             from archord.geometry.basis import bulk_quadrature, cell_basis
 
             cells = joint.bulk.histories()[int(name)][0]
-            x = cell_basis(joint.V.mesh, 2, cells, bulk_quadrature()[0]).point.reshape(-1, 2)
+            x = cell_basis(joint.V.mesh, 2, cells, bulk_quadrature(2)[0]).point.reshape(-1, 2)
         here[place] = number, x
     parts = comm.allgather(here)
     together = {place: [np.concatenate([p[place][i] for p in parts]) for i in (0, 1)] for place in here}

@@ -66,7 +66,8 @@ def state(comm, pin, block, kinematics, partitioner=None):
     norms += [comm.allreduce((force**2).sum()), *comm.allreduce(np.array(parts.bulk.energies(u)))]
     largest, integral = parts.bulk.peeq()
     norms += [comm.allreduce(largest, op=MPI.MAX), comm.allreduce(integral)]
-    rows, columns, values = parts.contact.tangent()
+    tangent = parts.contact.tangent
+    rows, columns, values = tangent.rows, tangent.columns, tangent.blocks()
     field = np.zeros((parts.V.dofmap.index_map.size_global + 1, 2))  # a rigid pin's is the last
     index_map = parts.V.dofmap.index_map
     start, end = index_map.local_range
