@@ -190,7 +190,7 @@ class Bulk:
             n, q = body.weight.shape
             sigma = self._sigma.x.array.reshape(-1, q, 3)
             sigma[body.cells] = body.stress[:, [0, 1, 3]].reshape(n, q, 3)
-            softening = (tangent - body.points.elastic_tangent).reshape(n, -1)
+            softening = (tangent - body.points.elastic_tangent).reshape(n, 9 * q)
             self._softening.x.array.reshape(-1, 9 * q)[body.cells] = softening
             body.yielding = body.cells[softening.any(axis=1)]
 

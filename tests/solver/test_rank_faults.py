@@ -44,7 +44,7 @@ SCENE = """
 PLACES = {
     "setup": ("solver.bulk", "Bulk", "__init__", 1),
     "residual": ("solver.contact", "Contact", "evaluate", 7),
-    "tangent": ("solver.contact", "Contact", "tangent", 4),
+    "tangent": ("solver.contact_tangent", "ContactTangent", "blocks", 4),
     "return map": ("solver.points", "PlasticPoints", "update", 9),
     "output": ("solver.fields", "FieldWriter", "write", 2),
 }

@@ -13,17 +13,18 @@ from archord.solver.stepping import StepFailure, StepSize, march
 
 
 class Spring:
-    """An equilibrium that converges in ``cost(load, stride)`` iterations, or fails where that is infinite."""
+    """An equilibrium and its solver that converges in ``cost(load, stride)`` iterations, or fails where that is infinite."""
 
     load_name = "delta"
 
     def __init__(self, cost):
         self.cost, self.load, self.at, self.solved = cost, 0.0, 0.0, []
+        self.equilibrium = self
 
     def state(self):
         return np.array([self.at])
 
-    def solve(self, load, guess, *, elastic_first):
+    def solve(self, load, guess, *, afar):
         iterations = self.cost(load, load - self.load)
         self.solved.append(load)
         self.at = load

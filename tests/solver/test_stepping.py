@@ -49,7 +49,7 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
         StepFailure, match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller"
     ):
         march(
-            joint.equilibrium,
+            joint.solver,
             targets,
             joint.rigid_translation,
             rules=Stepping(minimum=1.0),
