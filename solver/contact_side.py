@@ -6,6 +6,8 @@ displacement; each rank integrates the facets of the cells it owns. What a facet
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import basix
 import numpy as np
 from dolfinx import fem
@@ -86,6 +88,7 @@ class ContactSide:
     def place_points(self, xi: Array, w: Array) -> None:
         """Put the contact points at ``xi`` ``(n_facets of the curve, q)`` in (0, 1) with weights ``w``; no history."""
         self.curve_xi = xi
+        self.__dict__.pop("_arc_length", None)
         v0, v1 = _facet_ends(self._local_facet)
         t = np.where(self._flipped[:, None], 1 - xi[self.facet], xi[self.facet])
         basis = cell_basis(self.V.mesh, self.degree, self.cells, v0[:, None] + t[..., None] * (v1 - v0)[:, None])
@@ -124,10 +127,14 @@ class ContactSide:
 
         Points are in the curve's order: that of this rank's arrays, but for ``flipped`` facets, which have it reversed.
         """
-        s = self.curve.arc_length(self.curve_xi)
-        total = self.curve.arc_length(np.ones((self.curve.n_facets, 1)))[-1, 0]
         ends = np.linalg.norm(self.curve.X[[0, -1]] - origin, axis=1)
+        s, total = self._arc_length
         return total - s if ends[1] < ends[0] else s
+
+    @cached_property
+    def _arc_length(self) -> tuple[Array, float]:
+        total = self.curve.arc_length(np.ones((self.curve.n_facets, 1)))[-1, 0]
+        return self.curve.arc_length(self.curve_xi), float(total)
 
     def curve_displacement(self, u: Array) -> Array:
         """Displacement ``(n_nodes, 2)`` of the whole curve, from this rank's nodal displacements ``u`` ``(n, 2)``."""

@@ -1,7 +1,7 @@
 """fields.xdmf and fields.h5: the joint's fields over the steps, for ParaView and pyvista. debug.xdmf and debug.h5: the
 last state that a solve without success tried, with its residual forces and increments of PEEQ.
 
-Displacements are nodal on the curved second-order mesh; stress measures, PEEQ and the contact are means over cells. The
+Displacements are nodal on curved second-order triangles, whatever the degree of the elements; stress measures, PEEQ and the contact are means over cells. The
 arrays are in the order of the mesh generator, whatever the number of ranks. Rank 0 writes.
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.solver.disk import on_root, replace_text
 from archord.solver.mesh_order import MeshOrder
+from archord.solver.second_order import SecondOrder
 from archord.solver.step_file import Shapes, StepFile, open_or_create, step_name
 
 _VTK_ORDER = [0, 1, 2, 5, 3, 4]  # VTK counts edge nodes from the edge between the first two vertices
@@ -42,10 +43,11 @@ class FieldWriter:
             self.names[1:1] = ["peeq", "peeq_increment"] if debug else ["peeq"]
 
         def make() -> StepFile:
-            cells = order.nodes_of_cell[:, _VTK_ORDER]
+            self._nodes = SecondOrder(order.nodes_of_cell, joint.scene.analysis.degree)
+            cells, points = self._nodes.cells[:, _VTK_ORDER], self._nodes(order.coordinates)
             shapes: Shapes = {name: ((len(cells),), "<f8") for name in self.names}
-            shapes |= {name: ((len(order.coordinates), 3), "<f8") for name in self.nodal}
-            fixed = {"mesh/coordinates": order.coordinates, "mesh/cells": cells, "mesh/body": body_of}
+            shapes |= {name: ((len(points), 3), "<f8") for name in self.nodal}
+            fixed = {"mesh/coordinates": points, "mesh/cells": cells, "mesh/body": body_of}
             file = open_or_create(self._data_path, steps, shapes, fixed, after)
             if not after:
                 self._write_xdmf(file)
@@ -71,7 +73,8 @@ class FieldWriter:
         def write() -> None:
             assert self._file is not None
             if not again or self._file.accepted < step:
-                self._file.write(step, load, arrays | {k: np.pad(v, ((0, 0), (0, 1))) for k, v in nodal.items()})
+                vectors = {k: np.pad(self._nodes(v), ((0, 0), (0, 1))) for k, v in nodal.items()}
+                self._file.write(step, load, arrays | vectors)
             self._write_xdmf(self._file)
 
         on_root(joint.comm, write)

@@ -43,7 +43,7 @@ class Gather:
 class MeshOrder:
     """The generator's order of the joint's nodes and cells. Collective.
 
-    ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, 6)`` are the mesh in that order, on rank 0.
+    ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, a)`` are the mesh in that order, on rank 0.
     """
 
     def __init__(self, joint: Joint) -> None:
@@ -51,7 +51,7 @@ class MeshOrder:
         mesh, V = joint.model.mesh, joint.V
         self.n_cells = mesh.topology.index_map(2).size_local
         self._n_local = joint.equilibrium.n_local
-        # displacement dof of every mesh node of this rank: both number the six nodes of a cell alike
+        # displacement dof of every mesh node of this rank: both number the nodes of a cell alike
         self._dof = np.zeros(len(mesh.geometry.x), dtype=np.int64)
         self._dof[mesh.geometry.dofmap.ravel()] = V.dofmap.list.ravel()
         self._n_owned = mesh.geometry.index_map().size_local

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from archord.materials.elasticity import elastic_stress, von_mises
 from archord.materials.j2 import PlasticState
-from archord.solver.bulk import Body, Bulk, assemble, matrix
+from archord.solver.bulk import Body, Bulk, matrix
 from tests.solver.parts import (
     ELASTIC,
     HARDENING,
