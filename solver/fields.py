@@ -1,8 +1,9 @@
 """fields.xdmf and fields.h5: the joint's fields over the steps, for ParaView and pyvista. debug.xdmf and debug.h5: the
 last state that a solve without success tried, with its residual forces and increments of PEEQ.
 
-Displacements are nodal on curved second-order triangles, whatever the degree of the elements; stress measures, PEEQ and the contact are means over cells. The
-arrays are in the order of the mesh generator, whatever the number of ranks. Rank 0 writes.
+Displacements are nodal on curved second-order triangles, whatever the degree of the elements; stress measures, PEEQ and
+the contact are means over cells. The arrays are in the order of the mesh generator, whatever the number of ranks. Rank
+0 writes.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from archord.solver.stepping import StepFailure, StepSize, march
 
 
 class Spring:
-    """An equilibrium and its solver that converges in ``cost(load, stride)`` iterations, or fails where that is infinite."""
+    """Equilibrium and solver in one, which converges in ``cost(load, stride)`` iterations; infinite: it fails."""
 
     load_name = "delta"
 
