@@ -1,0 +1,179 @@
+"""The values that errors are measured against: ``archord benchmark work-precision --reference``.
+
+For each case and kinematics two families of meshes (`archord.benchmarks.work_precision_cases.families`), which refine
+near and far elements in different shares, are extrapolated, each by itself. The finer family gives the value; the
+stated error is what the two differ by or, if that is more, how far an extrapolation moves when one of its meshes is
+left out. The pressure profile is that of the finest mesh; its error is the L2 difference between the two families.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from archord.benchmarks.pressure_profile import ANGLES, profile_error, sampled
+from archord.benchmarks.richardson import extrapolated
+from archord.benchmarks.work_precision_cases import CASES, Case, Kinematics, Series, families
+from archord.geometry.basis import Array
+from archord.postprocess.arc_pressure import SIDES, read_arcs
+from archord.postprocess.run_curve import read_run
+from archord.solver.history import read_history
+from archord.solver.run import solve_scene
+from archord.solver.run_folder import claim_folder
+from archord.solver.scene import Scene, SceneError
+from archord.solver.scene_file import resolved
+
+FILE = Path(__file__).with_name("work_precision_reference.json")
+COLUMNS = {
+    "P": "P/(E* R)",
+    "p0": "p0/E*",
+    "eps": "eps",
+    "dissipation": "plastic_dissipation/(E* R2)",
+}  # of history.csv
+_INDEPENDENT = {
+    ("elastic", "reference"): {
+        "P": 0.012759596231085768,
+        "source": "NGSolve 6.2, fourth order elements, fixed pairs in the touching configuration, linear gap",
+    },
+    ("elastic", "current"): {
+        "P": 0.012778525299802898,
+        "source": "GetFEM 5.4, Q2 elements of 0.5 %R, closest points on the deformed curves, digits to 1e-5",
+    },
+}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Values of a case and their relative errors by quantity; ``profile`` by side, ``(401,)`` at `ANGLES`."""
+
+    values: dict[str, float]
+    errors: dict[str, float]
+    profile: dict[str, Array]
+
+    def error(self, quantity: str, value: float | None) -> float | None:
+        """Relative error of ``value``; None if it is unknown, or the quantity has no reference."""
+        if value is None or not self.values.get(quantity):
+            return None
+        return abs(value / self.values[quantity] - 1)
+
+
+def read_reference(case: str, kinematics: Kinematics = "current") -> Reference:
+    """The stored values. Raises `SceneError` if there are none."""
+    data = _stored().get(case, {}).get(kinematics)
+    if data is None:
+        raise SceneError(
+            f"{FILE.name}: holds no values of the {case} case with {kinematics} kinematics; compute them with "
+            "archord benchmark work-precision --reference."
+        )
+    values = {name: entry["value"] for name, entry in data["quantities"].items()}
+    errors = {name: entry["error"] for name, entry in data["quantities"].items()}
+    return Reference(values, errors, {side: np.array(p) for side, p in data.get("profile", {}).items()})
+
+
+def values_of(folder: Path) -> dict[str, float]:
+    """The quantities of a run's last step."""
+    history = read_history(folder / "history.csv")
+    return {name: history[column][-1] for name, column in COLUMNS.items()}
+
+
+def profile_of(folder: Path) -> dict[str, Array]:
+    """The pressure ``(401,)`` at `ANGLES` by side, at a run's last step."""
+    run = read_run(folder)
+    arcs = read_arcs(run, len(run.delta))
+    return {side: sampled(arcs[side]) for side in SIDES if side in arcs}
+
+
+def compute(
+    case: Case, kinematics: Kinematics, folder: Path, said: Callable[[str], None] = lambda sentence: None
+) -> dict[str, Any]:
+    """Solve both families of ``case`` below ``folder`` (what is done there already is taken) and store the result.
+
+    Raises RuntimeError if a run does not get to its end.
+    """
+    chosen = families(case, kinematics)
+    runs = [_solve(case, kinematics, series, folder, said) for series in chosen]
+    entry: dict[str, Any] = {"quantities": {}, "families": []}
+    for series, found in zip(chosen, runs, strict=True):
+        entry["families"].append({"name": series.name, "runs": [r | {"folder": r["folder"].name} for r in found]})
+    for quantity in COLUMNS:
+        if quantity in case.quantities:
+            entry["quantities"][quantity] = combined(
+                [[(r["element_size"], r[quantity]) for r in found] for found in runs]
+            )
+    finest, other = (profile_of(found[-1]["folder"]) for found in runs)
+    apart = max(profile_error(other[side], finest[side]) for side in finest)
+    entry["quantities"]["profile"] = {"value": 0.0, "error": apart}
+    if kinematics == "current":
+        entry["profile"] = {side: [float(f"{p:.8g}") for p in values] for side, values in finest.items()}
+    if (case.name, kinematics) in _INDEPENDENT:
+        entry["independent"] = _INDEPENDENT[case.name, kinematics]
+    stored = _stored()
+    stored.setdefault(case.name, {})[kinematics] = entry
+    ordered = {name: stored[name] for name in CASES if name in stored}
+    FILE.write_text(_json({"angles": f"{len(ANGLES)} equal ones from 0 to pi/2", "cases": ordered}), encoding="utf-8")
+    return entry
+
+
+def combined(found: list[list[tuple[float, float]]]) -> dict[str, Any]:
+    """Value and relative error from the pairs (element size, value) of each family, the first giving the value."""
+    limits = [extrapolated(*zip(*pairs, strict=True)) for pairs in found]
+    value = limits[0].value
+    error = max(limit.error for limit in limits)
+    error = max([error, *(abs(limit.value - value) for limit in limits[1:])])
+    extrapolations = [{"value": limit.value, "order": limit.order, "moves by": limit.error} for limit in limits]
+    return {"value": value, "error": error / abs(value), "extrapolations": extrapolations}
+
+
+def _solve(
+    case: Case, kinematics: Kinematics, series: Series, folder: Path, said: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    found = []
+    for mesh in series.meshes:
+        scene = case.scene(mesh, kinematics)
+        run = folder / f"{case.name}_{kinematics}_{scene.joint.h:g}_{scene.joint.growth:g}"
+        if not _finished(run, scene):
+            claim_folder(run, force=True)
+            outcome = solve_scene(scene, run)
+            if outcome.status == "interrupted":
+                raise KeyboardInterrupt
+            if outcome.status != "done":
+                raise RuntimeError(f"{run.name}: {outcome.message}")
+        report = json.loads((run / "run.json").read_text(encoding="utf-8"))
+        values = {name: value for name, value in values_of(run).items() if name in case.quantities}
+        found.append(
+            {
+                "element_size": scene.joint.h,
+                "growth": scene.joint.growth,
+                "dofs": report["mesh"]["dofs"],
+                **values,
+                "folder": run,
+            }
+        )
+        said(f"{run.name}: {report['mesh']['dofs']} dofs, {values}, {report['seconds']['total']:.0f} s")
+    return found
+
+
+def _finished(run: Path, scene: Scene) -> bool:
+    if not (run / "run.json").is_file() or not (run / "scene.toml").is_file():
+        return False
+    done = json.loads((run / "run.json").read_text(encoding="utf-8"))["status"] == "done"
+    return done and (run / "scene.toml").read_text(encoding="utf-8") == resolved(scene)
+
+
+def _stored() -> dict[str, dict[str, Any]]:
+    return json.loads(FILE.read_text(encoding="utf-8"))["cases"] if FILE.exists() else {}
+
+
+def _json(data: dict[str, Any]) -> str:
+    """Indented, but for the profiles, which would be a line a number."""
+    text = json.dumps(data, indent=1)
+    for case in data["cases"].values():
+        for entry in case.values():
+            for values in entry.get("profile", {}).values():
+                text = text.replace(json.dumps(values, indent=1).replace("\n", "\n" + " " * 5), json.dumps(values))
+    return text + "\n"
