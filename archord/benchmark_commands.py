@@ -138,10 +138,9 @@ def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, war
     from archord.benchmarks import work_precision as table
     from archord.benchmarks.work_precision_figure import draw
     from archord.benchmarks.work_precision_report import markdown, write_csv
-    from archord.solver.output_file import writing
+    from archord.solver.run_folder import claim_folder
 
-    with writing(output):
-        output.mkdir(parents=True, exist_ok=True)
+    claim_folder(output, force=True)
     found = [t for case in cases for t in table.tasks(case, output / "runs", quick=quick, peers=peers, limit=limit)]
     found = table.chosen(found, only)
 
