@@ -84,7 +84,7 @@ def series_of(lines: list[Line], case: str) -> dict[tuple[str, str], list[Line]]
 
 
 def own_limit(lines: list[Line], case: str, code: str = CALCULIX) -> dict[str, Limit]:
-    """Per series of ``code``, its P extrapolated, where at least three of its meshes were solved.
+    """Per series of ``code``, its P extrapolated from the three finest meshes, where as many were solved.
 
     CalculiX's contact is a penalty: its P converges to a value that is a little smaller than that of exact contact.
     """
@@ -92,7 +92,7 @@ def own_limit(lines: list[Line], case: str, code: str = CALCULIX) -> dict[str, L
     for (name, series), members in series_of(lines, case).items():
         pairs = [(line.task.size, line.point.values.quantities["P"]) for line in members if _has_force(line)]
         if name == code and len({size for size, _ in pairs}) >= 3:
-            sizes, values = zip(*pairs, strict=True)
+            sizes, values = zip(*sorted(pairs)[:3], strict=True)
             found[series] = extrapolated(sizes, values)
     return found
 

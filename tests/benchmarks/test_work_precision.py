@@ -42,7 +42,7 @@ def point(code, series, size, seconds, P, **values):
 # --- extrapolation
 
 
-@pytest.mark.parametrize("order", [1.3, 2.0, 3.7])
+@pytest.mark.parametrize("order", [1.5, 2.0, 3.7])
 def test_richardson_recovers_limit_and_order(order):
     """From three sizes or more, whatever their ratios, the sign and the size of the error."""
     for sizes in ([0.04, 0.02, 0.01], [0.3, 0.17, 0.1, 0.04, 0.01]):
@@ -66,10 +66,10 @@ def test_richardson_states_scatter_as_an_error():
 
 
 def test_two_families_that_differ_make_the_error():
-    """The first gives the value; the error is relative, and at least their difference."""
+    """The value is their mean; the error is relative, and at least their difference."""
     sizes = [0.04, 0.02, 0.01]
     entry = combined([[(h, 2 + h**2) for h in sizes], [(h, 2.002 - h**2) for h in sizes]])
-    assert entry["value"] == pytest.approx(2, abs=1e-7)
+    assert entry["value"] == pytest.approx(2.001, abs=1e-7)
     assert entry["error"] == pytest.approx(1e-3, rel=1e-3)
 
 
@@ -180,7 +180,7 @@ def test_every_series_makes_scenes():
             assert all(len(s.targets) == case.steps and s.target == pytest.approx(0.01) for s in scenes)
             cells = [s.joint.expected_cells for s in scenes]
             assert cells == sorted(cells)
-        for series in families(case, "current"):
+        for series in families(case):
             joints = [case.scene(mesh).joint for mesh in series.meshes]
             assert len(joints) >= 3
             assert np.ptp([j.growth / j.h for j in joints]) < 1e-3
