@@ -36,7 +36,7 @@ def tasks(case: Case, folder: Path, *, quick: bool = False, peers: bool = True, 
     """All points of ``case``; what they need is written below ``folder``."""
     found = list(archord_tasks(case, folder, limit, quick))
     if peers:
-        found += [*calculix_tasks(case, folder, limit, quick), *peer_tasks(case, folder, quick)]
+        found += [*calculix_tasks(case, folder, limit, quick), *peer_tasks(case, folder, limit, quick)]
     return found
 
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import importlib.util
 import json
 import math
+import re
 import shutil
+import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -67,7 +71,10 @@ def _archord_task(case: Case, series: Series, mesh: Mesh, folder: Path, limit: f
             profile_of(run)["hole"] / scene.E_star,
         )
 
-    return Task(case.name, OURS, series.name, label, scene.joint.h, case.steps, command, place, read, limit)
+    return Task(
+        case.name, OURS, series.name, label, scene.joint.h, case.steps, command, place, read, limit,
+        version=importlib.metadata.version("archord"),
+    )  # fmt: skip
 
 
 def calculix_tasks(case: Case, folder: Path, limit: float = LIMIT, quick: bool = False) -> Iterator[Task]:
@@ -95,8 +102,15 @@ def _calculix_task(case: Case, series: DeckSeries, keys: Mesh, folder: Path, lim
     results = tuple(f"joint.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d"))
     return Task(
         case.name, CALCULIX, series.element, label, size, case.steps, ("ccx", "joint"), place, read,
-        limit=limit, export=export, clear=results,
+        limit=limit, export=export, clear=results, version=_calculix_version(),
     )  # fmt: skip
+
+
+@cache
+def _calculix_version() -> str:
+    said = subprocess.run(["ccx", "-v"], capture_output=True, text=True).stdout
+    found = re.search(r"Version (\S+)", said)
+    return found[1] if found else ""
 
 
 def calculix_values(case: Case, scene: Scene, mesh: PlaneMesh, place: Path) -> Values:
@@ -152,17 +166,21 @@ def _iterations(sta: Path) -> int | None:
     return sum(int(row[3]) for row in rows if len(row) >= 6 and row[0].isdigit() and row[3].isdigit())
 
 
-def peer_tasks(case: Case, folder: Path, quick: bool = False) -> Iterator[Task]:
+def peer_tasks(case: Case, folder: Path, limit: float = LIMIT, quick: bool = False) -> Iterator[Task]:
     """Every installed code of `archord.benchmarks.peer_list`, where there is one."""
+    for peer in _installed_peers():
+        for size, order in peer.series.get(case.name, ())[: 1 if quick else None]:
+            yield _peer_task(case, peer, size, order, folder, limit)
+
+
+@cache
+def _installed_peers() -> list[Any]:
     if importlib.util.find_spec(_PEERS) is None:
-        return
-    for peer in importlib.import_module(_PEERS).installed():
-        meshes = peer.series.get(case.name, [])
-        for size, order in meshes[: 1 if quick else None]:
-            yield _peer_task(case, peer, size, order, folder)
+        return []
+    return importlib.import_module(_PEERS).installed()
 
 
-def _peer_task(case: Case, peer: Any, size: float, order: int, folder: Path) -> Task:
+def _peer_task(case: Case, peer: Any, size: float, order: int, folder: Path, limit: float) -> Task:
     series, label = f"order {order}", f"{size:g} R"
     place = (folder / slug(case.name, peer.label, series, label)).resolve()
     output = place / "result.json"
@@ -171,10 +189,9 @@ def _peer_task(case: Case, peer: Any, size: float, order: int, folder: Path) -> 
     def read() -> Values:
         return peer_values(output)
 
-    limit = float(getattr(peer, "time_limit", LIMIT))
     return Task(
-        case.name, peer.label, series, label, size, case.steps, command, place, read, limit=limit,
-        clear=(output.name,),
+        case.name, peer.label, series, label, size, case.steps, command, place, read,
+        limit=min(limit, float(peer.time_limit)), clear=(output.name,), version=peer.version,
     )  # fmt: skip
 
 

@@ -25,6 +25,7 @@ def row(line: Line) -> dict[str, str]:
     entries = {
         "case": task.case,
         "code": task.code,
+        "version": task.version,
         "series": task.series,
         "label": task.label,
         "status": "done" if point.done else "failed",
@@ -62,7 +63,10 @@ def write_csv(lines: list[Line], path: Path) -> None:
 
 def markdown(lines: list[Line], warm: Mapping[str, Sequence[float]] | None = None) -> str:
     """Tables of the points and of the ratios, case by case; ``warm`` are seconds of solves within one process."""
-    out = [f"{processor()}, one thread; medians of {max(len(line.point.seconds) for line in lines)} whole processes."]
+    repeats = max(len(line.point.seconds) for line in lines)
+    codes = dict.fromkeys(f"{line.task.code} {line.task.version}".strip() for line in lines)
+    processes = f"{repeats} whole process{'es' * (repeats != 1)}"
+    out = [f"{processor()}, one core, one thread; median of {processes}; {', '.join(codes)}."]
     for case in CASES.values():
         some = [line for line in lines if line.task.case == case.name]
         if some:

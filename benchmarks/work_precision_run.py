@@ -56,6 +56,7 @@ class Task:
     limit: float = LIMIT
     export: float = 0.0
     clear: tuple[str, ...] = ()  # files of an earlier run, removed before each
+    version: str = ""
 
 
 @dataclass

@@ -260,6 +260,33 @@ def test_the_result_of_a_peer(tmp_path):
         codes.peer_values(file)
 
 
+def test_peers_are_run_if_there_are_any(tmp_path, monkeypatch):
+    """Each with its own time limit or, if it is less, that of the benchmark; nothing where none is installed."""
+
+    class Peer:
+        label, version, time_limit = "other", "1.2", 20.0
+        series = {"elastic": ((0.2, 2), (0.1, 4))}  # noqa: RUF012
+
+        def command(self, case, size, order, steps, output):
+            result = {"P": size * order, "dofs": steps, "kinematics": "reference"}
+            text = f"open({str(output)!r}, 'w').write({json.dumps(json.dumps(result))})"
+            return [sys.executable, "-S", "-c", text]
+
+    monkeypatch.setattr(codes, "_installed_peers", lambda: [Peer()])
+    elastic, plastic = CASES["elastic"], CASES["plastic"]
+    tasks = list(codes.peer_tasks(elastic, tmp_path, limit=10.0))
+    assert [(t.code, t.version, t.series, t.label, t.limit) for t in tasks] == [
+        ("other", "1.2", "order 2", "0.2 R", 10.0),
+        ("other", "1.2", "order 4", "0.1 R", 10.0),
+    ]
+    assert list(codes.peer_tasks(plastic, tmp_path)) == []
+    assert len(list(codes.peer_tasks(elastic, tmp_path, quick=True))) == 1
+    points = run_all(tasks, 1)
+    assert [p.values.quantities["P"] for p in points if p.values] == [0.4, 0.4]
+    monkeypatch.setattr(codes, "_installed_peers", list)
+    assert list(codes.peer_tasks(elastic, tmp_path)) == []
+
+
 def test_the_edge_of_nodal_pressures():
     """Exact for the square root at an elastic edge, wherever the edge lies between two nodes."""
     angle = np.linspace(0, 1.5, 40)
