@@ -123,13 +123,12 @@ def work_precision(
 
 def _store_reference(cases, folder: Path, say) -> int:
     from archord.benchmarks.work_precision_reference import FILE, compute
+    from archord.benchmarks.work_precision_report import reference_table
 
     for case in cases:
         for kinematics in ("current", "reference"):
-            entry = compute(case, kinematics, folder, say)
-            for name, found in entry["quantities"].items():
-                value = "" if name == "profile" else f" {found['value']:.10g}"
-                print(f"{case.name}, {kinematics}: {name}{value}, relative error {found['error']:.1e}", flush=True)
+            compute(case, kinematics, folder, say)
+    print("\n".join(reference_table(cases)))
     print(FILE)
     return 0
 

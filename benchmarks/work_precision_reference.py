@@ -73,15 +73,21 @@ class Reference:
 
 def read_reference(case: str, kinematics: Kinematics = "current") -> Reference:
     """The stored values. Raises `SceneError` if there are none."""
+    data = stored(case, kinematics)
+    values = {name: entry["value"] for name, entry in data["quantities"].items()}
+    errors = {name: entry["error"] for name, entry in data["quantities"].items()}
+    return Reference(values, errors, {side: np.array(p) for side, p in data.get("profile", {}).items()})
+
+
+def stored(case: str, kinematics: Kinematics) -> dict[str, Any]:
+    """All that is known of the reference: quantities, extrapolations, runs. Raises `SceneError` if there is nothing."""
     data = _stored().get(case, {}).get(kinematics)
     if data is None:
         raise SceneError(
             f"{FILE.name}: holds no values of the {case} case with {kinematics} kinematics; compute them with "
             "archord benchmark work-precision --reference."
         )
-    values = {name: entry["value"] for name, entry in data["quantities"].items()}
-    errors = {name: entry["error"] for name, entry in data["quantities"].items()}
-    return Reference(values, errors, {side: np.array(p) for side, p in data.get("profile", {}).items()})
+    return data
 
 
 def values_of(folder: Path) -> dict[str, float]:
@@ -124,9 +130,9 @@ def compute(
         force = entry["quantities"]["P"]
         if independent["another choice of pairs"]:
             force["error"] = max(force["error"], abs(independent["P"] / force["value"] - 1))
-    stored = _stored()
-    stored.setdefault(case.name, {})[kinematics] = entry
-    ordered = {name: stored[name] for name in CASES if name in stored}
+    everything = _stored()
+    everything.setdefault(case.name, {})[kinematics] = entry
+    ordered = {name: everything[name] for name in CASES if name in everything}
     FILE.write_text(_json({"angles": f"{len(ANGLES)} equal ones from 0 to pi/2", "cases": ordered}), encoding="utf-8")
     return entry
 

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from archord.benchmarks.envelope import Pairs, seconds_at
 from archord.benchmarks.work_precision import Line, envelopes, own_limit
-from archord.benchmarks.work_precision_cases import CASES, QUANTITIES, Case
+from archord.benchmarks.work_precision_cases import CASES, QUANTITIES, Case, Kinematics
 from archord.benchmarks.work_precision_codes import CALCULIX, OURS
+from archord.benchmarks.work_precision_reference import stored
 
 LEVELS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7)
 _HEADINGS = ("code", "series", "mesh", "dofs", "steps", "iterations", "factorisations", "seconds", "from - to", "MB",
@@ -84,6 +85,31 @@ def processor() -> str:
         return next(line.split(":", 1)[1].strip() for line in text.splitlines() if line.startswith("model name"))
     except (OSError, StopIteration):
         return platform.processor() or platform.machine()
+
+
+def reference_table(cases: Sequence[Case], kinematics: Sequence[Kinematics] = ("current", "reference")) -> list[str]:
+    """The reference values, what they are known to, and the two extrapolations that they come from."""
+    out = ["| case | kinematics | quantity | value | relative error | first family | second family |", "|---" * 7 + "|"]
+    for case in cases:
+        for way in kinematics:
+            entry = stored(case.name, way)
+            sizes = [", ".join(f"{run['element_size']:g}" for run in family["runs"]) for family in entry["families"]]
+            for name, found in entry["quantities"].items():
+                cells = [
+                    case.name,
+                    way,
+                    name,
+                    f"{found['value']:.9g}" if found["value"] else "",
+                    f"{found['error']:.1e}",
+                ]
+                for limit, family, listed in zip(
+                    found.get("extrapolations", (None, None)), entry["families"], sizes, strict=True
+                ):
+                    cells.append(
+                        f"{limit['value']:.9g} (order {limit['order']:.1f})" if limit else f"{family['name']}: {listed}"
+                    )
+                out.append("| " + " | ".join(cells) + " |")
+    return out
 
 
 def ratio_table(kept: Mapping[str, Pairs]) -> list[str]:

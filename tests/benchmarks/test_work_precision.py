@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 from archord.benchmarks import work_precision_codes as codes
+from archord.benchmarks import work_precision_reference
 from archord.benchmarks.envelope import envelope, lasting, seconds_at
 from archord.benchmarks.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
 from archord.benchmarks.richardson import extrapolated
 from archord.benchmarks.work_precision import Line, chosen, envelopes, judge, own_limit
-from archord.benchmarks.work_precision_cases import CASES, DECKS, SERIES, chosen_cases, families
+from archord.benchmarks.work_precision_cases import CASES, DECKS, SERIES, Series, chosen_cases, families, scaled
 from archord.benchmarks.work_precision_reference import combined, read_reference, smooth_profile
-from archord.benchmarks.work_precision_report import markdown, ratio_table, row
+from archord.benchmarks.work_precision_report import markdown, ratio_table, reference_table, row
 from archord.benchmarks.work_precision_run import Point, RunFailure, Task, Values, run_all, run_once
 from archord.benchmarks.work_precision_warm import curves, warm_seconds
 from archord.cli import run
@@ -167,6 +168,31 @@ def test_references_are_there():
     assert force == pytest.approx(read_reference("elastic").values["P"], rel=0.01)
     with pytest.raises(SceneError, match="holds no values of the soft case"):
         read_reference("soft")
+
+
+def test_a_reference_is_computed_stored_and_read(tmp_path, monkeypatch):
+    """From finished runs only where the scene is the same; the force is that of its profile."""
+    case = CASES["elastic"]
+    coarse = tuple(Series(f"{ratio:g}", scaled(0.3, 0.2, 0.15, ratio=ratio)) for ratio in (3, 4))
+    monkeypatch.setattr(work_precision_reference, "families", lambda case: coarse)
+    monkeypatch.setattr(work_precision_reference, "FILE", tmp_path / "reference.json")
+    said: list[str] = []
+    work_precision_reference.compute(case, "current", tmp_path, said.append)
+    assert len(said) == 6
+    found = read_reference("elastic")
+    assert "| elastic | current | P | 0.012" in "\n".join(reference_table([case], ["current"]))
+    assert found.values["P"] == pytest.approx(0.01278, rel=0.02)
+    assert 0 < found.errors["P"] < 0.02
+    force = 2 * np.trapezoid(found.profile["pin"] * np.cos(ANGLES), ANGLES)
+    assert force == pytest.approx(found.values["P"], rel=0.03)
+
+    def solved(*arguments):
+        raise AssertionError("solved again")
+
+    monkeypatch.setattr(work_precision_reference, "solve_scene", solved)
+    work_precision_reference.compute(case, "current", tmp_path)
+    with pytest.raises(AssertionError, match="again"):
+        work_precision_reference.compute(case, "reference", tmp_path)
 
 
 # --- cases
