@@ -87,8 +87,8 @@ def work_precision(
     ),
     case: Annotated[str, typer.Option("--case", help="elastic, plastic or both")] = "both",
     only: Annotated[
-        str | None,
-        typer.Option("--only", metavar="PATTERN", help='codes or series with such a name, or "code, series"'),
+        list[str] | None,
+        typer.Option("--only", metavar="PATTERN", help='codes, series or "code, series, mesh"; may be repeated'),
     ] = None,
     repeats: Annotated[int, typer.Option("--repeats", min=1, help="timed runs of every point")] = 3,
     peers: Annotated[bool, typer.Option("--peers/--no-peers", help="CalculiX and other codes that are here")] = True,
@@ -141,7 +141,7 @@ def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, war
 
     claim_folder(output, force=True)
     found = [t for case in cases for t in table.tasks(case, output / "runs", quick=quick, peers=peers, limit=limit)]
-    found = table.chosen(found, only)
+    found = table.chosen(found, only or [])
 
     def said(task, repeat: int, sentence: str) -> None:
         counted = f"{repeat} of {repeats}" if repeat else "not counted"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,16 +40,18 @@ def tasks(case: Case, folder: Path, *, quick: bool = False, peers: bool = True, 
     return found
 
 
-def chosen(found: list[Task], pattern: str | None) -> list[Task]:
-    """Those whose code, series or "code, series, mesh" is ``pattern`` (with * and ?), or contains it.
+def chosen(found: list[Task], patterns: Sequence[str]) -> list[Task]:
+    """Those whose code, series or "code, series, mesh" is one of ``patterns`` (with * and ?), or contains it; all
+    without any.
 
-    Raises `SceneError` if there is none.
+    Raises `SceneError` for a pattern that fits none.
     """
-    kept = [t for t in found if matches(pattern, t.code, t.series, f"{t.code}, {t.series}, {t.label}")]
-    if not kept:
-        names = ", ".join(dict.fromkeys(name for t in found for name in (t.code, t.series)))
-        raise SceneError(f"--only {pattern}: no code or series has such a name; there are {names}.")
-    return kept
+    names = {t.folder: (t.code, t.series, f"{t.code}, {t.series}, {t.label}") for t in found}
+    for pattern in patterns:
+        if not any(matches(pattern, *names[t.folder]) for t in found):
+            known = ", ".join(dict.fromkeys(name for t in found for name in (t.code, t.series)))
+            raise SceneError(f"--only {pattern}: no code or series has such a name; there are {known}.")
+    return [t for t in found if not patterns or any(matches(p, *names[t.folder]) for p in patterns)]
 
 
 def run(

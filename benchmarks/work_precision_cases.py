@@ -120,8 +120,6 @@ def chosen_cases(name: str) -> list[Case]:
     return [CASES[name]]
 
 
-def matches(pattern: str | None, *names: str) -> bool:
-    """Whether ``pattern`` (with * and ?) is one of ``names``, or part of one; None matches all."""
-    if pattern is None:
-        return True
+def matches(pattern: str, *names: str) -> bool:
+    """Whether ``pattern`` (with * and ?) is one of ``names``, or part of one."""
     return any(pattern.lower() in name.lower() or fnmatch(name.lower(), pattern.lower()) for name in names)

@@ -353,11 +353,14 @@ def test_wrong_options(tmp_path, capsys):
         assert said in capsys.readouterr().err
 
 
-def test_a_pattern_chooses_codes_series_and_meshes(tmp_path):
-    tasks = [task(tmp_path, "true", code=c, label=m) for c in ("archord", "CalculiX") for m in ("0.1 R", "0.2 R")]
-    assert len(chosen(tasks, None)) == 4
-    assert len(chosen(tasks, "calculix")) == 2
-    assert len(chosen(tasks, "archord*0.2 R")) == 1
+def test_patterns_choose_codes_series_and_meshes(tmp_path):
+    tasks = [
+        task(tmp_path / c / m, "true", code=c, label=m) for c in ("archord", "CalculiX") for m in ("0.1 R", "0.2 R")
+    ]
+    assert chosen(tasks, []) == tasks
+    assert chosen(tasks, ["calculix"]) == tasks[2:]
+    assert chosen(tasks, ["archord*0.2 R"]) == tasks[1:2]
+    assert chosen(tasks, ["CalculiX, s, 0.1 R", "archord"]) == tasks[:3]
 
 
 def test_warm_solves_are_counted_without_the_first():
