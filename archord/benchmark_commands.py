@@ -78,3 +78,96 @@ def _print_table(lines) -> None:
         entries = row(line)
         table.add_row(*(entries[name] for name in shown[:-1]), "as it should be" if not line.faults else "WRONG")
     Console(highlight=False, width=None if sys.stdout.isatty() else 200).print(table, markup=False)
+
+
+@benchmark.command("work-precision")
+def work_precision(
+    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs, tables and diagrams")] = Path(
+        "runs/work_precision"
+    ),
+    case: Annotated[str, typer.Option("--case", help="elastic, plastic or both")] = "both",
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="PATTERN", help='codes, series or "code, series, mesh"; may be repeated'),
+    ] = None,
+    repeats: Annotated[int, typer.Option("--repeats", min=1, help="timed runs of every point")] = 3,
+    peers: Annotated[bool, typer.Option("--peers/--no-peers", help="CalculiX and other codes that are here")] = True,
+    limit: Annotated[float, typer.Option("--limit", min=1.0, help="seconds that a process may take")] = 600.0,
+    quick: Annotated[bool, typer.Option("--quick", help="the coarsest meshes alone, to see that it works")] = False,
+    warm: Annotated[bool, typer.Option("--warm", help="time curves within one process, too")] = False,
+    reference: Annotated[
+        bool, typer.Option("--reference", help="solve the fine meshes and store the reference values, nothing else")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what failed")] = False,
+) -> int:
+    """Time series of meshes, elastic and elasto-plastic, archord's and other codes', and set error against time.
+
+    Writes work_precision.csv, work_precision.md and a diagram for each case. Every point is a whole process on one core
+    with one thread, the median of all repeats. Exit code 0 if all of archord's points were solved.
+    """
+    from archord.benchmarks.work_precision_cases import chosen_cases
+
+    def say(sentence: str) -> None:
+        if not quiet:
+            print(f"{perf_counter() - begun:7.1f} s  {sentence}", file=sys.stderr, flush=True)
+
+    begun, cases = perf_counter(), chosen_cases(case)
+    try:
+        if reference:
+            return _store_reference(cases, output / "reference", say)
+        return _work_precision(cases, output, only, repeats, peers, limit, quick, warm, quiet, say)
+    except RuntimeError as error:
+        print(f"archord: {error}.", file=sys.stderr)
+        return 3
+
+
+def _store_reference(cases, folder: Path, say) -> int:
+    from archord.benchmarks.work_precision_reference import FILE, compute
+    from archord.benchmarks.work_precision_report import reference_table
+
+    for case in cases:
+        for kinematics in ("current", "reference"):
+            compute(case, kinematics, folder, say)
+    print("\n".join(reference_table(cases)))
+    print(FILE)
+    return 0
+
+
+def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, warm, quiet, say) -> int:
+    from archord.benchmarks import work_precision as table
+    from archord.benchmarks.work_precision_figure import draw
+    from archord.benchmarks.work_precision_report import markdown, write_csv
+    from archord.solver.run_folder import claim_folder
+
+    claim_folder(output, force=True)
+    found = [t for case in cases for t in table.tasks(case, output / "runs", quick=quick, peers=peers, limit=limit)]
+    found = table.chosen(found, only or [])
+
+    def said(task, repeat: int, sentence: str) -> None:
+        counted = f"{repeat} of {repeats}" if repeat else "not counted"
+        say(f"{task.case}: {task.code}, {task.series}, {task.label}: {sentence} ({counted})")
+
+    lines = table.run(found, repeats, said)
+    seconds = None
+    if warm:
+        from archord.benchmarks.work_precision_warm import warm_seconds
+
+        seconds = warm_seconds(repeats)
+    text = markdown(lines, seconds)
+    files = [output / "work_precision.csv", output / "work_precision.md"]
+    write_csv(lines, files[0])
+    files[1].write_text(text, encoding="utf-8")
+    for case in cases:
+        some = [line for line in lines if line.task.case == case.name]
+        if some:
+            files.append(output / f"work_precision_{case.name}.png")
+            draw(case, some, files[-1])
+    if not quiet:
+        print(text)
+        for file in files:
+            print(file)
+    failed = [line for line in lines if not line.point.done]
+    for line in failed:
+        task = line.task
+        print(f"archord: {task.case}: {task.code}, {task.series}, {task.label}: {line.point.failure}.", file=sys.stderr)
+    return 1 if any(line.task.code == "archord" for line in failed) else 0

@@ -78,11 +78,21 @@ def run_calculix(
         done = subprocess.run(["ccx", "joint"], cwd=folder, capture_output=True, text=True, timeout=timeout)
     except subprocess.TimeoutExpired:
         raise RuntimeError(f"CalculiX did not finish within {timeout:g} s") from None
-    seconds = perf_counter() - start
+    return read_opinion(scene, mesh, folder, done.stdout, thick, perf_counter() - start)
+
+
+def read_opinion(
+    scene: Scene, mesh: PlaneMesh, folder: Path, said: str, thick: float | None = None, seconds: float = math.nan
+) -> SecondOpinion:
+    """CalculiX's results in ``folder``, for which it took ``seconds`` and ``said`` this on the terminal.
+
+    Raises RuntimeError if it did not reach the last step.
+    """
+    thick = thickness(scene) if thick is None else thick
     printed = read_printed((folder / "joint.dat").read_text()) if (folder / "joint.dat").exists() else []
     pin, block = (step_forces(printed, name, thick) for name in (loaded_nodes(scene), "BLOCK_HELD"))
     if len(pin) != len(scene.targets):
-        errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
+        errors = [line.strip() for line in said.splitlines() if "*ERROR" in line]
         raise RuntimeError("; ".join([f"CalculiX ended after step {len(pin)} of {len(scene.targets)}", *errors]))
     pressure = read_contact_pressure((folder / "joint.frd").read_text(), len(mesh.x))
     largest, integral = plastic_strain(printed, mesh)

@@ -1,0 +1,43 @@
+"""How long a curve takes within a process that has solved before: what calibrations and parameter studies pay."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+from mpi4py import MPI
+
+from archord.benchmarks.paper_joint import paper_joint
+from archord.solver.run import solve_scene
+from archord.solver.scene import Scene
+
+
+def curves() -> dict[str, Scene]:
+    """The curves that are timed, up to 2 dR, on the default mesh."""
+    return {
+        "elastic, 8 steps": paper_joint(steps=8),
+        "elasto-plastic, sigY/E* = 0.2 %, 20 steps": paper_joint(steps=20, yield_stress=0.002),
+    }
+
+
+def warm_seconds(repeats: int, scenes: dict[str, Scene] | None = None) -> dict[str, list[float]]:
+    """Seconds of `solve_scene` for each curve, ``repeats`` times in turn, after one solve of each that is not counted.
+
+    Raises RuntimeError if one does not get to its end.
+    """
+    scenes = curves() if scenes is None else scenes
+    found: dict[str, list[float]] = {name: [] for name in scenes}
+    for repeat in range(repeats + 1):
+        for name, scene in scenes.items():
+            with tempfile.TemporaryDirectory() as folder:
+                start = perf_counter()
+                outcome = solve_scene(scene, Path(folder), MPI.COMM_SELF)
+                seconds = perf_counter() - start
+            if outcome.status == "interrupted":
+                raise KeyboardInterrupt
+            if outcome.status != "done":
+                raise RuntimeError(f"{name}: {outcome.message}")
+            if repeat:
+                found[name].append(seconds)
+    return found

@@ -1,0 +1,372 @@
+"""The work-precision benchmark: extrapolation, errors, envelopes, timed processes, and its command."""
+
+import csv
+import json
+import math
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from archord.benchmarks import work_precision_codes as codes
+from archord.benchmarks import work_precision_reference
+from archord.benchmarks.envelope import envelope, lasting, seconds_at
+from archord.benchmarks.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
+from archord.benchmarks.richardson import extrapolated
+from archord.benchmarks.work_precision import Line, chosen, envelopes, judge, own_limit
+from archord.benchmarks.work_precision_cases import CASES, DECKS, SERIES, Series, chosen_cases, families, scaled
+from archord.benchmarks.work_precision_reference import combined, read_reference, smooth_profile
+from archord.benchmarks.work_precision_report import markdown, ratio_table, reference_table, row
+from archord.benchmarks.work_precision_run import Point, RunFailure, Task, Values, run_all, run_once
+from archord.benchmarks.work_precision_warm import curves, warm_seconds
+from archord.cli import run
+from archord.postprocess.arc_pressure import ArcPressure
+from archord.solver.scene import SceneError
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="it starts processes of one rank")
+
+
+def task(folder, *command, limit=30.0, read=lambda: Values({"P": 1.0}, 10), **names):
+    given = {"case": "elastic", "code": "archord", "series": "s", "label": "0.1 R", "size": 0.1, "steps": 2} | names
+    return Task(**given, command=command, folder=Path(folder), read=read, limit=limit)
+
+
+def point(code, series, size, seconds, P, **values):
+    """A point that was run once and found this P."""
+    found = Values({"P": P}, round(100 / size), **values)
+    made = task(".", code=code, series=series, size=size, label=f"{size:g} R")
+    return judge(Point(made, [seconds], 10**8, found))
+
+
+# --- extrapolation
+
+
+@pytest.mark.parametrize("order", [1.5, 2.0, 3.7])
+def test_richardson_recovers_limit_and_order(order):
+    """From three sizes or more, whatever their ratios, the sign and the size of the error."""
+    for sizes in ([0.04, 0.02, 0.01], [0.3, 0.17, 0.1, 0.04, 0.01]):
+        for factor in (-3.0, 1e-4):
+            found = extrapolated(sizes, [5 + factor * h**order for h in sizes])
+            assert found.value == pytest.approx(5, abs=1e-6 * abs(factor))
+            assert found.order == pytest.approx(order, abs=1e-3)
+            assert found.error < 1e-4 * abs(factor)
+
+
+def test_richardson_states_scatter_as_an_error():
+    """With noise on the values the limit is within the stated error or so, and the error not far below the noise."""
+    random = np.random.default_rng(1)
+    sizes = np.array([0.04, 0.03, 0.02, 0.014, 0.01])
+    for _ in range(20):
+        found = extrapolated(sizes, 1 + sizes**2 + 1e-5 * random.standard_normal(5))
+        assert abs(found.value - 1) < 20 * max(found.error, 1e-6)
+        assert found.error > 1e-7
+    with pytest.raises(ValueError, match="three"):
+        extrapolated([0.1, 0.1, 0.2], [1, 1, 2])
+
+
+def test_two_families_that_differ_make_the_error():
+    """The value is their mean; the error is relative, and at least their difference."""
+    sizes = [0.04, 0.02, 0.01]
+    entry = combined([[(h, 2 + h**2) for h in sizes], [(h, 2.002 - h**2) for h in sizes]])
+    assert entry["value"] == pytest.approx(2.001, abs=1e-7)
+    assert entry["error"] == pytest.approx(1e-3, rel=1e-3)
+
+
+# --- profiles
+
+
+def test_a_profile_has_no_error_against_itself_and_errors_scale():
+    """Relative: k times the difference is k times the error, and units do not matter."""
+    reference = np.sqrt(np.maximum(0, 1 - (ANGLES / 1.2) ** 2))
+    bump = 1e-3 * np.cos(5 * ANGLES)
+    assert profile_error(reference, reference) == 0
+    one = profile_error(reference + bump, reference)
+    assert profile_error(reference + 3 * bump, reference) == pytest.approx(3 * one)
+    assert profile_error(7 * (reference + bump), 7 * reference) == pytest.approx(one)
+    assert profile_error(1.01 * reference, reference) == pytest.approx(0.01)
+
+
+def test_sampling_keeps_a_linear_profile():
+    """Of a run's side in whatever order its points are, and of nodal values."""
+    angle = np.linspace(0, np.pi / 2, 60).reshape(20, 3)
+    arc = ArcPressure(1.0, angle[:, ::-1], np.ones_like(angle), 2 - angle[:, ::-1])
+    np.testing.assert_allclose(sampled(arc), 2 - ANGLES, atol=1e-12)
+    np.testing.assert_allclose(interpolated(angle.ravel(), 2 - angle.ravel()), 2 - ANGLES, atol=1e-12)
+
+
+def test_smoothing_keeps_a_smooth_profile_and_removes_scatter():
+    """An elastic pressure is kept to 1e-4; waves from facet to facet leave no more than a quarter of themselves."""
+    edge = 1.1717
+    x = np.minimum(ANGLES / edge, 1)
+    exact = np.sqrt(1 - x**2) * (1 + 0.3 * x**2 - 0.1 * x**4)
+    assert profile_error(smoothed(exact, 6), exact) < 1e-4
+    rough = exact * (1 + 0.01 * np.sin(60 * ANGLES))
+    assert profile_error(smoothed(rough, 6), exact) < 0.25 * profile_error(rough, exact)
+    profile, error = smooth_profile([[{"hole": exact}], [{"hole": rough}]], 6)
+    assert profile_error(profile["hole"], exact) < error
+
+
+# --- envelopes and ratios
+
+
+def test_an_error_lasts_only_if_finer_meshes_keep_it():
+    """A lucky coarse mesh counts as good as the worst of those that follow; unknown ones are left out."""
+    assert lasting([1e-2, 1e-6, 1e-3, 1e-4]) == [1e-2, 1e-3, 1e-3, 1e-4]
+    assert lasting([1e-2, None, 1e-3]) == [1e-2, None, 1e-3]
+
+
+def test_envelopes_keep_what_nothing_beats():
+    """Straight in log-log between points; never beyond the ends."""
+    kept = envelope([(1, 1e-2), (2, 5e-2), (10, 1e-4), (11, 1e-4), (5, 1e-3)])
+    assert kept == [(1, 1e-2), (5, 1e-3), (10, 1e-4)]
+    assert seconds_at(1e-3, kept) == pytest.approx(5)
+    assert seconds_at(math.sqrt(1e-3 * 1e-4), kept) == pytest.approx(math.sqrt(50))
+    assert seconds_at(0.5, kept) == pytest.approx(1)
+    assert seconds_at(9e-5, kept) is None
+    assert seconds_at(1e-3, []) is None
+
+
+def test_ratios_of_synthetic_codes():
+    """A code that always takes ten times as long is said to; one that stops at 1e-3 never gets beyond."""
+    ours = [(10.0**k, 10.0 ** -(k + 2)) for k in range(4)]
+    text = "\n".join(ratio_table({"archord": ours, "slow": [(10 * s, e) for s, e in ours], "rough": ours[:2]}))
+    (line,) = [line for line in text.splitlines() if line.startswith("| 0.0001 |")]
+    assert line == "| 0.0001 | 100.00 | takes 10 times as long | never |"
+    assert "rough 1.0e-03" in text
+    assert ratio_table({"archord": ours}) == []
+
+
+def test_errors_and_ratios_of_lines():
+    """Errors are against the reference of the code's kinematics; CalculiX is compared with its own limit, too."""
+    exact = read_reference("elastic").values["P"]
+    ours = [point("archord", "s", h, 0.1 / h, exact * (1 + h**2)) for h in (0.1, 0.03, 0.01)]
+    theirs = [point("CalculiX", "CPE6", h, 10 / h, exact * (0.999 + h**2)) for h in (0.1, 0.03, 0.01)]
+    assert ours[0].errors["P"] == pytest.approx(0.01)
+    assert own_limit(theirs, "elastic")["CPE6"].value == pytest.approx(0.999 * exact, rel=1e-6)
+    kept = envelopes(ours + theirs, "elastic")
+    assert set(kept) == {"archord", "CalculiX", "CalculiX, own limit"}
+    assert seconds_at(1e-3, kept["CalculiX, own limit"]) == pytest.approx(
+        100 * (seconds_at(1e-3, kept["archord"]) or 0), rel=1e-2
+    )
+    other = point("peer", "p", 0.1, 1.0, exact, kinematics="reference")
+    assert other.errors["P"] == pytest.approx(abs(exact / read_reference("elastic", "reference").values["P"] - 1))
+    assert "takes 1" in markdown(ours + theirs)
+
+
+def test_references_are_there():
+    """Both cases, both kinematics, with errors below what they are to judge; a profile for each side."""
+    for case in CASES.values():
+        for kinematics in ("current", "reference"):
+            reference = read_reference(case.name, kinematics)
+            assert set(reference.values) == set(case.quantities) == set(reference.errors)
+            assert reference.errors["P"] < 2e-5
+            assert kinematics == "reference" or {p.shape for p in reference.profile.values()} == {ANGLES.shape}
+    profile = read_reference("elastic").profile
+    force = 2 * np.trapezoid(profile["pin"] * np.cos(ANGLES), ANGLES)
+    assert force == pytest.approx(read_reference("elastic").values["P"], rel=0.01)
+    with pytest.raises(SceneError, match="holds no values of the soft case"):
+        read_reference("soft")
+
+
+def test_a_reference_is_computed_stored_and_read(tmp_path, monkeypatch):
+    """From finished runs only where the scene is the same; the force is that of its profile."""
+    case = CASES["elastic"]
+    coarse = tuple(Series(f"{ratio:g}", scaled(0.3, 0.2, 0.15, ratio=ratio)) for ratio in (3, 4))
+    monkeypatch.setattr(work_precision_reference, "families", lambda case: coarse)
+    monkeypatch.setattr(work_precision_reference, "FILE", tmp_path / "reference.json")
+    said: list[str] = []
+    work_precision_reference.compute(case, "current", tmp_path, said.append)
+    assert len(said) == 6
+    found = read_reference("elastic")
+    assert "| elastic | current | P | 0.012" in "\n".join(reference_table([case], ["current"]))
+    assert found.values["P"] == pytest.approx(0.01278, rel=0.02)
+    assert 0 < found.errors["P"] < 0.02
+    force = 2 * np.trapezoid(found.profile["pin"] * np.cos(ANGLES), ANGLES)
+    assert force == pytest.approx(found.values["P"], rel=0.03)
+
+    def solved(*arguments):
+        raise AssertionError("solved again")
+
+    monkeypatch.setattr(work_precision_reference, "solve_scene", solved)
+    work_precision_reference.compute(case, "current", tmp_path)
+    with pytest.raises(AssertionError, match="again"):
+        work_precision_reference.compute(case, "reference", tmp_path)
+
+
+# --- cases
+
+
+def test_every_series_makes_scenes():
+    """Of one joint, from coarse to fine; those of the reference are refined near and far."""
+    for case in CASES.values():
+        for series in (*SERIES, *DECKS):
+            scenes = [case.scene(mesh) for mesh in series.meshes]
+            assert all(len(s.targets) == case.steps and s.target == pytest.approx(0.01) for s in scenes)
+            cells = [s.joint.expected_cells for s in scenes]
+            assert cells == sorted(cells)
+        for series in families(case):
+            joints = [case.scene(mesh).joint for mesh in series.meshes]
+            assert len(joints) >= 3
+            assert np.ptp([j.growth / j.h for j in joints]) < 1e-3
+    assert [c.name for c in chosen_cases("both")] == ["elastic", "plastic"]
+
+
+# --- processes
+
+
+def test_a_process_is_timed_from_outside(tmp_path):
+    """Its sleep, its memory but not its parent's, one core, one thread."""
+    code = (
+        "import os, json, time; a = bytearray(60_000_000); time.sleep(0.2); "
+        "json.dump([len(os.sched_getaffinity(0)), os.environ['OMP_NUM_THREADS']], open('said.json', 'w'))"
+    )
+    core = max(os.sched_getaffinity(0))
+    seconds, memory, values = run_once(task(tmp_path, sys.executable, "-S", "-c", code), core)
+    assert 0.2 < seconds < 5
+    assert 60e6 < memory < 110e6
+    assert values.dofs == 10
+    assert json.loads((tmp_path / "said.json").read_text()) == [1, "1"]
+
+
+def test_failures_are_recorded_with_their_sentence(tmp_path):
+    """A crash, a process that takes too long, a command that is not there and a result that cannot be read: one point
+    each, not tried again, in the tables."""
+
+    def unread():
+        raise RunFailure("no result")
+
+    said = []
+    ok = task(tmp_path / "a", "true", label="ok")
+    bad = [
+        task(tmp_path / "b", sys.executable, "-S", "-c", "import sys; sys.exit('it broke')", label="crash"),
+        task(tmp_path / "c", "sleep", "60", limit=0.2, label="late"),
+        task(tmp_path / "d", "no-such-program", label="absent"),
+        task(tmp_path / "e", "true", read=unread, label="unread"),
+    ]
+    points = run_all([ok, *bad], 2, lambda t, repeat, sentence: said.append((t.label, repeat)))
+    assert [p.done for p in points] == [True] + 4 * [False]
+    assert [p.failure for p in points[1:3]] == ["it broke", "more than the 0.2 s allowed"]
+    assert "no-such-program" in points[3].failure
+    assert points[4].failure == "no result"
+    assert said == [("ok", 0), ("ok", 1), *((t.label, 1) for t in bad), ("ok", 2)]
+    lines = [judge(p) for p in points]
+    assert [row(line)["status"] for line in lines] == ["done"] + 4 * ["failed"]
+    assert row(lines[1])["message"] == "it broke"
+    assert "| crash | failed: it broke |" in markdown(lines)
+    assert len(points[0].seconds) == 2
+
+
+def test_repeats_are_interleaved(tmp_path):
+    """Round robin, after one untimed run of each series."""
+    said = []
+    tasks = [task(tmp_path / n, "true", series=n[0], label=n) for n in ("a1", "a2", "b1")]
+    run_all(tasks, 2, lambda t, repeat, sentence: said.append(f"{t.label}:{repeat}"))
+    assert " ".join(said) == "a1:0 b1:0 a1:1 a2:1 b1:1 a1:2 a2:2 b1:2"
+
+
+def test_the_result_of_a_peer(tmp_path):
+    """Quantities that it knows, its kinematics, its own sentence where it failed."""
+    file = tmp_path / "result.json"
+    good = {"P": 0.0127, "p0": None, "eps": 1.17, "dofs": 5, "iterations": 7, "kinematics": "reference"}
+    file.write_text(json.dumps(good | {"failed": None}))
+    values = codes.peer_values(file)
+    assert (values.quantities, values.kinematics) == ({"P": 0.0127, "eps": 1.17}, "reference")
+    for text, said in (
+        (json.dumps(good | {"failed": "Newton's method diverged"}), "Newton's method diverged"),
+        ("{", "is not what"),
+        ("{}", "is not what"),
+    ):
+        file.write_text(text)
+        with pytest.raises(RunFailure, match=said):
+            codes.peer_values(file)
+    file.unlink()
+    with pytest.raises(RunFailure, match=r"wrote no result\.json"):
+        codes.peer_values(file)
+
+
+def test_peers_are_run_if_there_are_any(tmp_path, monkeypatch):
+    """Each with its own time limit or, if it is less, that of the benchmark; nothing where none is installed."""
+
+    class Peer:
+        label, version, time_limit = "other", "1.2", 20.0
+        series = {"elastic": ((0.2, 2), (0.1, 4))}  # noqa: RUF012
+
+        def command(self, case, size, order, steps, output):
+            result = {"P": size * order, "dofs": steps, "kinematics": "reference"}
+            text = f"open({str(output)!r}, 'w').write({json.dumps(json.dumps(result))})"
+            return [sys.executable, "-S", "-c", text]
+
+    monkeypatch.setattr(codes, "_installed_peers", lambda: [Peer()])
+    elastic, plastic = CASES["elastic"], CASES["plastic"]
+    tasks = list(codes.peer_tasks(elastic, tmp_path, limit=10.0))
+    assert [(t.code, t.version, t.series, t.label, t.limit) for t in tasks] == [
+        ("other", "1.2", "order 2", "0.2 R", 10.0),
+        ("other", "1.2", "order 4", "0.1 R", 10.0),
+    ]
+    assert list(codes.peer_tasks(plastic, tmp_path)) == []
+    assert len(list(codes.peer_tasks(elastic, tmp_path, quick=True))) == 1
+    points = run_all(tasks, 1)
+    assert [p.values.quantities["P"] for p in points if p.values] == [0.4, 0.4]
+    monkeypatch.setattr(codes, "_installed_peers", list)
+    assert list(codes.peer_tasks(elastic, tmp_path)) == []
+
+
+def test_the_edge_of_nodal_pressures():
+    """Exact for the square root at an elastic edge, wherever the edge lies between two nodes."""
+    angle = np.linspace(0, 1.5, 40)
+    for edge in (1.0, 1.011, 1.02):
+        pressure = np.sqrt(np.maximum(0, edge - angle))
+        assert codes.edge_angle(angle, pressure) == pytest.approx(edge, abs=1e-9)
+    assert math.isnan(codes.edge_angle(angle, np.zeros(40)))
+
+
+# --- the command
+
+
+def test_a_quick_run_through_the_command(tmp_path, capsys):
+    """Coarsest meshes: CSV with every error, table, diagram, exit code 0."""
+    options = ["--quick", "--case", "elastic", "--no-peers", "--repeats", "1", "-q", "-o", str(tmp_path / "b")]
+    assert run(["benchmark", "work-precision", *options]) == 0
+    assert capsys.readouterr().out == ""
+    with (tmp_path / "b" / "work_precision.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [r["status"] for r in rows] == ["done", "done"]
+    for entries in rows:
+        assert 0 < float(entries["error of P"]) < 1e-2
+        assert 0 < float(entries["error of profile"]) < 0.1
+        assert int(entries["iterations"]) > 2
+        assert float(entries["seconds median"]) > 0.2
+        assert entries["error of dissipation"] == ""
+    assert (tmp_path / "b" / "work_precision_elastic.png").read_bytes().startswith(b"\x89PNG")
+    assert "**elastic, 2 steps to 2 dR**" in (tmp_path / "b" / "work_precision.md").read_text(encoding="utf-8")
+
+
+def test_wrong_options(tmp_path, capsys):
+    """One sentence, exit code 2."""
+    for options, said in (
+        (["--case", "soft"], "--case soft: must be elastic, plastic or both."),
+        (["--only", "nothing", "--no-peers"], "--only nothing: no code or series has such a name; there are archord"),
+    ):
+        assert run(["benchmark", "work-precision", "-o", str(tmp_path), *options]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_patterns_choose_codes_series_and_meshes(tmp_path):
+    tasks = [
+        task(tmp_path / c / m, "true", code=c, label=m) for c in ("archord", "CalculiX") for m in ("0.1 R", "0.2 R")
+    ]
+    assert chosen(tasks, []) == tasks
+    assert chosen(tasks, ["calculix"]) == tasks[2:]
+    assert chosen(tasks, ["archord*0.2 R"]) == tasks[1:2]
+    assert chosen(tasks, ["CalculiX, s, 0.1 R", "archord"]) == tasks[:3]
+
+
+def test_warm_solves_are_counted_without_the_first():
+    """As many seconds as repeats for each curve; those of the benchmark have 8 and 20 steps."""
+    assert [len(scene.targets) for scene in curves().values()] == [8, 20]
+    found = warm_seconds(2, {"coarse": CASES["elastic"].scene(SERIES[0].meshes[0])})
+    assert len(found["coarse"]) == 2
+    assert min(found["coarse"]) > 0.01
+    assert "| coarse |" in markdown([Line(Point(task(".")), {}, read_reference("elastic"))], found)
