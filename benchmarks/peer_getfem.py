@@ -1,11 +1,12 @@
-"""The paper's quarter joint by GetFEM: ``python3 peer_getfem.py --case plastic --size 0.04 --steps 20 --output r.json``.
+"""The paper's quarter joint by GetFEM: ``python3 peer_getfem.py --case plastic --steps 20 --output r.json``.
 
 Needs Debian's python3-getfem and python3-gmsh, and nothing of archord. Units: R = 1, E* = 1.
 
-- Bodies: curved second-order triangles (gmsh's, nodes on the circles), P2 displacements, small strains, plane strain. Elements have
-  the size h on the arcs, h + 0.25 times their distance from there.
-- Contact: kinematics "current", GetFEM's integral large sliding contact brick with raytracing from the pin's deformed arc to the
-  hole's, without friction: augmented Lagrangian, P1 multipliers on the pin's arc, augmentation E*/h (Poulios and Renard 2015).
+- Bodies: curved second-order triangles (gmsh's, nodes on the circles), P2 displacements, small strains, plane strain.
+  Elements have the size h on the arcs and grow by 0.25 times the distance from there, below h = 0.04 by 6.25 h times.
+- Contact: kinematics "current", GetFEM's integral large sliding contact brick with raytracing from the pin's deformed
+  arc to the hole's, without friction: augmented Lagrangian, P1 multipliers on the pin's arc, augmentation E*/h
+  (Poulios and Renard 2015).
 - Plasticity: GetFEM's brick "plane strain Prandtl Reuss" (J2, perfect, backward Euler, return mapping).
 - GetFEM's Newton solver with its sequential MUMPS; where it fails, the step is cut.
 """
@@ -93,7 +94,19 @@ class Joint:
                 md.add_im_data(f"xi_{name}", scalar)
                 md.add_im_data(f"Previous_xi_{name}", scalar)
                 md.add_im_data(f"Ep_{name}", tensor)
-                law = (mim, "plane strain Prandtl Reuss", 0, u, f"xi_{name}", f"Ep_{name}", "lambda", "mu", "sigY", "1", "1")
+                law = (
+                    mim,
+                    "plane strain Prandtl Reuss",
+                    0,
+                    u,
+                    f"xi_{name}",
+                    f"Ep_{name}",
+                    "lambda",
+                    "mu",
+                    "sigY",
+                    "1",
+                    "1",
+                )
                 md.add_small_strain_elastoplasticity_brick(*law)
                 self.laws.append(law)
             else:
@@ -133,8 +146,8 @@ class Joint:
         self.md.set_variable("top_pin", [-delta])
         self.md.to_variables(guess)
         iterations, converged = self.md.solve(
-            "max_iter", ITERATIONS, "max_res", TOLERANCE, "diverged_res", FAR, "lsolver", "mumps", "lsearch", "simplest",
-            "alpha min", 0.3,
+            "max_iter", ITERATIONS, "max_res", TOLERANCE, "diverged_res", FAR, "lsolver", "mumps",
+            "lsearch", "simplest", "alpha min", 0.3,
         )  # fmt: skip
         if not converged:
             raise NoConvergence
@@ -187,7 +200,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--case", choices=["elastic", "plastic"], default="elastic")
     parser.add_argument("--size", type=float, default=0.04, help="edge length on the arcs over R")
-    parser.add_argument("--growth", type=float, default=0.25, help="growth of the edges per distance from the arcs")
+    parser.add_argument("--growth", type=float, help="growth of the edges per distance; min(0.25, 6.25 size) if absent")
     parser.add_argument("--order", type=int, choices=[2], default=2)
     parser.add_argument("--steps", type=int, default=2, help="equal steps to delta = 2 dR")
     parser.add_argument("--output", type=Path, default=Path("result.json"))
@@ -199,8 +212,9 @@ def main() -> int:
         return 0
     gf.util_trace_level(0)
     gf.util_warning_level(0)
+    growth = options.growth or min(0.25, 6.25 * options.size)
     result: dict = {"kinematics": "current", "P": None, "p0": None, "eps": None, "iterations": 0, "failed": None}
-    joint = Joint(options.size, options.growth, options.case == "plastic")
+    joint = Joint(options.size, growth, options.case == "plastic")
     try:
         result["iterations"] = load(joint, options.steps, 2 * DR)
         result["P"], result["p0"] = joint.force(), joint.axis_pressure()

@@ -1,15 +1,18 @@
-"""The paper's quarter joint by scikit-fem: ``python3 peer_skfem.py --case plastic --size 0.04 --steps 20 --output r.json``.
+"""The paper's quarter joint by scikit-fem: ``python3 peer_skfem.py --case plastic --steps 20 --output r.json``.
 
 Needs scikit-fem, gmsh and, for speed, pypardiso (all of PyPI), and nothing of archord. Units: R = 1, E* = 1.
 
-- Bodies: MeshTri2 (gmsh's second-order triangles, nodes on the circles), displacements of the given order, small strains,
-  plane strain. Elements have the size h on the arcs, h + 0.25 times their distance from there.
-- Contact: kinematics "reference". A point x of the pin's arc, with its normal n, faces the point y of the hole on that normal in
-  the touching configuration; the gap g = (y - x) . n - (u(x) - u(y)) . n is linear and the pressure is k <-g>,
-  k = 1e5 E*/R (penalty): a usual pressure E* dR/R goes 1e-5 dR deep. Two Gauss points a facet, as many as it has own nodes.
+- Bodies: MeshTri2 (gmsh's second-order triangles, nodes on the circles), P2 displacements, three points a triangle,
+  small strains, plane strain. Elements have the size h on the arcs and grow by 0.25 times the distance from there,
+  below h = 0.04 by 6.25 h times.
+- Contact: kinematics "reference". A point x of the pin's arc, with its normal n, faces the point y of the hole on
+  that normal in the touching configuration; the gap g = (y - x) . n - (u(x) - u(y)) . n is linear and the pressure is
+  k <-g>, k = 1e5 E*/R (penalty): a usual pressure E* dR/R goes 1e-5 dR deep. Two Gauss points a facet, as many as it
+  has own nodes.
 - Plasticity: J2, perfect, radial return with its consistent tangent (Simo and Hughes 1998, box 3.2).
-- Newton's method with full steps; where it fails, the step is cut. Residual: 1e-8 of the reaction. All element matrices at once
-  by numpy, their sum by slots of the sparse matrix found once; PARDISO for positive definite matrices, else SuperLU.
+- Newton's method with full steps; where it fails, the step is cut. Residual: 1e-8 of the reaction. All element
+  matrices at once by numpy, their sum by slots of the sparse matrix found once; MKL's PARDISO for positive definite
+  matrices, else SuperLU.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-R, DR, WIDTH, NU, GROWTH = 1.0, 0.005, 100.0, 0.3, 0.25
+R, DR, WIDTH, NU = 1.0, 0.005, 100.0, 0.3
 E = 2 * (1 - NU**2)
 MU, LAME = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
 SIGY = {"elastic": float("inf"), "plastic": 0.002}
@@ -31,7 +34,7 @@ PENALTY, POINTS = 1e5, 2
 TOLERANCE, FAR, ITERATIONS, CUTS = 1e-8, 1e3, 25, 6  # residuals over the reaction
 
 
-def mesh_joint(size: float):
+def mesh_joint(size: float, growth: float):
     """Second-order triangles of pin and block: nodes ``(n, 2)`` and elements ``(m, 6)``, corners before midpoints."""
     gmsh.initialize(interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
@@ -49,7 +52,7 @@ def mesh_joint(size: float):
     loop((0, 0), R + DR, (WIDTH, 0), (WIDTH, -WIDTH), (0, -WIDTH))
     geo.synchronize()
     field = gmsh.model.mesh.field.add("MathEval")
-    gmsh.model.mesh.field.setString(field, "F", f"{size} + {GROWTH} * Abs(Sqrt(x*x + y*y) - {R + DR})")
+    gmsh.model.mesh.field.setString(field, "F", f"{size} + {growth} * Abs(Sqrt(x*x + y*y) - {R + DR})")
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
     for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
         gmsh.option.setNumber(f"Mesh.{option}", 0)
@@ -121,7 +124,7 @@ def make_solver():
 
 
 def return_map(strain, history, sigy: float):
-    """Stress ``(m, q, 3)`` (xx, yy, xy) and tangent ``(m, q, 3, 3)`` of total strains (xx, yy, 2 xy), and the new history.
+    """Stress ``(m, q, 3)`` (xx, yy, xy), tangent ``(m, q, 3, 3)`` and new history of total strains (xx, yy, 2 xy).
 
     ``history`` ``(m, q, 4)`` is the plastic strain (xx, yy, zz, xy).
     """
@@ -149,8 +152,8 @@ def return_map(strain, history, sigy: float):
 class Joint:
     """Half of the joint below the pin's diameter, discretised: elements first, then contact points, 12 dofs each."""
 
-    def __init__(self, size: float, sigy: float) -> None:
-        points, cells = mesh_joint(size)
+    def __init__(self, size: float, growth: float, sigy: float) -> None:
+        points, cells = mesh_joint(size, growth)
         mesh = skfem.MeshTri2(points.T, cells.T)
         basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP2()), intorder=2)
         self.sigy, self.n, self.cells = sigy, int(basis.N), len(cells)
@@ -242,12 +245,12 @@ class Joint:
         forces = np.bincount(self.dofs.ravel(), np.concatenate([bulk, contact]).ravel(), self.n)
         return forces, new, np.concatenate([blocks, stiff])
 
-    def axis_pressure(self, u) -> float:
+    def axis_pressure(self, u) -> float | None:
         """Pressure on the axis: even parabola through the facet means within 0.2 rad."""
         mean = (self.pressure(u) * self.ds).sum(1) / self.ds.sum(1)
         angle = (self.angle * self.ds).sum(1) / self.ds.sum(1)
         near = angle < 0.2
-        return float(np.polyfit(angle[near] ** 2, mean[near], 1)[1])
+        return float(np.polyfit(angle[near] ** 2, mean[near], 1)[1]) if near.sum() > 2 else None
 
 
 def newton(joint: Joint, solve, u):
@@ -293,6 +296,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--case", choices=list(SIGY), default="elastic")
     parser.add_argument("--size", type=float, default=0.04, help="edge length on the arcs over R")
+    parser.add_argument("--growth", type=float, help="growth of the edges per distance; min(0.25, 6.25 size) if absent")
     parser.add_argument("--order", type=int, choices=[2], default=2)
     parser.add_argument("--steps", type=int, default=2, help="equal steps to delta = 2 dR")
     parser.add_argument("--output", type=Path, default=Path("result.json"))
@@ -301,8 +305,9 @@ def main() -> int:
     if options.probe:
         print(version("scikit-fem"))
         return 0
+    growth = options.growth or min(0.25, 6.25 * options.size)
     result: dict = {"kinematics": "reference", "P": None, "p0": None, "eps": None, "iterations": 0, "failed": None}
-    joint = Joint(options.size, SIGY[options.case])
+    joint = Joint(options.size, growth, SIGY[options.case])
     try:
         result["P"], result["p0"], result["iterations"] = load(joint, options.steps, 2 * DR)
     except NoConvergence as error:
