@@ -1,4 +1,4 @@
-"""The paper's quarter joint by NGSolve: ``python3 peer_ngsolve.py --case plastic --order 4 --steps 20 --output r.json``.
+"""The paper's quarter joint by NGSolve: ``python3 peer_ngsolve.py --case elastic --order 4 --output r.json``.
 
 Needs NGSolve (of PyPI) and nothing of archord. Units: R = 1, E* = 1.
 
