@@ -2,7 +2,7 @@
 
 They get a virtual environment of their own, ``.cache/peers-venv`` in the checkout, without the system's packages, so
 that their numpy and archord's do not meet. About 1.5 GB, most of it MKL (PARDISO, scikit-fem's linear solver). Where
-a proxy signs with its own authority: ``docker/run env PIP_CERT=/archord/... python3 -m
+a proxy signs with its own authority: ``docker/run env PIP_CERT=.cache/ca.pem python3 -m
 archord.benchmarks.peer_environment``.
 """
 

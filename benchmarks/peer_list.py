@@ -52,14 +52,14 @@ PEERS = (
         _FOLDER / "peer_skfem.py",
         {
             "elastic": _sizes(2, 0.16, 0.08, 0.04, 0.02, 0.01),
-            "plastic": _sizes(2, 0.16, 0.08, 0.04, 0.02, 0.01),
+            "plastic": _sizes(2, 0.16, 0.08, 0.04, 0.02),
         },
     ),
     Peer(
         "GetFEM",
         _FOLDER / "peer_getfem.py",
         {
-            "elastic": _sizes(2, 0.16, 0.08, 0.04, 0.02, 0.01),
+            "elastic": _sizes(2, 0.16, 0.08, 0.04, 0.02),
             "plastic": _sizes(2, 0.16, 0.08, 0.04, 0.02),
         },
     ),
