@@ -208,7 +208,7 @@ def main() -> int:
     options = parser.parse_args()
     if options.probe:
         # its Python package carries no version
-        print(next(iter(re.findall(r"libgetfem\S*", Path("/proc/self/maps").read_text())), "getfem"))
+        print(next(iter(re.findall(r"libgetfem\.so\.(\S+)", Path("/proc/self/maps").read_text())), "unknown"))
         return 0
     gf.util_trace_level(0)
     gf.util_warning_level(0)
