@@ -1,0 +1,147 @@
+"""The peers of the benchmark "error against run time": their list, and the force of the joint that each computes."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from archord.benchmarks import peer_environment
+from archord.benchmarks.peer_list import CASES, PEERS, Peer, installed, probe
+from archord.benchmarks.peer_skfem import NU, E, return_map
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="peers run beside one rank")
+
+# Elastic: independent solvers of each kinematics, refined until the digits stood (README.md). Plastic: archord's for
+# fixed pairs, GetFEM's and NGSolve's for closest points.
+FORCE = {
+    "elastic": {"reference": 0.0127596, "current": 0.0127785},
+    "plastic": {"reference": 0.00668, "current": 0.006692},
+}
+MODULES = {"scikit-fem": "skfem", "GetFEM": "getfem", "NGSolve": "ngsolve"}
+
+
+@functools.cache
+def here() -> dict[str, Peer]:
+    return {peer.label: peer for peer in installed()}
+
+
+def peer_here(label: str) -> Peer:
+    if label not in here():
+        pytest.skip(f"{label} is not installed (docs/peers.md)")
+    return here()[label]
+
+
+def solved(peer: Peer, case: str, size: float, order: int, steps: int, folder) -> dict:
+    output = folder / "result.json"
+    subprocess.run(peer.command(case, size, order, steps, output), check=True, timeout=peer.time_limit)
+    return json.loads(output.read_text())
+
+
+def test_every_peer_has_a_series_of_growing_cost_for_both_cases():
+    """Edges shrink within an order, orders grow; scripts are there and no two are called alike."""
+    assert len({peer.label for peer in PEERS}) == len({peer.script for peer in PEERS}) == len(PEERS)
+    for peer in PEERS:
+        assert peer.script.is_file()
+        assert set(peer.series) == set(CASES)
+        for meshes in peer.series.values():
+            assert list(meshes) == sorted(meshes, key=lambda mesh: (mesh[1], -mesh[0]))
+            assert len(set(meshes)) == len(meshes) >= 3
+
+
+def test_only_what_answers_is_listed(tmp_path):
+    """An interpreter that is not there, or has not the code, lists nothing; of two the first that answers is taken."""
+    assert installed([str(tmp_path / "python")]) == installed(["/bin/false"]) == []
+    answers = tmp_path / "python"
+    answers.write_text("#!/bin/sh\necho 1.2\n")
+    answers.chmod(0o755)
+    found = installed(["/bin/false", str(answers), sys.executable])
+    assert [(peer.label, peer.python, peer.version) for peer in found] == [
+        (peer.label, str(answers), "1.2") for peer in PEERS
+    ]
+    command = found[0].command("plastic", 0.04, 2, 20, tmp_path / "r.json")
+    assert command[:2] == [str(answers), str(PEERS[0].script)]
+    assert dict(zip(command[2::2], command[3::2], strict=True)) == {
+        "--case": "plastic", "--size": "0.04", "--order": "2", "--steps": "20", "--output": str(tmp_path / "r.json"),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.label)
+def test_a_script_without_its_code_says_so(tmp_path, peer):
+    """Exit code 1 and one line, with --probe and without."""
+    blocked = tmp_path / f"{MODULES[peer.label]}.py"
+    blocked.write_text(f"raise ImportError('no {blocked.stem}')\n")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    for option in ("--probe", "--size=0.16"):
+        command = [sys.executable, str(peer.script), option]
+        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert done.stderr.count("\n") == 1
+        assert peer.label in done.stderr
+
+
+@pytest.mark.parametrize("label", MODULES)
+def test_elastic_force_is_that_of_its_kinematics(tmp_path, label):
+    """On its coarsest mesh within 1 %, on the next one within 0.1 %, in two steps."""
+    peer = peer_here(label)
+    assert probe(peer, peer.python) == peer.version != ""
+    for (size, order), tolerance in zip(peer.series["elastic"], (1e-2, 1e-3), strict=False):
+        result = solved(peer, "elastic", size, order, 2, tmp_path)
+        assert result["failed"] is None
+        assert result["P"] == pytest.approx(FORCE["elastic"][result["kinematics"]], rel=tolerance)
+        assert result["p0"] is None or result["p0"] == pytest.approx(0.0082, rel=0.02)
+        assert result["iterations"] >= 2
+        assert result["dofs"] > 1000
+
+
+@pytest.mark.parametrize("label", MODULES)
+def test_plastic_force_is_that_of_its_kinematics(tmp_path, label):
+    """On its coarsest mesh, within 1 %, and far below the elastic one."""
+    peer = peer_here(label)
+    size, order = peer.series["plastic"][0]
+    result = solved(peer, "plastic", size, order, 20, tmp_path)
+    assert result["failed"] is None
+    assert result["P"] == pytest.approx(FORCE["plastic"][result["kinematics"]], rel=1e-2)
+
+
+def test_return_map_of_scikit_fems_peer():
+    """Beyond yield the stress lies on the yield surface, the plastic strain has no trace, and the tangent is the
+    derivative of the stress; within, Hooke's law in plane strain holds."""
+    generator = np.random.default_rng(1)
+    strain = generator.normal(size=(40, 2, 3)) * 0.01
+    history = np.zeros((40, 2, 4))
+    sigy = 0.02
+    stress, tangent, new = return_map(strain, history, sigy)
+    yielded = np.linalg.norm(new, axis=-1) > 0
+    assert 10 < yielded.sum() < yielded.size - 5
+    np.testing.assert_allclose(new[..., :3].sum(-1), 0, atol=1e-15)
+    xx, yy, xy = np.moveaxis(stress, -1, 0)
+    bulk = E / (3 * (1 - 2 * NU))
+    zz = 3 * bulk * (strain[..., 0] + strain[..., 1]) - xx - yy
+    mises = np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
+    np.testing.assert_allclose(mises[yielded], sigy, rtol=1e-12)
+    assert mises[~yielded].max() <= sigy
+    shear = E / (2 * (1 + NU))
+    np.testing.assert_allclose(xy[~yielded], shear * strain[~yielded][:, 2], rtol=1e-12)
+    lame = bulk - 2 * shear / 3
+    hooke = (lame + 2 * shear) * strain[..., 0] + lame * strain[..., 1]
+    np.testing.assert_allclose(xx[~yielded], hooke[~yielded], rtol=1e-10)
+    for k in range(3):
+        step = np.zeros(3)
+        step[k] = 1e-7
+        ahead, behind = (return_map(strain + sign * step, history, sigy)[0] for sign in (1, -1))
+        np.testing.assert_allclose(tangent[..., k], (ahead - behind) / 2e-7, atol=1e-6)
+
+
+def test_the_environment_is_the_checkouts_own():
+    """Where nothing else looks for packages, and git does not look; every package with its version."""
+    root = peer_environment.PLACE.parents[1]
+    assert (root / "pyproject.toml").is_file()
+    assert peer_environment.PLACE.parent.name in (root / ".gitignore").read_text().replace("/", "").split()
+    assert peer_environment.interpreter().parent.parent == peer_environment.PLACE
+    assert all(package.count("==") == 1 for package in peer_environment.PACKAGES)
