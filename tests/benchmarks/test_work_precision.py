@@ -313,15 +313,6 @@ def test_peers_are_run_if_there_are_any(tmp_path, monkeypatch):
     assert list(codes.peer_tasks(elastic, tmp_path)) == []
 
 
-def test_the_edge_of_nodal_pressures():
-    """Exact for the square root at an elastic edge, wherever the edge lies between two nodes."""
-    angle = np.linspace(0, 1.5, 40)
-    for edge in (1.0, 1.011, 1.02):
-        pressure = np.sqrt(np.maximum(0, edge - angle))
-        assert codes.edge_angle(angle, pressure) == pytest.approx(edge, abs=1e-9)
-    assert math.isnan(codes.edge_angle(angle, np.zeros(40)))
-
-
 # --- the command
 
 
