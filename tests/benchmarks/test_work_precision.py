@@ -150,6 +150,8 @@ def test_errors_and_ratios_of_lines():
     assert seconds_at(1e-3, kept["CalculiX, own limit"]) == pytest.approx(
         100 * (seconds_at(1e-3, kept["archord"]) or 0), rel=1e-2
     )
+    scattered = [*theirs, point("CalculiX", "CPE6", 0.02, 500.0, 0.99 * exact)]
+    assert own_limit(scattered, "elastic") == {}
     other = point("peer", "p", 0.1, 1.0, exact, kinematics="reference")
     assert other.errors["P"] == pytest.approx(abs(exact / read_reference("elastic", "reference").values["P"] - 1))
     assert "takes 1" in markdown(ours + theirs)
