@@ -16,6 +16,7 @@ from archord.benchmarks.work_precision_run import LIMIT, Point, Task, run_all
 from archord.solver.scene import SceneError
 
 OWN_LIMIT = "own limit"
+_SCATTER = 1e-4
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,8 @@ def series_of(lines: list[Line], case: str) -> dict[tuple[str, str], list[Line]]
 
 
 def own_limit(lines: list[Line], case: str, code: str = CALCULIX) -> dict[str, Limit]:
-    """Per series of ``code``, its P extrapolated from the three finest meshes, where as many were solved.
+    """Per series of ``code``, its P extrapolated from the four finest meshes, or from three if no more were solved;
+    absent where one of them moves it by more than 1e-4.
 
     CalculiX's contact is a penalty: its P converges to a value that is a little smaller than that of exact contact.
     """
@@ -94,8 +96,10 @@ def own_limit(lines: list[Line], case: str, code: str = CALCULIX) -> dict[str, L
     for (name, series), members in series_of(lines, case).items():
         pairs = [(line.task.size, line.point.values.quantities["P"]) for line in members if _has_force(line)]
         if name == code and len({size for size, _ in pairs}) >= 3:
-            sizes, values = zip(*sorted(pairs)[:3], strict=True)
-            found[series] = extrapolated(sizes, values)
+            sizes, values = zip(*sorted(pairs)[:4], strict=True)
+            limit = extrapolated(sizes, values)
+            if limit.error < _SCATTER * abs(limit.value):
+                found[series] = limit
     return found
 
 

@@ -150,6 +150,8 @@ def test_errors_and_ratios_of_lines():
     assert seconds_at(1e-3, kept["CalculiX, own limit"]) == pytest.approx(
         100 * (seconds_at(1e-3, kept["archord"]) or 0), rel=1e-2
     )
+    scattered = [*theirs, point("CalculiX", "CPE6", 0.02, 500.0, 0.99 * exact)]
+    assert own_limit(scattered, "elastic") == {}
     other = point("peer", "p", 0.1, 1.0, exact, kinematics="reference")
     assert other.errors["P"] == pytest.approx(abs(exact / read_reference("elastic", "reference").values["P"] - 1))
     assert "takes 1" in markdown(ours + theirs)
@@ -311,15 +313,6 @@ def test_peers_are_run_if_there_are_any(tmp_path, monkeypatch):
     assert [p.values.quantities["P"] for p in points if p.values] == [0.4, 0.4]
     monkeypatch.setattr(codes, "_installed_peers", list)
     assert list(codes.peer_tasks(elastic, tmp_path)) == []
-
-
-def test_the_edge_of_nodal_pressures():
-    """Exact for the square root at an elastic edge, wherever the edge lies between two nodes."""
-    angle = np.linspace(0, 1.5, 40)
-    for edge in (1.0, 1.011, 1.02):
-        pressure = np.sqrt(np.maximum(0, edge - angle))
-        assert codes.edge_angle(angle, pressure) == pytest.approx(edge, abs=1e-9)
-    assert math.isnan(codes.edge_angle(angle, np.zeros(40)))
 
 
 # --- the command
