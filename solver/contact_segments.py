@@ -29,8 +29,8 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     breaks = [_apart(np.sort(met.xi[inside & (met.facet == k)])) for k in range(own.n_facets)]
     segments = max(len(b) for b in breaks) - 1
     ends = np.array([_refined(b, segments) for b in breaks])
-    # three points are exact for a quadratic pressure against quadratic shape functions, but for the curve's measure
-    x, w = np.polynomial.legendre.leggauss(own.degree + 2 if segments == 1 else own.degree + 1)
+    # two more than a quadratic pressure against quadratic shape functions wants: pairs slide, and the breaks stay behind
+    x, w = np.polynomial.legendre.leggauss(own.degree + 3)
     length = np.diff(ends, axis=1)[:, :, None]
     xi = ends[:, :-1, None] + length * (x + 1) / 2
     return xi.reshape(own.n_facets, -1), (length * w / 2).reshape(own.n_facets, -1)
