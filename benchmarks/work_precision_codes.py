@@ -69,7 +69,8 @@ def _archord_task(case: Case, series: Series, mesh: Mesh, folder: Path, limit: f
             scene.analysis.kinematics,
             round(sum(read_history(run / "history.csv")["iterations"])),
             report["totals"].get("factorisations"),
-            profile_of(run)["hole"] / scene.E_star,
+            profile_of(run)["both"] / scene.E_star,
+            "both",
         )
 
     return Task(

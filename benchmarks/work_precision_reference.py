@@ -76,7 +76,8 @@ def read_reference(case: str, kinematics: Kinematics = "current") -> Reference:
     data = stored(case, kinematics)
     values = {name: entry["value"] for name, entry in data["quantities"].items()}
     errors = {name: entry["error"] for name, entry in data["quantities"].items()}
-    return Reference(values, errors, {side: np.array(p) for side, p in data.get("profile", {}).items()})
+    profile = {side: np.array(p) for side, p in data.get("profile", {}).items()}
+    return Reference(values, errors, profile | {"both": _mean(profile)} if profile else {})
 
 
 def stored(case: str, kinematics: Kinematics) -> dict[str, Any]:
@@ -90,6 +91,11 @@ def stored(case: str, kinematics: Kinematics) -> dict[str, Any]:
     return data
 
 
+def _mean(profile: dict[str, Array]) -> Array:
+    """The pressure at an angle, of which the unbiased contact integrates one half on either side."""
+    return np.mean(list(profile.values()), axis=0)
+
+
 def values_of(folder: Path) -> dict[str, float]:
     """The quantities of a run's last step."""
     history = read_history(folder / "history.csv")
@@ -97,10 +103,11 @@ def values_of(folder: Path) -> dict[str, float]:
 
 
 def profile_of(folder: Path) -> dict[str, Array]:
-    """The pressure ``(401,)`` at `ANGLES` by side, at a run's last step."""
+    """The pressure ``(401,)`` at `ANGLES` by side, and of "both", at a run's last step."""
     run = read_run(folder)
     arcs = read_arcs(run, len(run.delta))
-    return {side: sampled(arcs[side]) for side in SIDES if side in arcs}
+    sides = {side: sampled(arcs[side]) for side in SIDES if side in arcs}
+    return sides | {"both": _mean(sides)}
 
 
 def compute(

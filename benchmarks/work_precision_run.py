@@ -25,7 +25,8 @@ class RunFailure(RuntimeError):
 @dataclass(frozen=True)
 class Values:
     """What a code found at the last step: ``quantities`` (P/(E* R), p0/E*, eps [rad], dissipation/(E* R2)) and the
-    pressure ``profile`` ``(401,)`` over E*, of the ``side`` "pin" or "hole"; what it does not tell is absent."""
+    pressure ``profile`` ``(401,)`` over E*, of the ``side`` "pin" or "hole", or "both", their mean; what it does
+    not tell is absent."""
 
     quantities: dict[str, float]
     dofs: int

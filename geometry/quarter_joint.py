@@ -15,6 +15,8 @@ from mpi4py import MPI
 from archord.geometry.fenicsx import gmsh_to_mesh
 from archord.geometry.joint_mesh import Cells, Facets, JointMesh, edges_on, on_circle, tag_and_size
 
+_EDGE_GROWTH = 0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
+
 
 def quarter_joint(
     comm: MPI.Comm,
@@ -26,13 +28,15 @@ def quarter_joint(
     *,
     size_ratio: float = 1.0,
     degree: int = 2,
+    edge: tuple[float, float] | None = None,
     rigid_pin: bool = False,
     partitioner=None,
 ) -> JointMesh:
     """Mesh the quarter joint with second-order curved triangles.
 
     ``element_size`` is the edge length on the hole's arc, ``size_ratio`` times that the one on the pin's; away from
-    them it grows by ``growth`` per unit of distance. Lengths share one unit. A rigid pin is not meshed.
+    them it grows by ``growth`` per unit of distance. ``edge`` is an angle from the axis [rad] and the size to which
+    the elements shrink there, where the contact is to end. Lengths share one unit. A rigid pin is not meshed.
     ``partitioner`` is a dolfinx cell partitioner (tests use it to cut the mesh in unusual ways). Collective over
     ``comm``; rank 0 meshes.
     """
@@ -50,7 +54,8 @@ def quarter_joint(
             faces[Cells.PIN] = geo.addPlaneSurface([geo.addCurveLoop([arc, top, axis])])
             curves[Facets.PIN_ARC], curves[Facets.PIN_TOP] = [arc], [top]
             curves[Facets.SYMMETRY] += [axis]
-            geo.mesh.setTransfiniteCurve(arc, edges_on(math.pi / 2, size_ratio * size) + 1)
+            if edge is None:
+                geo.mesh.setTransfiniteCurve(arc, edges_on(math.pi / 2, size_ratio * size) + 1)
         centre = geo.addPoint(0, 0, 0)
         bottom, side = geo.addPoint(0, far[0], 0), geo.addPoint(far[2], 0, 0)
         corners = [geo.addPoint(x, y, 0) for x, y in ((width, 0), (width, -width), (0, -width))]
@@ -59,10 +64,17 @@ def quarter_joint(
         faces[Cells.BLOCK] = geo.addPlaneSurface([geo.addCurveLoop([arc, *edges])])
         curves[Facets.HOLE_ARC], curves[Facets.BLOCK_HELD] = [arc], [edges[0]]
         curves[Facets.SYMMETRY] += [edges[-1]]
-        geo.mesh.setTransfiniteCurve(arc, edges_on(math.pi / 2, size) + 1)
+        if edge is None:
+            geo.mesh.setTransfiniteCurve(arc, edges_on(math.pi / 2, size) + 1)
         from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
         on_arc = {Cells.PIN: size_ratio * size, Cells.BLOCK: size}
-        tag_and_size(gmsh, faces, curves, {body: f"{value!r} + {from_arc}" for body, value in on_arc.items()})
+        sizes = {body: f"{value!r} + {from_arc}" for body, value in on_arc.items()}
+        if edge is not None:
+            angle, fine = edge
+            x, y = hole * math.sin(angle), hole * math.cos(angle)
+            from_edge = f"{fine / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
+            sizes = {body: f"Min({value}, {from_edge})" for body, value in sizes.items()}
+        tag_and_size(gmsh, faces, curves, sizes)
 
     def exact(x: np.ndarray, tag: int) -> np.ndarray:
         if tag == Facets.PIN_ARC:

@@ -29,7 +29,7 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     breaks = [_apart(np.sort(met.xi[inside & (met.facet == k)])) for k in range(own.n_facets)]
     segments = max(len(b) for b in breaks) - 1
     ends = np.array([_refined(b, segments) for b in breaks])
-    # two more than a quadratic pressure against quadratic shape functions wants: pairs slide, and the breaks stay behind
+    # two more than a quadratic pressure against quadratic shape functions wants, as pairs slide and breaks do not
     x, w = np.polynomial.legendre.leggauss(own.degree + 3)
     length = np.diff(ends, axis=1)[:, :, None]
     xi = ends[:, :-1, None] + length * (x + 1) / 2

@@ -82,7 +82,8 @@ class Joint:
         options = {"size_ratio": g.size_ratio, "degree": self.scene.analysis.degree, "partitioner": partitioner}
         if g.model == "ring":
             return half_ring(self.comm, *sizes, self.scene.load.core_radius * g.radius, **options)
-        return quarter_joint(self.comm, *sizes, rigid_pin=self.scene.pin.rigid, **options)
+        edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
+        return quarter_joint(self.comm, *sizes, edge=edge, rigid_pin=self.scene.pin.rigid, **options)
 
     def _core_force(self) -> Array:
         """Downward nodal forces ``(n_owned, 2)`` of half a unit force, spread over the core as ``1 - (r/core)^2``."""

@@ -96,6 +96,13 @@ class JointGeometry(_Section):
         ge=0.01,
         le=100,
     )
+    edge_angle: float | None = _key(
+        "semi-angle [rad] at which the contact is to end: elements on the arcs shrink toward it; not in a ring",
+        default=None,
+        gt=0,
+        lt=math.pi / 2,
+    )
+    edge_ratio: float = _key("element size at edge_angle over element_size", default=0.25, ge=0.01, le=1)
     growth: float = _key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
 
     @model_validator(mode="after")
@@ -114,6 +121,10 @@ class JointGeometry(_Section):
             raise ValueError(f"{name}|must be between 1e-4 and 0.5 times the radius")
         if not 1e-4 <= self.size_ratio * self.h / self.radius <= 0.5:
             raise ValueError("size_ratio|must leave the pin's elements between 1e-4 and 0.5 times the radius")
+        if self.edge_angle is not None and self.model == "ring":
+            raise ValueError("edge_angle|is only for the model block")
+        if self.edge_angle is not None and self.edge_ratio * self.h / self.radius < 1e-4:
+            raise ValueError("edge_ratio|must leave elements of at least 1e-4 times the radius")
         if 2 * (self.radius + self.dR) > self.W:
             raise ValueError("block_size|must be at least twice the radius of the hole")
         if self.W / self.radius > _WIDEST:

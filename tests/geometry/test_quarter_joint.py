@@ -55,6 +55,19 @@ def test_arc_nodes_lie_on_their_radius(joint):
     assert np.abs(np.linalg.norm(hole, axis=-1) - R - DR).max() < 1e-15
 
 
+def test_elements_shrink_toward_the_edge_of_the_contact():
+    """Edges of both arcs are a quarter as long at the given angle, and elsewhere no longer than without it."""
+    angle, fine = 1.1, SIZE / 4
+    joint = quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH, edge=(angle, fine))
+    for tag, centre in ((Facets.PIN_ARC, -DR), (Facets.HOLE_ARC, 0.0)):
+        x, length = facet_nodes(joint, tag) - [0, centre], edge_lengths(joint, tag)
+        middle = x.mean(axis=1)
+        away = np.abs(np.arctan2(middle[:, 0], -middle[:, 1]) - angle)
+        assert length[away.argmin()] == pytest.approx(fine, rel=0.35)
+        assert length.max() < 1.2 * SIZE
+        assert length[away > 0.6].mean() > 2 * fine
+
+
 def test_arcs_reach_from_the_axis_to_the_top(joint):
     """Both end on the symmetry axis and on the height of their centre, with equal edges (to gmsh's 1e-8)."""
     for tag, radius, centre in ((Facets.PIN_ARC, R, -DR), (Facets.HOLE_ARC, R + DR, 0.0)):
