@@ -62,7 +62,7 @@ class Curve:
         self.X = X
         self.degree = degree
         self.n_facets = (len(X) - 1) // degree
-        self.connectivity = np.arange(self.n_facets)[:, None] * degree + np.arange(degree + 1)
+        self.connectivity = (np.arange(self.n_facets)[:, None] * degree + np.arange(degree + 1)).astype(np.int32)
         self._coefficients = lagrange(degree)
 
     def shapes(self, xi: Array) -> tuple[Array, Array, Array]:
@@ -166,7 +166,7 @@ class RigidCircle:
             tangent=np.stack([-normal[:, 1], normal[:, 0]], axis=1),
             bend=np.full(m, -1.0 / self.radius),
             slides=np.ones(m, dtype=bool),
-            nodes=np.zeros((m, 1), dtype=np.int64),
+            nodes=np.zeros((m, 1), dtype=np.int32),
             shape=np.ones((m, 1)),
             slope=np.zeros((m, 1)),
             facet=np.zeros(m, dtype=np.int32),

@@ -153,15 +153,9 @@ class Contact:
         """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, 2)`` of owned nodes."""
         on_curve = {id(side): np.zeros((len(side.curve_dofs), 2)) for side in self.sides}
         for pair in self.pairings:
-            side, f, P = pair.side, pair.forces, pair.projection
-            n, q = side.weight.shape
-            along = np.broadcast_to(side.trace[:, None, :], (n, q, side.trace.shape[1]))
-            own = np.einsum("nqa,nqi->nai", np.take_along_axis(side.shape, along, axis=2), f.reshape(n, q, 2))
-            np.add.at(on_curve[id(side)], side.curve.connectivity[side.facet], -own)
-            if isinstance(pair.opposite, ContactSide):
-                np.add.at(on_curve[id(pair.opposite)], P.nodes, P.shape[:, :, None] * f[:, None, :])
+            pair.add_forces(on_curve[id(pair.side)], on_curve.get(id(pair.opposite), np.zeros((1, 2))))
         for side in self.sides:
-            side.add_to_owned(side.sum_over_ranks(on_curve[id(side)]), force)
+            side.add_to_owned(side.sum_over_ranks(-on_curve[id(side)]), force)
 
     @property
     def tangent(self) -> ContactTangent:

@@ -8,8 +8,15 @@ from typing import Literal
 import numpy as np
 
 from archord.geometry.curve import Array, Curve, Projection, RigidCircle
+from archord.kernels.compiled import library, pointer
 from archord.solver.contact_side import ContactSide
 
+_PROTOTYPES = """
+void contact_pressure(int32_t m, const double *stress, const double *outward, const double *opening,
+    const double *normal, const double *gamma, const uint8_t *found, double *traction, double *gap, double *pressure);
+void contact_forces(int32_t n, int32_t q, int32_t k, int32_t o, const double *force, const double *trace,
+    const int32_t *own_nodes, const double *shape, const int32_t *opposite_nodes, double *own, double *opposite);
+"""
 Kinematics = Literal["current", "reference", "tied"]
 
 
@@ -69,30 +76,24 @@ class Pairing:
         side, outward = self.side, self.side.outward.reshape(-1, 2)
         displacement, stress, tangent = (values.reshape(-1, *values.shape[2:]) for values in side.deform(u))
         self.tangent = tangent
-        traction = np.stack(
-            [
-                stress[:, 0] * outward[:, 0] + stress[:, 3] * outward[:, 1],
-                stress[:, 3] * outward[:, 0] + stress[:, 1] * outward[:, 1],
-            ],
-            axis=1,
-        )
         if self.kinematics == "current":
             self._pair_anew(side.point.reshape(-1, 2) + displacement, outward, motion)
             opening = self.separation
         else:
             jump = displacement - self._opposite_displacement(motion)
             opening = self.separation + jump
-            if self.kinematics == "tied":
-                traction = traction - self.gamma[:, None] * jump
-        normal = self.projection.normal
-        self.traction = traction
-        self.gap = (opening * normal).sum(1)
-        normal_traction = (traction * normal).sum(1)
+        self.traction, self.gap, self.pressure = self._pressed(stress, outward, opening)
         if self.kinematics == "tied":
-            self.pressure = normal_traction
-        else:
-            trial = normal_traction - self.gamma * self.gap
-            self.pressure = np.where(self.projection.found & (trial > 0), trial, 0.0)
+            self.traction -= self.gamma[:, None] * jump
+            self.pressure = (self.traction * self.projection.normal).sum(1)
+
+    def _pressed(self, stress: Array, outward: Array, opening: Array) -> tuple[Array, Array, Array]:
+        """Traction ``(m, 2)``, gap and pressure ``(m,)`` of a contact that only presses."""
+        m, P = len(stress), self.projection
+        given = stress, outward, opening, P.normal, self.gamma, P.found
+        found = np.empty((m, 2)), np.empty(m), np.empty(m)
+        library("contact_points", _PROTOTYPES).contact_pressure(m, *map(pointer, given + found))
+        return found
 
     def _pair_anew(self, x: Array, outward: Array, motion: Array) -> None:
         if isinstance(self.curve, Curve) and self._hold:
@@ -122,3 +123,12 @@ class Pairing:
         if self.kinematics == "tied":
             return np.where(self.projection.found, w, 0.0)[:, None] * self.traction
         return (w * self.pressure)[:, None] * self.projection.normal
+
+    def add_forces(self, own: Array, opposite: Array) -> None:
+        """Add the forces on the nodes of the own curve to ``own`` ``(nodes, 2)``, their reactions to ``opposite``."""
+        side, P = self.side, self.projection
+        n, q, k = side.trace_shape.shape
+        on_own = self.forces, side.trace_shape, side.curve.connectivity[side.facet]
+        on_opposite = P.shape, P.nodes
+        forces = library("contact_points", _PROTOTYPES).contact_forces
+        forces(n, q, k, P.shape.shape[1], *map(pointer, (*on_own, *on_opposite, own, opposite)))

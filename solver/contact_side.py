@@ -23,9 +23,9 @@ class ContactSide:
 
     Arrays of this rank's ``n`` facets with ``q`` points each, in the order in which the curve runs: ``weight`` ``(n,
     q)`` (measure of the curved edge), ``point`` and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own
-    cell's basis, ``shape`` ``(n, q, a)``, ``gamma`` ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve,
-    ``trace`` their nodes within the cell; ``curve_cell_dofs`` holds the global cell dofs of every facet of the curve,
-    on every rank.
+    cell's basis, ``shape`` ``(n, q, a)`` and of it ``trace_shape`` ``(n, q, k)`` of the nodes on the facet, ``gamma``
+    ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve, ``trace`` their nodes within the cell;
+    ``curve_cell_dofs`` holds the global cell dofs of every facet of the curve, on every rank.
     """
 
     def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material) -> None:
@@ -98,6 +98,8 @@ class ContactSide:
         self.weight = length * w[self.facet]
         self.outward = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
         self.point, self.gradient, self.shape = basis.point, basis.gradient, np.ascontiguousarray(basis.shape)
+        along = np.broadcast_to(self.trace[:, None, :], (*self.weight.shape, self.trace.shape[1]))
+        self.trace_shape = np.take_along_axis(self.shape, along, axis=2)
         self.points = material_points(self.material, self.weight.size)
 
     def _trace_inequality(self) -> Array:
@@ -152,7 +154,7 @@ class ContactSide:
 
     def add_to_owned(self, curve_force: Array, force: Array) -> None:
         """Add nodal forces ``(n_nodes, 2)`` of the whole curve to this rank's owned ``force`` ``(n, 2)``."""
-        np.add.at(force, self._owned_local, curve_force[self._owned])
+        force[self._owned_local] += curve_force[self._owned]
 
     def deform(self, u: Array) -> tuple[Array, Array, Array]:
         """Own displacement ``(n, q, 2)``, stress ``(n, q, 4)`` and tangent ``(n, q, 3, 3)`` at the contact points."""
