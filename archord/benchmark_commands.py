@@ -105,6 +105,34 @@ def scaling(
     return 1 if costs.faults() else 0
 
 
+@benchmark.command()
+def variants(
+    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs and table")] = Path("runs/variants"),
+    repeats: Annotated[int, typer.Option("--repeats", min=1, help="runs of each variant; the median counts")] = 3,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what is wrong")] = False,
+) -> int:
+    """Solve one scene in variants, and tell what each loads, needs and writes.
+
+    Writes variants.csv and variants.md. Exit code 0 only if none loads what it does not use.
+    """
+    from archord.benchmarks import variants as table
+
+    def said(use) -> None:
+        if not quiet:
+            print(f"{use.variant.name}: {use.seconds:.2f} s, {use.modules} modules", file=sys.stderr, flush=True)
+
+    uses = table.run(output / "runs", repeats, said)
+    files = table.write_report(uses, output)
+    faults = [fault for use in uses for fault in use.faults()]
+    if not quiet:
+        print(table.markdown(uses))
+        for file in files:
+            print(file)
+    for fault in faults:
+        print(f"archord: {fault}.", file=sys.stderr)
+    return 1 if faults else 0
+
+
 def _print_table(lines) -> None:
     from rich.console import Console
     from rich.table import Table

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
@@ -14,7 +15,6 @@ from archord.solver.checkpoint import write as write_checkpoint
 from archord.solver.contact_file import ContactWriter
 from archord.solver.contact_profile import ArcProfile
 from archord.solver.disk import WriteError, naming, on_root, replace_text
-from archord.solver.fields import FieldWriter
 from archord.solver.history import History
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.joint import Joint
@@ -29,6 +29,9 @@ from archord.solver.scene_file import resolved
 from archord.solver.standing import Standing, halt, resume
 from archord.solver.stepping import Position, Step, StepFailure, march
 from archord.solver.timer import Timer
+
+if TYPE_CHECKING:
+    from archord.solver.fields import FieldWriter
 
 _UNSEEN = (
     "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
@@ -137,6 +140,8 @@ class _Output:
             on_root(comm, lambda: self._prepare(start))
             self._fields: FieldWriter | None = None
             if joint.scene.output.fields:
+                from archord.solver.fields import FieldWriter
+
                 self._fields = FieldWriter(self.folder, self._order, len(joint.scene.targets), after=len(self.steps))
             on_root(comm, self._write_scene)
         self._last = perf_counter()
@@ -204,6 +209,8 @@ class _Output:
 
     def debug(self, load: float) -> None:
         """Write the state that the last solve left, without success at ``load``. Collective."""
+        from archord.solver.fields import FieldWriter
+
         FieldWriter(self.folder, self._order, 1, debug=True).write(1, load)
 
     def unseen(self) -> bool:
