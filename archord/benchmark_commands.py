@@ -65,6 +65,74 @@ def stability(
     return 1 if wrong else 0
 
 
+@benchmark.command()
+def scaling(
+    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs, tables and picture")] = Path(
+        "runs/scaling"
+    ),
+    largest: Annotated[
+        float, typer.Option("--largest", metavar="N", help="dofs of the largest mesh, 1 million at most")
+    ] = 1_000_000,
+    ranks: Annotated[str, typer.Option("--ranks", metavar="1,2", help="numbers of ranks, 1 first")] = "1,2",
+    repeats: Annotated[int, typer.Option("--repeats", min=1, help="runs of each case; the median counts")] = 1,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what is wrong")] = False,
+) -> int:
+    """Solve the paper's joint on ever finer meshes and several ranks: time by part and memory per rank.
+
+    Writes scaling.csv, scaling.md and scaling.png. Exit code 0 only if every run finishes, with the same force on any
+    number of ranks.
+    """
+    from archord.benchmarks import scaling as table
+    from archord.benchmarks.scaling_report import markdown, write_report
+    from archord.solver.scene import SceneError
+
+    if not all(part.strip().isdecimal() for part in ranks.split(",")):
+        raise SceneError(f"--ranks {ranks}: must be whole numbers with commas between them, like 1,2.")
+
+    def said(cost) -> None:
+        if not quiet:
+            what = cost.fault or f"{cost.dofs} dofs, {cost.total:.1f} s, {cost.peak / 1e6:.0f} MB"
+            print(f"{cost.case.name}: {what}", file=sys.stderr, flush=True)
+
+    costs = table.Costs(table.run(largest, [int(part) for part in ranks.split(",")], output / "runs", repeats, said))
+    files = write_report(costs, output)
+    if not quiet:
+        print(markdown(costs))
+        for file in files:
+            print(file)
+    for fault in costs.faults():
+        print(f"archord: {fault}.", file=sys.stderr)
+    return 1 if costs.faults() else 0
+
+
+@benchmark.command()
+def variants(
+    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs and table")] = Path("runs/variants"),
+    repeats: Annotated[int, typer.Option("--repeats", min=1, help="runs of each variant; the median counts")] = 3,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what is wrong")] = False,
+) -> int:
+    """Solve one scene in variants, and tell what each loads, needs and writes.
+
+    Writes variants.csv and variants.md. Exit code 0 only if none loads what it does not use.
+    """
+    from archord.benchmarks import variants as table
+
+    def said(use) -> None:
+        if not quiet:
+            print(f"{use.variant.name}: {use.seconds:.2f} s, {use.modules} modules", file=sys.stderr, flush=True)
+
+    uses = table.run(output / "runs", repeats, said)
+    files = table.write_report(uses, output)
+    faults = [fault for use in uses for fault in use.faults()]
+    if not quiet:
+        print(table.markdown(uses))
+        for file in files:
+            print(file)
+    for fault in faults:
+        print(f"archord: {fault}.", file=sys.stderr)
+    return 1 if faults else 0
+
+
 def _print_table(lines) -> None:
     from rich.console import Console
     from rich.table import Table

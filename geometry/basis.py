@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import basix
 import numpy as np
 import numpy.typing as npt
-from dolfinx.mesh import Mesh
 
 from archord.kernels.compiled import library, pointer
+
+if TYPE_CHECKING:
+    from dolfinx.mesh import Mesh
 
 Array = npt.NDArray[np.float64]
 

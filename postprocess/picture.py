@@ -30,6 +30,8 @@ def draw(folder: str | Path, target: str | Path | None = None) -> Path:
     folder = Path(folder)
     missing = [name for name in FILES if not (folder / name).is_file()]
     run = read_run(folder)
+    if not run.scene.output.fields:
+        raise SceneError(f"{folder}: has no fields to draw: it was solved with output.fields = false.")
     if missing:
         raise SceneError(f"{folder}: is not a complete run folder: {missing[0]} is missing.")
     history = read_history(folder / "history.csv")

@@ -7,10 +7,13 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from archord.solver.disk import replace_text
-from archord.solver.measures import Measures
 from archord.solver.scene import Scene
+
+if TYPE_CHECKING:
+    from archord.solver.measures import Measures
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from archord.solver.joint import Joint
 from archord.solver.measures import Measures
 from archord.solver.stepping import Step
 
-_INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact")
+_INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")
 _FEW_FACETS = 5
 _ROUGH = 0.01  # of the clearance
 
@@ -44,6 +44,7 @@ class Report:
         self.path, self.joint, self.begun = path, joint, begun
         self.measures = list(done)
         self._residual = 0.0
+        self.peak_memory: list[int] = []  # bytes, per rank; whoever knows all ranks sets it
         self.content: dict[str, Any] = {
             "status": "running",
             "message": "",
@@ -85,7 +86,11 @@ class Report:
             self._residual = max(self._residual, step.residual)
         self.content["warnings"] += _warnings(self.joint, profiles, m, step.residual)
         self.content["steps"].append(
-            asdict(m) | {"substeps": step.substeps, "residuals": [a.residuals for a in step.attempts]}
+            asdict(m)
+            | {"substeps": step.substeps}
+            | {"factorisations": sum(a.factorisations for a in step.attempts)}
+            | {"evaluations": sum(a.evaluations for a in step.attempts)}
+            | {"residuals": [a.residuals for a in step.attempts]}
         )
         self.write()
 
@@ -99,6 +104,7 @@ class Report:
     def write(self) -> None:
         """Replace run.json in one move, so that a reader never sees half of it. Raises `OSError`."""
         self.content |= {"totals": self._totals(), "seconds": self._seconds(), "error_estimates": self._errors()}
+        self.content["peak_memory"] = self.peak_memory
         replace_text(self.path, json.dumps(_finite(self.content), indent=1, allow_nan=False) + "\n")
 
     def _totals(self) -> dict[str, int]:

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
@@ -14,11 +15,11 @@ from archord.solver.checkpoint import write as write_checkpoint
 from archord.solver.contact_file import ContactWriter
 from archord.solver.contact_profile import ArcProfile
 from archord.solver.disk import WriteError, naming, on_root, replace_text
-from archord.solver.fields import FieldWriter
 from archord.solver.history import History
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures, Work, arc_profiles, measure
+from archord.solver.memory import peak_memory
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.report import Report
 from archord.solver.restart import Start
@@ -28,6 +29,9 @@ from archord.solver.scene_file import resolved
 from archord.solver.standing import Standing, halt, resume
 from archord.solver.stepping import Position, Step, StepFailure, march
 from archord.solver.timer import Timer
+
+if TYPE_CHECKING:
+    from archord.solver.fields import FieldWriter
 
 _UNSEEN = (
     "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
@@ -134,7 +138,11 @@ class _Output:
             self._order = MeshOrder(joint)
             self.steps = comm.bcast(start.done if start else [])
             on_root(comm, lambda: self._prepare(start))
-            self._fields = FieldWriter(self.folder, self._order, len(joint.scene.targets), after=len(self.steps))
+            self._fields: FieldWriter | None = None
+            if joint.scene.output.fields:
+                from archord.solver.fields import FieldWriter
+
+                self._fields = FieldWriter(self.folder, self._order, len(joint.scene.targets), after=len(self.steps))
             on_root(comm, self._write_scene)
         self._last = perf_counter()
         if not comm.bcast(start is not None):
@@ -188,12 +196,21 @@ class _Output:
             self._report.add(m, step, profiles)
 
         with self.joint.timer("output"):
-            self._fields.write(m.step, m.delta, again=again)
+            if self._fields is not None:
+                self._fields.write(m.step, m.delta, again=again)
+            self._note_memory()
             on_root(self.joint.comm, add)
         self.steps.append(m)
 
+    def _note_memory(self) -> None:
+        memory = self.joint.comm.gather(peak_memory())
+        if self._report is not None:
+            self._report.peak_memory = memory or []
+
     def debug(self, load: float) -> None:
         """Write the state that the last solve left, without success at ``load``. Collective."""
+        from archord.solver.fields import FieldWriter
+
         FieldWriter(self.folder, self._order, 1, debug=True).write(1, load)
 
     def unseen(self) -> bool:
@@ -202,6 +219,8 @@ class _Output:
 
     def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
         """Note how the run ended; returns the warnings on rank 0. Collective."""
+
+        self._note_memory()
 
         def note() -> list[str]:
             if self._report is None:

@@ -321,6 +321,12 @@ class Stepping(_Section):
         return self
 
 
+class Output(_Section):
+    """What a run writes besides its curves."""
+
+    fields: bool = _key("write the fields of every step to fields.xdmf and fields.h5", default=True)
+
+
 class Scene(_Section):
     """A pin joint and how to load it."""
 
@@ -332,6 +338,7 @@ class Scene(_Section):
     analysis: Analysis = Field(default_factory=Analysis, description="model and solver")
     load: Load = Field(description="loading")
     stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
+    output: Output = Field(default_factory=Output, description="what is written")
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:

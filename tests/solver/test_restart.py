@@ -38,6 +38,7 @@ CASES = {
     "ring": (persson_joint(0.5, 0.2, 4, block={"yield_stress": 0.002}), 2),
     "ring with an interference": (persson_joint(-2.0, 0.2, 3), 1),
     "substeps": (scene(0.2, 3, **PLASTIC, stepping={"initial": 0.1, "growth": 1.5}), 1),
+    "no fields": (scene(0.2, 3, output={"fields": False}), 1),
     "cutbacks": (scene(0.2, 2, **PLASTIC, analysis={"max_iterations": 6}), 1),
 }
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.postprocess.picture import draw
 from archord.solver.history import read_history
 from archord.solver.run import solve_scene
 from archord.solver.run_folder import CHECKPOINT, FILES, claim_folder
@@ -33,6 +34,35 @@ def test_all_files_are_there_and_say_done(run):
     assert report["error_estimates"]["force_balance"] < 1e-8
     assert {"archord", "dolfinx", "petsc", "mpi", "numpy", "python"} <= report["versions"].keys()
     assert sum(s for name, s in report["seconds"].items() if name != "total") <= report["seconds"]["total"] * 1.001
+
+
+def test_every_step_tells_what_it_cost(run):
+    """The steps' counts add up to the totals, and there is a peak of memory for each rank."""
+    report = json.loads((run.folder / "run.json").read_text())
+    steps, totals = report["steps"], report["totals"]
+    assert sum(s["factorisations"] for s in steps) == totals["factorisations"] <= totals["newton_iterations"]
+    assert sum(s["evaluations"] for s in steps) == totals["residual_evaluations"] > totals["newton_iterations"]
+    assert len(report["peak_memory"]) == report["ranks"] == 1
+    arrays = report["mesh"]["dofs"] * 8
+    assert arrays < report["peak_memory"][0] < 1e6 * arrays
+
+
+def test_a_run_without_fields_is_the_same_but_for_them(tmp_path):
+    """The same curves, byte for byte but for the clock; nothing to draw, in one sentence."""
+    for name, fields in (("with", True), ("without", False)):
+        (tmp_path / name).mkdir()
+        solve_scene(scene(0.2, 2, output={"fields": fields}), tmp_path / name, MPI.COMM_SELF)
+    curves = [read_history(tmp_path / name / "history.csv") for name in ("with", "without")]
+    for curve in curves:
+        curve.pop("seconds")
+    assert curves[0] == curves[1]
+    there, here = ({p.name for p in (tmp_path / name).iterdir()} for name in ("with", "without"))
+    assert there - here == {"fields.xdmf", "fields.h5"}
+    assert not here - there
+    with pytest.raises(
+        SceneError, match=r"without: has no fields to draw: it was solved with output\.fields = false\."
+    ):
+        draw(tmp_path / "without")
 
 
 def test_history_holds_units_and_dimensionless_forms(run):

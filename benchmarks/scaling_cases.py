@@ -1,0 +1,77 @@
+"""The meshes of the scaling benchmark: the paper's joint, refined everywhere alike, on one rank and on several."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scipy.optimize import brentq
+
+from archord.benchmarks.paper_joint import paper_joint
+from archord.solver.scene import JointGeometry, Scene, SceneError
+
+ELASTIC = (5_000, 30_000, 100_000, 300_000, 1_000_000)  # dofs
+PLASTIC = (5_000, 30_000, 100_000)
+WEAK = (30_000, 100_000, 300_000)  # dofs per rank
+ELASTIC_STEPS, PLASTIC_STEPS = 2, 5
+YIELD_STRESS = 0.002  # over E*
+_COARSEST = {"element_size": 0.04, "growth": 0.25}  # both are scaled, so that the meshes are alike
+_SCALES = 0.045, 2.0  # of those; growth then stays within its limits
+_DOFS_PER_CELL = 4.15  # expected, of fine meshes: two nodes a triangle, and gmsh makes a few more of them
+
+
+@dataclass(frozen=True)
+class Case:
+    """The joint with about ``dofs`` unknowns, elastic or ``plastic``, on ``ranks`` ranks; ``weak``: only to compare
+    with a mesh smaller by the number of ranks."""
+
+    dofs: int
+    ranks: int
+    plastic: bool = False
+    weak: bool = False
+
+    @property
+    def name(self) -> str:
+        """Material, size and ranks."""
+        return f"{'plastic' if self.plastic else 'elastic'}_{self.dofs}_on_{self.ranks}"
+
+    def scene(self) -> Scene:
+        """The joint to solve."""
+        size, growth = refined(self.dofs)
+        steps, strength = (PLASTIC_STEPS, YIELD_STRESS) if self.plastic else (ELASTIC_STEPS, None)
+        return paper_joint(size, steps, strength, joint={"element_size": size, "growth": growth})
+
+
+def refined(dofs: float) -> tuple[float, float]:
+    """Element size on the arcs, over R, and growth of a mesh with about ``dofs`` unknowns."""
+
+    def excess(scale: float) -> float:
+        sizes = {name: scale * value for name, value in _COARSEST.items()}
+        # without its checks, which refuse meshes beyond the wanted one
+        cells = JointGeometry.model_construct(radius=1.0, clearance=0.005, **sizes).expected_cells
+        return _DOFS_PER_CELL * cells - dofs
+
+    scale = brentq(excess, *_SCALES, rtol=1e-6)
+    return scale * _COARSEST["element_size"], scale * _COARSEST["growth"]
+
+
+def cases(largest: float, ranks: Sequence[int]) -> list[Case]:
+    """All runs up to ``largest`` dofs, the smallest first: every size on every number of ``ranks``, the weak series on
+    several, the plastic series on one. Raises `SceneError` if no size is left, or ``ranks`` do not begin with 1."""
+    if largest < ELASTIC[0]:
+        raise SceneError(f"--largest {largest:g}: must be at least {ELASTIC[0]}, the dofs of the smallest mesh.")
+    if not ranks or ranks[0] != 1 or sorted(set(ranks)) != list(ranks):
+        raise SceneError(
+            f"--ranks {','.join(map(str, ranks))}: must be numbers of ranks that rise from 1, like 1,2, as everything "
+            "is compared with one rank."
+        )
+    sizes = [n for n in ELASTIC if n <= largest]
+    chosen = [Case(n, r) for n in sizes for r in ranks]
+    chosen += [
+        Case(n * r, r, weak=True)
+        for n in WEAK
+        for r in ranks[1:]
+        if n * r <= largest and n * r not in sizes and n in sizes
+    ]
+    chosen += [Case(n, 1, plastic=True) for n in PLASTIC if n <= largest]
+    return sorted(chosen, key=lambda case: case.dofs * (PLASTIC_STEPS if case.plastic else 1))

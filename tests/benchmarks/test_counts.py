@@ -1,0 +1,26 @@
+"""What a solve costs, in counts that do not depend on the clock, does not grow unnoticed."""
+
+import pytest
+
+from archord.benchmarks.counts import count, grown, kept, names
+
+
+@pytest.mark.parametrize("name", names())
+def test_no_count_grows_by_more_than_a_tenth(name):
+    now, before = count(name), kept()[name]
+    assert not grown(name, now, before), f"{now}, kept {before}: python3 -m archord.benchmarks.counts --write"
+
+
+def test_more_than_a_tenth_is_noticed_and_less_is_not():
+    before = {"dofs": 1000, "iterations": 100, "factorisations": 90, "evaluations": 120}
+    assert not grown("case", {name: 11 * value // 10 for name, value in before.items()}, before)
+    assert grown("case", before | {"iterations": 111}, before) == ["case: iterations grew from 100 to 111"]
+    assert len(grown("case", {name: 2 * value for name, value in before.items()}, before)) == 4
+
+
+def test_every_case_is_kept_with_all_that_a_solve_counts():
+    assert list(kept()) == names()
+    assert all(
+        set(counts) == {"dofs", "iterations", "factorisations", "evaluations"} and min(counts.values()) > 0
+        for counts in kept().values()
+    )

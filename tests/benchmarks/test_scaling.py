@@ -1,0 +1,115 @@
+"""The scaling benchmark concludes what its numbers say."""
+
+import csv
+import json
+import math
+
+import pytest
+
+from archord.benchmarks.scaling import Costs, exponent, extrapolated, goals, serial_fraction
+from archord.benchmarks.scaling_cases import ELASTIC, Case, cases, refined
+from archord.benchmarks.scaling_report import markdown
+from archord.benchmarks.scaling_run import PARTS, Cost, read_cost, solve
+from archord.cli import run
+from archord.solver.scene import SceneError
+
+
+def cost(dofs: int, ranks: int = 1, *, solve: float = 10.0, contact: float = 0.5, **options) -> Cost:
+    """A made-up run of 2 s and the seconds of these parts."""
+    seconds = {part: 0.25 for part in PARTS} | {"linear solve": solve, "contact": contact, "rest": 0.25}
+    plastic = options.pop("plastic", False)
+    return Cost(Case(dofs, ranks, plastic), dofs=dofs, total=sum(seconds.values()), seconds=seconds,
+                memory=[100 * dofs] * ranks, iterations=10, factorisations=8, evaluations=12, force=0.0128,
+                **options)  # fmt: skip
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0, 1.3])
+def test_a_power_law_has_its_exponent(power):
+    sizes = [5e3, 3e4, 1e6]
+    assert exponent(sizes, [3.7 * n**power for n in sizes]) == pytest.approx(power, rel=1e-12)
+    assert math.isnan(exponent([5e3], [1.0]))
+
+
+def test_amdahls_law_is_inverted():
+    """The serial fraction of T(1) (s + (1 - s)/r) is s; what gets slower on more ranks is serial, no more."""
+    for s in (0.0, 0.1, 0.7, 1.0):
+        for ranks in (2, 4):
+            assert serial_fraction(8.0, 8.0 * (s + (1 - s) / ranks), ranks) == pytest.approx(s, abs=1e-12)
+    assert serial_fraction(8.0, 9.0, 2) == 1.0
+    assert serial_fraction(8.0, 3.0, 2) == 0.0
+
+
+def test_an_extrapolation_begins_with_what_was_measured():
+    """On the measured number of ranks it gives that time back; more ranks never take longer, nor less than the parts
+    of rank 0."""
+    one, two = cost(10**6, 1, solve=100.0, contact=2.0), cost(10**6, 2, solve=58.0, contact=1.5)
+    total = [sum(extrapolated(one, two, ranks).values()) for ranks in (2, 4, 16, 64, 10**9)]
+    assert total[0] == pytest.approx(two.total, rel=1e-12)
+    assert total == sorted(total, reverse=True)
+    assert total[-1] > 100.0 * 0.16 + 2.0 * 0.5 + sum(two.seconds[part] for part in ("start-up", "mesh", "output"))
+
+
+@pytest.mark.parametrize("dofs", [20_000, 100_000, 1_000_000])
+def test_meshes_of_the_series_are_alike(dofs):
+    """Element size over growth is the same, so that a quarter of the dofs is twice the size everywhere."""
+    size, growth = refined(dofs)
+    assert size / growth == pytest.approx(0.04 / 0.25, rel=1e-12)
+    assert refined(dofs / 4)[0] / size == pytest.approx(2, rel=0.1)
+
+
+def test_every_size_runs_on_every_number_of_ranks_and_doubled_ones_on_two():
+    found = cases(1e6, [1, 2])
+    assert {(c.dofs, c.ranks) for c in found if not c.plastic} >= {(n, r) for n in ELASTIC for r in (1, 2)}
+    assert {(c.dofs, c.ranks) for c in found if c.weak} == {(60_000, 2), (200_000, 2), (600_000, 2)}
+    assert [c.dofs for c in found if c.plastic] == [5_000, 30_000, 100_000]
+    assert all(c.scene().joint.expected_cells <= 1e6 for c in found)
+    assert max(c.dofs for c in cases(30_000, [1])) == 30_000
+
+
+@pytest.mark.parametrize(("largest", "ranks", "said"), [(100, [1], "--largest 100"), (1e6, [2], "--ranks 2"),
+                                                         (1e6, [1, 1], "--ranks 1,1")])  # fmt: skip
+def test_what_cannot_be_compared_is_refused(largest, ranks, said):
+    with pytest.raises(SceneError, match=said):
+        cases(largest, ranks)
+
+
+def test_goals_follow_the_numbers():
+    """Too steep, too much contact, a run that failed and a force that depends on the ranks are told."""
+    good = Costs([cost(5_000), cost(10**6, solve=200.0), cost(5_000, 2), cost(10**6, 2, solve=100.0)])
+    assert [met for _, _, met in goals(good)] == [True] * 5
+    assert not good.faults()
+    bad = [
+        cost(5_000),
+        cost(50_000, solve=1e3),
+        cost(5_000, 2, contact=9.0),
+        Cost(Case(50_000, 2), fault="exit code 3: no"),
+    ]
+    assert [met for _, _, met in goals(Costs(bad))] == [False, True, False, False]
+    assert Costs(bad).faults() == ["elastic_50000_on_2: exit code 3: no"]
+    shifted = Cost(**{**vars(cost(5_000, 2)), "force": 0.0129})
+    assert "P differs" in Costs([cost(5_000), shifted]).faults()[0]
+    assert "50000" in markdown(Costs(bad))
+
+
+def test_the_parts_of_a_run_are_its_time(tmp_path):
+    """A real run: no part is negative, they sum up to the time from outside, and little is in no part."""
+    found = solve(Case(3_000, 1), tmp_path)
+    assert not found.fault
+    assert min(found.seconds.values()) >= 0
+    assert sum(found.seconds.values()) == pytest.approx(found.total, rel=1e-12)
+    assert found.seconds["rest"] < 0.5 * found.total
+    assert found.factorisations <= found.iterations < found.evaluations
+    report = json.loads((tmp_path / found.case.name / "run.json").read_text())
+    again = read_cost(found.case, report, 2 * found.total)
+    assert again.seconds["rest"] == pytest.approx(found.seconds["rest"] + found.total, rel=1e-9)
+
+
+def test_the_command_writes_its_table(tmp_path, capsys):
+    assert run(["benchmark", "scaling", "--largest", "5000", "--ranks", "1", "-o", str(tmp_path), "-q"]) == 0
+    assert {"scaling.csv", "scaling.md", "scaling.png"} <= {p.name for p in tmp_path.iterdir()}
+    with (tmp_path / "scaling.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["material"] for row in rows] == ["elastic", "plastic"]
+    assert all(4_000 < int(row["dofs"]) < 8_000 and not row["fault"] for row in rows)
+    assert run(["benchmark", "scaling", "--ranks", "1;2", "-o", str(tmp_path)]) == 2
+    assert "--ranks 1;2: must be whole numbers" in capsys.readouterr().err

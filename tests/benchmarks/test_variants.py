@@ -1,0 +1,42 @@
+"""A scene's variants pay only for what they use."""
+
+import pytest
+
+from archord.benchmarks.variants import VARIANTS, WATCHED, Use, markdown, use, write_report
+
+CHOSEN = ("elastic, rigid pin", "elastic, no fields", "plastic", "picture of plastic")
+
+
+@pytest.fixture(scope="module")
+def uses(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("variants")
+    return {v.name: use(v, folder, 1) for v in VARIANTS if v.name in CHOSEN}
+
+
+@pytest.mark.parametrize("name", CHOSEN)
+def test_nothing_unused_is_loaded(uses, name):
+    assert uses[name].faults() == []
+
+
+def test_what_is_used_is_loaded(uses):
+    """So that its absence elsewhere says something."""
+    assert {"archord.materials.j2", "kernel radial_return", "archord.solver.fields", "kernel closest_point",
+            "dolfinx"} <= set(uses["plastic"].loaded)  # fmt: skip
+    assert {"kernel closest_point"} <= set(uses["elastic, no fields"].loaded)
+    assert "matplotlib" in uses["picture of plastic"].loaded
+
+
+def test_less_is_written_and_solved_where_less_is_wanted(uses):
+    """No fields: less than half of what the same joint writes with them; a rigid pin has no dofs."""
+    assert uses["elastic, no fields"].written < 0.5 * uses["plastic"].written
+    assert uses["elastic, rigid pin"].dofs < uses["plastic"].dofs == uses["elastic, no fields"].dofs
+    assert all(used.memory > 8 * used.dofs and used.modules > 100 and used.seconds > 0 for used in uses.values())
+
+
+def test_what_is_not_needed_is_told(uses, tmp_path):
+    plastic = uses["plastic"]
+    wasteful = Use(**{**vars(plastic), "loaded": (*plastic.loaded, "scipy")})
+    assert wasteful.faults() == ["plastic: loads scipy, which it does not need"]
+    assert markdown([plastic]).count("\n") == 3
+    assert {f.name for f in write_report([wasteful], tmp_path)} == {"variants.csv", "variants.md"}
+    assert all(set(v.unused) <= set(WATCHED) for v in VARIANTS)
