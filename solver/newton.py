@@ -263,17 +263,30 @@ class NewtonSolver:
                 if self._raised is not None:
                     raise self._raised from None
                 raise
-        code = self._snes.getConvergedReason()
+        code, iterations = self._snes.getConvergedReason(), self._snes.getIterationNumber()
+        if self._snes.getKSP().getConvergedReason() < 0:
+            self._forget_factorisation()
         result = Newton(
             code > 0,
             "converged",
-            self._snes.getIterationNumber(),
+            iterations,
             self._residuals,
             flips=self._flips,
             factorisations=self._factorisations,
             evaluations=self._evaluations,
         )
         return result if result.converged else self._explained(result, code)
+
+    def _forget_factorisation(self) -> None:
+        """Start with a new linear solver: after a singular matrix PETSc's interface to MUMPS may skip the factorisation
+        of the next one, and fail."""
+        at, x = self.equilibrium, self._x
+        if at.border is not None:
+            at.border.replace(at.tangent.A)
+        self._snes.destroy()
+        self._snes = self._make_snes()
+        self._x.array[:] = x.array_r
+        x.destroy()
 
     def _explained(self, result: Newton, code: int) -> Newton:
         """A ``result`` without success, with the reason and the place of the largest residual."""

@@ -71,7 +71,7 @@ def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, ranks):
 
 def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
     """The reason on stderr, accepted steps on disk."""
-    limits = ["--set", "analysis.max_iterations=5", "--set", "stepping.minimum=1.0", "--set", "load.steps=10"]
+    limits = ["--set", "analysis.max_iterations=6", "--set", "stepping.minimum=1.0", "--set", "load.steps=10"]
     result = archord("solve", SCENE, "--set", "joint.relative_element_size=0.08", *limits, cwd=tmp_path)
     assert result.returncode == 3
     assert "no equilibrium at delta" in result.stderr

@@ -140,7 +140,7 @@ def test_the_resolved_scene_gives_the_same_numbers(run, tmp_path):
 
 def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
     """Four of ten steps, then no convergence: all four readable, and run.json says why."""
-    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5}, stepping={"minimum": 1.0})
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6}, stepping={"minimum": 1.0})
     outcome = solve_scene(problem, tmp_path, MPI.COMM_SELF)
     assert outcome.status == "stopped"
     assert len(read_history(tmp_path / "history.csv")["P"]) == 4
@@ -155,7 +155,7 @@ def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
 
 def test_a_failing_step_tells_where_and_why(tmp_path):
     """Every attempt's residuals, flips and plastic increment in run.json; debug.xdmf holds the state they speak of."""
-    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 5}, stepping={"minimum": 1.0})
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6}, stepping={"minimum": 1.0})
     assert solve_scene(problem, tmp_path, MPI.COMM_SELF, debug=True).status == "stopped"
     failed = json.loads((tmp_path / "run.json").read_text())["failed_step"]
     assert failed["cutbacks"] == len([a for a in failed["attempts"] if not a["converged"]]) == 1
