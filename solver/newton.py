@@ -72,6 +72,11 @@ class NewtonSolver:
         self._renewed = True  # the last factorisation is of another matrix
         self._snes = self._make_snes()
 
+    @property
+    def elastic(self) -> bool:
+        """Whether no body can yield, so that nothing but the contact is nonlinear."""
+        return not self.equilibrium.bulk.plastic
+
     def _make_snes(self) -> PETSc.SNES:
         snes = PETSc.SNES().create(self.comm)
         snes.setOptionsPrefix("archord_")

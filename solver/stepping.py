@@ -106,7 +106,8 @@ def march(
 ) -> None:
     """Reach the loads ``targets`` in turn and, where a step fails or ``rules`` ask for it, loads between them.
 
-    The guess for a step extrapolates the last increment. Where the path starts or turns, it comes from the elastic
+    The guess for a step extrapolates the last increment; where that fails an elastic joint starts from the last state
+    itself before the step is cut. Where the path starts or turns, it comes from the elastic
     solution, at the start from ``first_guess(load)``. ``substep_done(load)`` follows every accepted step with its
     history still to be committed, ``target_done(step, position)`` every output target, ``attempted(load, iterations)``
     every solve, ``gave_up(load)`` the one after which nothing smaller is allowed, before it is taken back. ``start``
@@ -128,6 +129,9 @@ def march(
             stride = load - at.load
             guess, afar = _guess(at, state, stride, load, first_guess)
             result = solver.solve(load, guess, afar=afar)
+            if not result.converged and solver.elastic and not afar and guess is not state:
+                # an extrapolated state has a kink where the contact ended, which fine meshes resolve
+                result = solver.solve(load, state, afar=True).after(result)
             record.iterations += result.iterations
             record.attempts.append(result)
             attempted(load, result.iterations)

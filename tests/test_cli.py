@@ -146,7 +146,8 @@ def test_a_picture_that_cannot_be_drawn_is_one_sentence(tmp_path, arguments, sai
 def test_scene_prints_schema_and_example(tmp_path):
     """The schema is JSON and names every section; the example solves."""
     schema = json.loads(archord("scene", "--schema", cwd=tmp_path).stdout)
-    assert set(schema["properties"]) == {"format", "units", "joint", "pin", "block", "analysis", "load", "stepping"}
+    sections = {"units", "joint", "pin", "block", "analysis", "load", "stepping", "output"}
+    assert set(schema["properties"]) == {"format", *sections}
     example = archord("scene", "--example", cwd=tmp_path)
     (tmp_path / "example.toml").write_text(example.stdout)
     result = archord("solve", "example.toml", *COARSE, cwd=tmp_path)

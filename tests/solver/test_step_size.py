@@ -16,6 +16,7 @@ class Spring:
     """Equilibrium and solver in one, which converges in ``cost(load, stride)`` iterations; infinite: it fails."""
 
     load_name = "delta"
+    elastic = False
 
     def __init__(self, cost):
         self.cost, self.load, self.at, self.solved = cost, 0.0, 0.0, []
@@ -51,6 +52,38 @@ def follow(targets, cost=lambda load, stride: 3, **rules):
         target_done=lambda step, position: done.append(SimpleNamespace(step=step, at=position.load)),
     )
     return spring, accepted, done
+
+
+class Kinked(Spring):
+    """An elastic joint for which no extrapolated guess is good enough."""
+
+    elastic = True
+
+    def __init__(self):
+        super().__init__(lambda load, stride: 3)
+        self.guesses = []
+
+    def solve(self, load, guess, *, afar):
+        self.guesses.append((load, guess[0], afar))
+        if guess[0] != self.load:
+            self.solved.append(load)
+            return Newton(False, "kinked", 5, [1.0, 0.5])
+        return super().solve(load, guess, afar=afar)
+
+
+def test_an_elastic_step_that_fails_starts_from_the_last_state_before_it_is_cut():
+    """No cutback, and the iterations of both solves count."""
+    spring, done = Kinked(), []
+    march(
+        spring,
+        [1.0, 2.0, 3.0],
+        lambda load: np.zeros(1),
+        rules=Stepping(),
+        substep_done=lambda load: None,
+        target_done=lambda step, position: done.append(step),
+    )
+    assert [(s.cutbacks, s.substeps, s.iterations) for s in done] == [(0, 1, 3), (0, 1, 8), (0, 1, 8)]
+    assert spring.guesses == [(1.0, 0, True), (2.0, 2.0, False), (2.0, 1.0, True), (3.0, 3.0, False), (3.0, 2.0, True)]
 
 
 PATH = [0.1 * k for k in range(1, 8)] + [0.3, -0.2, 0.0, 0.0, 1 / 3]
