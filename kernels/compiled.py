@@ -37,8 +37,9 @@ def library(name: str, prototypes: str) -> Any:
     path = _cache() / f"{name}-{hashlib.sha256(key).hexdigest()[:16]}.so"
     if not path.exists():
         _compile([*compiler, *_FLAGS], source, path)
-    _ffi.cdef(prototypes)
-    return _ffi.dlopen(str(path))
+    ffi = cffi.FFI()
+    ffi.cdef(prototypes)
+    return ffi.dlopen(str(path))
 
 
 def pointer(array: np.ndarray) -> Any:

@@ -1,0 +1,60 @@
+"""C kernels: compiled once, called with arrays that fit."""
+
+import numpy as np
+import pytest
+
+from archord.kernels import compiled
+from archord.kernels.compiled import CompilerError, library, pointer
+
+PROTOTYPE = "double twice(double x);"
+
+
+@pytest.fixture
+def source(tmp_path, monkeypatch):
+    """A folder of kernels and a cache of their own."""
+    monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled.py"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    library.cache_clear()
+    yield tmp_path / "doubling.c"
+    library.cache_clear()
+
+
+def test_a_kernel_is_compiled_once_and_anew_when_its_source_changes(source):
+    source.write_text("double twice(double x) { return 2 * x; }\n")
+    assert library("doubling", PROTOTYPE).twice(1.5) == 3.0
+    (first,) = (source.parent / "cache" / "archord").iterdir()
+    made = first.stat().st_mtime_ns
+    library.cache_clear()
+    library("doubling", PROTOTYPE)
+    assert first.stat().st_mtime_ns == made
+    source.write_text("double twice(double x) { return x + x + 1; }\n")
+    library.cache_clear()
+    assert library("doubling", PROTOTYPE).twice(1.5) == 4.0
+    assert len(list((source.parent / "cache" / "archord").iterdir())) == 2
+
+
+def test_a_failing_or_missing_compiler_is_one_sentence_and_leaves_nothing(source, monkeypatch):
+    source.write_text("double twice(double x) { return nonsense; }\n")
+    with pytest.raises(CompilerError, match=r"doubling\.c could not be compiled: .*nonsense"):
+        library("doubling", PROTOTYPE)
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(CompilerError, match=r"no C compiler .*install gcc, or set CC"):
+        library("doubling", PROTOTYPE)
+    assert not list((source.parent / "cache" / "archord").iterdir())
+
+
+def test_a_cache_that_cannot_be_written_is_no_hindrance(source, monkeypatch):
+    source.write_text("double twice(double x) { return 2 * x; }\n")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/nowhere")
+    assert library("doubling", PROTOTYPE).twice(2.0) == 4.0
+
+
+@pytest.mark.parametrize("array", [np.zeros((4, 4)).T[1:], np.zeros(4)[::2]], ids=["transposed", "strided"])
+def test_an_array_with_holes_is_refused(array):
+    with pytest.raises(ValueError, match="contiguous"):
+        pointer(array)
+
+
+def test_an_array_of_another_type_is_refused():
+    with pytest.raises(KeyError):
+        pointer(np.zeros(3, dtype=np.int64))
