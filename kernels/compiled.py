@@ -67,6 +67,7 @@ def _compile(command: list[str], source: Path, path: Path) -> None:
         raise CompilerError(f"no C compiler ({error}); install gcc, or set CC") from None
     if result.returncode:
         target.unlink()
-        raise CompilerError(f"{source.name} could not be compiled: {result.stderr.strip()[:500]}")
+        said = [line for line in result.stderr.splitlines() if "error" in line] or [f"exit code {result.returncode}"]
+        raise CompilerError(f"{source.name} could not be compiled: {said[0]}")
     target.chmod(0o755)
     os.replace(target, path)
