@@ -9,15 +9,17 @@ from time import perf_counter
 from mpi4py import MPI
 
 from archord.benchmarks.paper_joint import paper_joint
+from archord.benchmarks.work_precision_cases import edged
 from archord.solver.run import solve_scene
 from archord.solver.scene import Scene
 
 
 def curves() -> dict[str, Scene]:
-    """The curves that are timed, up to 2 dR, on the default mesh."""
+    """The curves that are timed, up to 2 dR, on the meshes that are good for 1e-4 (elastic) and 3e-4 (plastic) in P."""
+    elastic, plastic = edged("elastic", 0.16, growth=0.5, degree=3)[0], edged("plastic", 0.1, growth=0.3)[0]
     return {
-        "elastic, 8 steps": paper_joint(steps=8),
-        "elasto-plastic, sigY/E* = 0.2 %, 20 steps": paper_joint(steps=20, yield_stress=0.002),
+        "elastic, 8 steps": paper_joint(steps=8, **elastic),
+        "elasto-plastic, sigY/E* = 0.2 %, 20 steps": paper_joint(steps=20, yield_stress=0.002, **plastic),
     }
 
 
