@@ -79,13 +79,15 @@ class Contact:
         chosen = range(len(sides)) if one_sided is None else [one_sided]
         compliance = np.array([1 / sides[i].points.elastic_tangent[0, 0] for i in chosen])
         self.pairings: list[Pairing] = []
+        self._unit_gammas: list[Array] = []  # gamma of each pairing's points for a factor of 1
         failure = None
         for i, share in zip(chosen, compliance / compliance.sum(), strict=True):
             try:
                 if rigid is None:
                     sides[i].place_points(*segment_rule(sides[i].curve, sides[1 - i].curve))
-                gamma = np.repeat(gamma_factor * share * sides[i].gamma, sides[i].weight.shape[1])
-                self.pairings.append(Pairing(sides[i], opposites[i], float(share), gamma, kinematics))
+                unit = np.repeat(share * sides[i].gamma, sides[i].weight.shape[1])
+                self._unit_gammas.append(unit)
+                self.pairings.append(Pairing(sides[i], opposites[i], float(share), gamma_factor * unit, kinematics))
             except ProjectionError as error:
                 failure = str(error)
         self._raise_together(failure)
@@ -103,8 +105,8 @@ class Contact:
 
     def use_gamma_factor(self, factor: float) -> None:
         """Another ``gamma_factor`` than that of the contact, for the time being."""
-        for pair in self.pairings:
-            pair.gamma *= factor / self.gamma_factor
+        for pair, unit in zip(self.pairings, self._unit_gammas, strict=True):
+            pair.gamma = factor * unit
         self.gamma_factor = factor
 
     def hold(self) -> None:

@@ -66,7 +66,7 @@ class NewtonSolver:
         self.equilibrium, self.tolerance, self.max_iterations = equilibrium, tolerance, max_iterations
         self.comm = equilibrium.comm
         self._goal = tolerance
-        self._by_and_by = False
+        self.by_and_by = False  # a large gamma has to be raised by and by
         self._raised: BaseException | None = None
         self._failure = ""
         self._renewed = True  # the last factorisation is of another matrix
@@ -173,7 +173,7 @@ class NewtonSolver:
         wanted = 0.0 if contact is None else contact.gamma_factor
         if contact is None or wanted <= _STIFF_CONTACT:
             return self.solve_at_once(load, guess, afar=afar)
-        if not self._by_and_by:
+        if not self.by_and_by:
             result = self.solve_at_once(load, guess, afar=afar)
             if result.converged:
                 return result
@@ -186,7 +186,7 @@ class NewtonSolver:
                 break
         contact.use_gamma_factor(wanted)
         assert result is not None
-        self._by_and_by |= result.converged
+        self.by_and_by |= result.converged
         return result
 
     def solve_at_once(self, load: float, guess: Array, *, afar: bool = False) -> Newton:

@@ -37,6 +37,7 @@ def halt(order: MeshOrder, standing: Standing) -> Checkpoint:
         "work": vars(standing.work),
         "position": {name: value for name, value in vars(position).items() if name != "increment"},
         "largest_reaction": joint.equilibrium.largest_reaction,
+        "gamma_by_and_by": joint.solver.by_and_by,
         "level": float(state[-1]),
     }
     if position.increment is not None:
@@ -59,6 +60,7 @@ def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> Stand
     step = Step(**scalars["step"])
     step.attempts = [Newton(**attempt) for attempt in scalars["step"]["attempts"]]
     state = np.append(fields["displacement"], scalars["level"])
+    order.joint.solver.by_and_by = scalars.get("gamma_by_and_by", False)
     order.joint.equilibrium.resume(position.load, state, scalars["largest_reaction"])
     return Standing(Measures(**scalars["measures"]), step, position, work)
 

@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.persson import persson_joint
+from archord.solver.history import read_history
 from archord.solver.restart import plan_extension, plan_restart
 from archord.solver.run import solve_scene
 from archord.solver.run_folder import claim_folder, occupied
@@ -85,6 +86,18 @@ def test_a_restarted_run_equals_the_uninterrupted_one(tmp_path, name):
     same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
     if name == "cutbacks":
         assert sum(m.cutbacks for m in outcome.steps[step:]) > 0
+
+
+def test_a_restarted_run_remembers_that_a_large_gamma_is_raised_by_and_by(tmp_path):
+    """The rest takes the same iterations, and agrees to what such a gamma leaves of the digits."""
+    problem = scene(0.1, 3, **PLASTIC, analysis={"gamma_factor": 1e4})
+    run(problem, tmp_path / "whole")
+    run(problem, tmp_path / "halted", crash=2)
+    go_on(problem, tmp_path / "halted")
+    whole, halted = (read_history(tmp_path / name / "history.csv") for name in ("whole", "halted"))
+    assert whole["iterations"] == halted["iterations"]
+    assert whole["iterations"][-1] > 25  # more than one solve's: it was raised
+    assert halted["P"] == pytest.approx(whole["P"], rel=1e-9)
 
 
 def test_a_run_may_be_halted_after_every_step(tmp_path):
