@@ -70,7 +70,10 @@ class SweepProgress:
             self._bar.update(self._task, advance=1, description=self._counts())
         elif result.message != "not begun":
             word = f"{result.status}, {result.steps} steps in {result.seconds:.1f} s"
-            print(f"{perf_counter() - self.begun:7.1f} s  {result.run} {word}; {self._counts()}", flush=True)
+            try:
+                print(f"{perf_counter() - self.begun:7.1f} s  {result.run} {word}; {self._counts()}", flush=True)
+            except OSError:  # nobody reads any more: no reason to stop
+                self.silent = True
 
     def _counts(self) -> str:
         """Done, running, failed, and the time left."""

@@ -8,6 +8,7 @@ half of two ranks.)
 from __future__ import annotations
 
 import gc
+import signal
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -61,6 +62,7 @@ class Farm:
         """
         global _here
         MESHES.capacity = _MESHES_KEPT
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc would end the batch where its reader has seen enough
         gc.collect()
         gc.freeze()  # what the imports made need not be searched after every case
         with Interrupt() as interrupt:
