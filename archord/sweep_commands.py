@@ -33,11 +33,13 @@ def sweep(
     from mpi4py import MPI
 
     from archord.solver.ranks import agreed
+    from archord.solver.scene import SceneError
     from archord.sweep.cases import read_sweep
-    from archord.sweep.run import FILE, Share, claim, default_folder, gather, open_jobs
+    from archord.sweep.run import FILE, Share, check_ranks, claim, default_folder, gather, open_jobs
 
     comm = MPI.COMM_WORLD
     share = Share.parse(array)
+    check_ranks(comm.size, ranks_per_case)
     source = file / FILE if file.is_dir() else file
     folder = output or (file if file.is_dir() else default_folder(file))
     show = comm.rank == 0 and not quiet
@@ -48,6 +50,8 @@ def sweep(
             print(_announced(design), flush=True)
         if dry_run:
             return design, ([], [])
+        if gather_only and not (folder / FILE).exists():
+            raise SceneError(f"{folder}: holds no sweep to gather.")
         claim(design, folder)
         return design, ([], []) if gather_only else open_jobs(design, folder, share, retry=retry)
 

@@ -42,10 +42,12 @@ class SweepProgress:
             self._task = self._bar.add_task("starting", total=self._total, completed=len(ended))
 
     def __enter__(self) -> SweepProgress:
+        """Show the bar, if there is one."""
         self._bar.__enter__()
         return self
 
     def __exit__(self, *what) -> None:
+        """Take it away."""
         self._bar.__exit__(*what)
 
     def running(self, number: int) -> None:

@@ -37,7 +37,7 @@ def gmsh_to_mesh(
 
     ``adjust(x, tag)`` may move the nodes ``x`` ``(n, 3)`` of the physical curve ``tag``; the mesh is scaled by
     ``scale`` at the end. An error on rank 0 is raised on every rank. Returns mesh, cell tags and facet tags.
-    ``key`` says all that enters ``build`` and ``adjust``: what `MESHES` keeps of a mesh with the same key is used again.
+    ``key`` says all that enters ``build`` and ``adjust``; a mesh that `MESHES` keeps by the same key is used again.
     """
     model, failure = None, None
     known = MESHES.find((*key, order)) if comm.rank == 0 and key else None

@@ -24,6 +24,7 @@ class Answers:
         return Answers(None if self._model is None else self._model.mesh, "mesh.", self._known)
 
     def __getattr__(self, name: str) -> Any:
+        """The method ``name`` of the model."""
         if name.startswith("__"):
             raise AttributeError(name)
 

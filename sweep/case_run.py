@@ -122,9 +122,7 @@ def _solve(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], in
     return _failed(folder, comm, fault)
 
 
-def _attempt(
-    scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int], *, anew: bool
-) -> Result:
+def _attempt(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int], *, anew: bool) -> Result:
     """Solve, from the beginning if ``anew``. Raises whatever went wrong."""
     from archord.solver.ranks import agreed
     from archord.solver.run import solve_scene

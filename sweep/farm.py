@@ -21,7 +21,7 @@ from mpi4py import MPI
 from archord.geometry.mesh_cache import MESHES
 from archord.solver.interrupt import Interrupt
 from archord.solver.ranks import arrived_before
-from archord.solver.scene import Scene, SceneError
+from archord.solver.scene import Scene
 from archord.sweep.case_run import Result, solve_case
 
 _MESHES_KEPT = 4
@@ -38,14 +38,10 @@ class Job:
 
 
 class Farm:
-    """The ranks of ``comm`` in groups of ``ranks_per_case``; ``crew`` is this rank's group.
+    """The ranks of ``comm`` in groups of ``ranks_per_case``, which divides them; ``crew`` is this rank's group.
+    Collective."""
 
-    Raises `SceneError` on all ranks if they cannot be divided so. Collective.
-    """
-
-    def __init__(self, comm: MPI.Comm, ranks_per_case: int = 1) -> None:
-        if comm.size % ranks_per_case:
-            raise SceneError(f"--ranks-per-case {ranks_per_case}: must divide the number of ranks, {comm.size}.")
+    def __init__(self, comm: MPI.Intracomm, ranks_per_case: int = 1) -> None:
         self.comm = comm
         self.crew = MPI.COMM_SELF if ranks_per_case == 1 else comm.Split(comm.rank // ranks_per_case)
         self.leaders = comm.Split(0 if self.crew.rank == 0 else MPI.UNDEFINED)

@@ -44,6 +44,12 @@ class Share:
         return longest[self.index - 1 :: self.total]
 
 
+def check_ranks(ranks: int, ranks_per_case: int) -> None:
+    """Raise `SceneError` if ``ranks`` are no whole number of groups."""
+    if ranks % ranks_per_case:
+        raise SceneError(f"--ranks-per-case {ranks_per_case}: must divide the number of ranks, {ranks}.")
+
+
 def default_folder(path: Path) -> Path:
     """runs/NAME for NAME.sweep.toml or NAME.toml."""
     return Path("runs") / path.stem.removesuffix(".sweep")
@@ -62,7 +68,8 @@ def claim(sweep: Sweep, folder: Path) -> None:
         (folder / CASES).mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):
             raise SceneError(f"{folder}: cannot be used for a sweep: Permission denied.")
-        replace_text(folder / FILE, resolved(sweep.file))
+        with tables.alone(folder):
+            replace_text(folder / FILE, resolved(sweep.file))
     except OSError as error:
         raise SceneError(f"{folder}: cannot be used for a sweep: {error.strerror}.") from None
 
@@ -96,5 +103,3 @@ def gather(sweep: Sweep, folder: Path) -> Tables:
         return tables.write(sweep, folder)
     except OSError as error:
         raise SceneError(f"{error.filename} cannot be written: {error.strerror}.") from None
-
-

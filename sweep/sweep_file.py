@@ -148,7 +148,7 @@ def _sentence(error: Any, data: dict[str, Any], path: Path) -> str:
         "too_short": "must not be empty",
         "list_type": "must be a list of values" + ("; write [[list]]" if key == "list" else ""),
         "dict_type": 'must be a scene file, base = "scene.toml", or a table' if key == "base" else "must be a table",
-        "model_type": "must be [low, high] or { from = low, to = high }" if len(where) > 2 else "must be a table",
+        "model_type": "must be [low, high] or {{ from = low, to = high }}" if len(where) > 2 else "must be a table",
         "float_type": "must be a number",
         "int_type": "must be a whole number",
         "finite_number": "must be a finite number",

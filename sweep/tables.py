@@ -8,7 +8,7 @@ import fcntl
 import io
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,7 @@ def write(sweep: Sweep, folder: Path) -> Tables:
 
     Raises `OSError`.
     """
-    with _alone(folder):
+    with alone(folder):
         tables = gather(sweep, folder)
         replace_text(folder / "sweep.csv", _csv(tables.steps, tables.step_rows))
         replace_text(folder / "cases.csv", _csv(tables.cases, tables.case_rows))
@@ -91,14 +91,12 @@ def read_table(path: str | Path) -> list[dict[str, str]]:
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Wait until no other process gathers in ``folder``, so that the last one to end writes what all have done."""
+def alone(folder: Path) -> Iterator[None]:
+    """Wait until no other process is here with this ``folder``: the last one to end gathers what all have done."""
     descriptor = os.open(folder / CASES, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        try:
+        with suppress(OSError):  # a file system without locks
             fcntl.flock(descriptor, fcntl.LOCK_EX)
-        except OSError:  # a file system without locks
-            pass
         yield
     finally:
         os.close(descriptor)
