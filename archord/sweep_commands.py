@@ -12,6 +12,10 @@ from archord.plain_typer import typer
 
 def sweep(
     file: Annotated[Path, typer.Argument(metavar="SWEEP", help="sweep file (TOML), or the folder of a sweep")],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="override a key of the base scene; may be repeated"),
+    ] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="folder [runs/<sweep name>]")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="print the cases and stop")] = False,
     ranks_per_case: Annotated[
@@ -45,7 +49,7 @@ def sweep(
     show = comm.rank == 0 and not quiet
 
     def prepared():
-        design = read_sweep(source)
+        design = read_sweep(source, overrides or [])
         if show:
             print(_announced(design), flush=True)
         if dry_run:

@@ -34,7 +34,7 @@ def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) ->
     data = read_toml(path)
     origin = {}
     for override in overrides:
-        origin[_override(data, override)] = f"--set {override}"
+        origin[override_key(data, override)] = f"--set {override}"
     read_targets(data, Path(path))
     return parse_scene(data, str(path), origin)
 
@@ -133,7 +133,7 @@ def _key_shown(part: str) -> str:
     )
 
 
-def _override(data: dict[str, Any], override: str) -> str:
+def override_key(data: dict[str, Any], override: str) -> str:
     """Set one ``a.b=value`` in ``data`` (value: TOML, a number, else text; nothing: drop it); returns the dotted
     key."""
     key, sign, text = override.partition("=")

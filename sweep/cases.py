@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,15 +51,22 @@ class Sweep:
         return list({case.run: case for case in reversed(self.cases)}.values())[::-1]
 
 
-def read_sweep(path: str | Path) -> Sweep:
-    """Read the sweep file ``path`` and check the scene of every case. Raises `SceneError`."""
+def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
+    """Read the sweep file ``path``, with ``overrides`` of its base, and check the scene of every case.
+
+    Raises `SceneError` with one sentence per fault.
+    """
     path = Path(path)
-    file = load_sweep(path)
+    file = load_sweep(path, overrides)
     try:
         found = factors(file)
         rows = combinations(found)
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from None
+    keys = varied_keys(found)
+    for override in overrides:
+        if override.partition("=")[0].strip() in keys:
+            raise SceneError(f"--set {override}: is varied by {path} already.")
     cases: list[Case] = []
     faults: dict[str, list[int]] = {}
     for number, overrides in enumerate(rows, 1):
@@ -71,7 +79,7 @@ def read_sweep(path: str | Path) -> Sweep:
             cases.append(Case(number, overrides, scene, run_name(scene)))
     if faults:
         raise SceneError("\n".join(_told(faults, path, len(rows))))
-    return Sweep(path, file, varied_keys(found), cases)
+    return Sweep(path, file, keys, cases)
 
 
 def run_name(scene: Scene) -> str:

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from mpi4py import MPI
 
@@ -44,7 +44,7 @@ class Farm:
     def __init__(self, comm: MPI.Intracomm, ranks_per_case: int = 1) -> None:
         self.comm = comm
         self.crew = MPI.COMM_SELF if ranks_per_case == 1 else comm.Split(comm.rank // ranks_per_case)
-        self.leaders = comm.Split(0 if self.crew.rank == 0 else MPI.UNDEFINED)
+        self.leaders = cast(MPI.Intracomm, comm.Split(0 if self.crew.rank == 0 else MPI.UNDEFINED))
         self.workers = comm.size // ranks_per_case
 
     def run(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from archord.solver.scene import SceneError
-from archord.solver.scene_file import read_toml
+from archord.solver.scene_file import override_key, read_toml
 from archord.solver.scene_format import toml_value
 
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
@@ -88,8 +89,9 @@ class SweepFile(_Section):
         return self
 
 
-def load_sweep(path: str | Path) -> SweepFile:
-    """Read and check the sweep file ``path``; ``base`` then is the base scene's table, its paths absolute.
+def load_sweep(path: str | Path, overrides: Sequence[str] = ()) -> SweepFile:
+    """Read and check the sweep file ``path``; ``base`` then is the base scene's table, its paths absolute, with
+    ``overrides`` like ``"joint.radius=2"`` on top.
 
     The scene itself is not checked, as it may be whole only with the overrides. Raises `SceneError` with one sentence
     per fault: file, key, value, and what is allowed.
@@ -105,8 +107,10 @@ def load_sweep(path: str | Path) -> SweepFile:
     except ValidationError as error:
         raise SceneError("\n".join(dict.fromkeys(_sentence(e, data, path) for e in error.errors()))) from None
     _anchor(sweep.base.get("load"), folder)
-    for overrides in sweep.list_:
-        _anchor(overrides, path.parent, "load.path")
+    for override in overrides:
+        override_key(sweep.base, override)
+    for entry in sweep.list_:
+        _anchor(entry, path.parent, "load.path")
     for lists in (sweep.zip, sweep.grid):
         if "load.path" in lists:
             lists["load.path"][:] = [_absolute(value, path.parent) for value in lists["load.path"]]
@@ -133,7 +137,10 @@ def _sentence(error: Any, data: dict[str, Any], path: Path) -> str:
     given: Any = data
     key = ""
     for part in where:
-        given = given.get(part) if isinstance(given, dict) else given[part] if isinstance(given, list) else None
+        if isinstance(given, dict):
+            given = given.get(part, flattened(given).get(part))
+        else:
+            given = given[part] if isinstance(given, list) else None
         key += f": entry {part + 1}" if isinstance(part, int) else f".{part}" if key else str(part)
     shown = "" if given is None or isinstance(given, dict) or where[-1:] == ["base"] else f" = {toml_value(given)}"
     if kind == "extra_forbidden":
