@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated
 
 from archord.plain_typer import typer
+
+STATUS = ("done", "stopped", "failed", "interrupted", "busy", "open")
 
 
 def sweep(
@@ -66,7 +69,7 @@ def sweep(
         if comm.rank == 0:
             _print_cases(design)
         return 0
-    received = 0
+    received, results = 0, []
     if comm.bcast(bool(jobs)):
         from archord.sweep.farm import Farm  # imports PETSc, on all ranks together
         from archord.sweep_progress import SweepProgress
@@ -74,14 +77,14 @@ def sweep(
         farm = Farm(comm, ranks_per_case)
         with SweepProgress(jobs, ended, farm.workers, begun, silent=not show) as progress:
             received = farm.run(jobs, progress.ended, progress.running)
-            meshes = progress.meshes
+        results = progress.results
         if show:
-            print(meshes)
+            print(progress.meshes)
     failed = 0
     if comm.rank == 0:
-        tables = gather(design, folder)
+        tables = gather(design, folder, results)
         mine = {case.run for case in share.of(design.distinct)}
-        failed = _report(design, folder, tables.counts, mine, quiet=quiet, seconds=perf_counter() - begun)
+        failed = _report(tables.results, design, folder, mine, quiet=quiet, seconds=perf_counter() - begun)
     if received:
         return 128 + received
     return comm.bcast(3 if failed else 0)
@@ -124,19 +127,15 @@ def _print_cases(design) -> None:
     Console(highlight=False, width=width, force_terminal=watched).print(table, markup=False)
 
 
-def _report(design, folder: Path, counts: dict[str, int], mine: set[str], *, quiet: bool, seconds: float) -> int:
-    """Say how the cases ended; returns how many of this share failed."""
-    from archord.sweep.case_run import standing
-    from archord.sweep.tables import of_case
-
-    failed = 0
-    for case in design.distinct:
-        result = standing(of_case(case, folder)) if case.run in mine else None
-        if result is not None and result.status in ("stopped", "failed"):
-            failed += 1
-            print(f"archord: case {case.number}, {case.run}: {result.status}: {result.message}.", file=sys.stderr)
+def _report(results, design, folder: Path, mine: set[str], *, quiet: bool, seconds: float) -> int:
+    """Say how the distinct cases ended; returns how many of this share, ``mine``, failed."""
+    number = {case.run: case.number for case in design.distinct}
+    failed = [r for r in results if r.run in mine and r.status in ("stopped", "failed")]
+    for result in failed:
+        case = f"case {number[result.run]}, {result.run}"
+        print(f"archord: {case}: {result.status}: {result.message}.", file=sys.stderr)
     if not quiet:
-        order = ("done", "stopped", "failed", "interrupted", "open")
-        told = ", ".join(f"{counts[status]} {status}" for status in order if status in counts)
+        counts = Counter(result.status for result in results)
+        told = ", ".join(f"{n} {status}" for status in STATUS if (n := counts[status]))
         print(f"{told} in {seconds:.1f} s, tables in {folder}")
-    return failed
+    return len(failed)

@@ -14,12 +14,13 @@ if TYPE_CHECKING:
 
 
 class SweepProgress:
-    """Reports cases as they end: of ``jobs``, with those that had ``ended`` before.
+    """Reports cases as they end: of ``jobs``, with those that had ``ended`` before. ``results`` keeps what ended.
 
     The time left is the expected cost of what is left, by the time that what has ended took on ``workers``.
     """
 
     def __init__(self, jobs: list[Job], ended: list[Result], workers: int, begun: float, *, silent: bool) -> None:
+        self.results: list[Result] = []
         self.silent, self.begun, self.workers = silent, begun, workers
         self._cost = {job.folder.name: job.cost for job in jobs}
         self._left = sum(self._cost.values())
@@ -60,6 +61,7 @@ class SweepProgress:
         """Show a case that ended."""
         self._done += result.status == "done"
         self._failed += result.status in ("stopped", "failed")
+        self.results.append(result)
         self._made += result.meshes
         self._reused += result.reused
         cost = self._cost.get(result.run, 0.0)

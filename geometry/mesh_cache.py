@@ -68,10 +68,9 @@ class MeshCache:
         while len(self._kept) > self.capacity:
             self._kept.popitem(last=False)
 
-    def clear(self) -> None:
-        """Forget all meshes and counts."""
+    def forget(self) -> None:
+        """Keep none of the meshes any longer."""
         self._kept.clear()
-        self.made = self.reused = 0
 
 
 MESHES = MeshCache()  # of this process; keeps none unless somebody gives it a capacity

@@ -42,6 +42,8 @@ class Farm:
     Collective."""
 
     def __init__(self, comm: MPI.Intracomm, ranks_per_case: int = 1) -> None:
+        import archord.solver.run  # noqa: F401  PETSc starts here, on all ranks together and before any signal is set
+
         self.comm = comm
         self.crew = MPI.COMM_SELF if ranks_per_case == 1 else comm.Split(comm.rank // ranks_per_case)
         self.leaders = cast(MPI.Intracomm, comm.Split(0 if self.crew.rank == 0 else MPI.UNDEFINED))
@@ -73,6 +75,7 @@ class Farm:
                 _here = None
                 gc.unfreeze()
                 MESHES.capacity = 0
+                MESHES.forget()
             arrived_before(self.comm)  # asleep: those that are done leave their cores to the others
             return max(self.comm.allgather(interrupt.received))
 

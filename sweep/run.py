@@ -97,9 +97,10 @@ def open_jobs(sweep: Sweep, folder: Path, share: Share, *, retry: bool) -> tuple
     return ended, jobs
 
 
-def gather(sweep: Sweep, folder: Path) -> Tables:
-    """Write the tables of what is there. Raises `SceneError` if they cannot be written."""
+def gather(sweep: Sweep, folder: Path, results: list[Result]) -> Tables:
+    """Write the tables of what is there, with the ``results`` of this process. Raises `SceneError` if they cannot be
+    written."""
     try:
-        return tables.write(sweep, folder)
+        return tables.write(sweep, folder, {r.run: r for r in results if r.status in ("failed", "busy")})
     except OSError as error:
         raise SceneError(f"{error.filename} cannot be written: {error.strerror}.") from None

@@ -7,7 +7,7 @@ import csv
 import fcntl
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,18 +34,23 @@ class Tables:
     step_rows: list[Row] = field(default_factory=list)
     cases: list[str] = field(default_factory=list)
     case_rows: list[Row] = field(default_factory=list)
-    counts: dict[str, int] = field(default_factory=dict)  # distinct runs by status
+    results: list[Result] = field(default_factory=list)  # of the distinct cases
 
 
-def gather(sweep: Sweep, folder: Path) -> Tables:
-    """Both tables, from what is in the run folders of ``sweep`` below ``folder`` now."""
+def gather(sweep: Sweep, folder: Path, failed: Mapping[str, Result] | None = None) -> Tables:
+    """Both tables, from what is in the run folders of ``sweep`` below ``folder`` now.
+
+    ``failed`` are results, by run, that could perhaps not be written there.
+    """
     tables, found = Tables(), {}
     for case in sweep.distinct:
         run = folder / CASES / case.run
         report = report_of(run)
-        found[case.run] = standing(run, report), report, _history(run)
-        status = found[case.run][0].status
-        tables.counts[status] = tables.counts.get(status, 0) + 1
+        result = standing(run, report)
+        if not result.ended:
+            result = (failed or {}).get(case.run, result)
+        found[case.run] = result, report, _history(run)
+        tables.results.append(result)
     history = next((heading for _, _, (heading, _) in found.values() if heading), [])
     final = [name for name in history if name not in _PER_STEP]
     keys = [heading(key, sweep.cases[0].scene) for key in sweep.keys]
@@ -61,13 +66,13 @@ def gather(sweep: Sweep, folder: Path) -> Tables:
     return tables
 
 
-def write(sweep: Sweep, folder: Path) -> Tables:
+def write(sweep: Sweep, folder: Path, failed: Mapping[str, Result] | None = None) -> Tables:
     """Gather and write sweep.csv, sweep.h5 and cases.csv, each in one move; of several processes one after the other.
 
     Raises `OSError`.
     """
     with alone(folder):
-        tables = gather(sweep, folder)
+        tables = gather(sweep, folder, failed)
         replace_text(folder / "sweep.csv", _csv(tables.steps, tables.step_rows))
         replace_text(folder / "cases.csv", _csv(tables.cases, tables.case_rows))
         content = _hdf5(tables)
