@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import basix.ufl
 import numpy as np
 import ufl
@@ -21,6 +23,10 @@ from archord.solver.equilibrium import Equilibrium, Support
 from archord.solver.newton import NewtonSolver
 from archord.solver.scene import Scene
 from archord.solver.timer import Timer
+from archord.solver.walk import Position, Walk
+
+if TYPE_CHECKING:
+    from archord.solver.coarse_start import CoarseStart
 
 SIDES = ("pin", "hole")
 
@@ -128,6 +134,10 @@ class Joint:
         if not scene.pin.rigid:
             u[np.unique(self.V.dofmap.list[self.model.cells.find(Cells.PIN)]), 1] = -shift
         return np.append(u, shift)
+
+    def walk(self, at: Position | None = None, coarse: CoarseStart | None = None) -> Walk:
+        """The way of this joint along its path of loads, from the position ``at`` or the beginning."""
+        return Walk(self.solver, self.rigid_translation, from_rest=self.scene.joint.dR > 0, at=at, coarse=coarse)
 
     def delta(self) -> float:
         """Displacement of the pin from first touch: of its diameter, or in a ring the mean over the core."""
