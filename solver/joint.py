@@ -14,7 +14,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.curve import RigidCircle
 from archord.geometry.half_ring import half_ring
-from archord.geometry.joint_mesh import Cells, Facets, JointMesh
+from archord.geometry.joint_mesh import Cells, Facets, JointMesh, refinements
 from archord.geometry.quarter_joint import quarter_joint
 from archord.solver.bulk import Body, Bulk
 from archord.solver.contact import Contact
@@ -86,6 +86,7 @@ class Joint:
         g = self.scene.joint
         sizes = (g.radius, g.dR, g.W, g.h, g.growth)
         options = {"size_ratio": g.size_ratio, "degree": self.scene.analysis.degree, "partitioner": partitioner}
+        options["refinements"] = refinements(g.expected_cells)
         if g.model == "ring":
             return half_ring(self.comm, *sizes, self.scene.load.core_radius * g.radius, **options)
         edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
