@@ -21,6 +21,7 @@ PARTS = {
     "start-up": ("start-up",),
     "mesh": ("mesh",),
     "setup": ("setup",),
+    "coarse start": ("coarse start",),
     "bulk": ("return mapping", "assemble force", "assemble bulk", "assemble border"),
     "contact": ("contact", "assemble contact"),
     "linear solve": ("linear solve",),

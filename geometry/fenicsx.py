@@ -30,11 +30,13 @@ def gmsh_to_mesh(
     *,
     order: int = 2,
     scale: float = 1.0,
+    refinements: int = 0,
     partitioner=None,
     key: tuple = (),
 ) -> tuple[Mesh, MeshTags, MeshTags]:
     """Mesh what ``build(gmsh)`` describes, in triangles of the given ``order``, and distribute it over ``comm``.
 
+    The triangles are cut in four ``refinements`` times before they are curved.
     ``adjust(x, tag)`` may move the nodes ``x`` ``(n, 3)`` of the physical curve ``tag``; the mesh is scaled by
     ``scale`` at the end. An error on rank 0 is raised on every rank. Returns mesh, cell tags and facet tags.
     ``key`` says all that enters ``build`` and ``adjust``; a mesh that `MESHES` keeps by the same key is used again.
@@ -53,6 +55,8 @@ def gmsh_to_mesh(
             gmsh.option.setNumber("Mesh.HighOrderOptimize", 0)
             build(gmsh)
             gmsh.model.mesh.generate(2)
+            for _ in range(refinements):
+                gmsh.model.mesh.refine()
             gmsh.model.mesh.setOrder(order)
             if adjust is not None:
                 _adjust(gmsh, adjust)

@@ -26,15 +26,18 @@ def half_ring(
     *,
     size_ratio: float = 1.0,
     degree: int = 2,
+    refinements: int = 0,
     partitioner=None,
 ) -> JointMesh:
     """Mesh the half joint with second-order curved triangles, ``element_size`` long on the hole's arc and
     ``size_ratio`` times that on the pin's.
 
     Away from the arcs they grow by ``growth`` per unit of distance, to a third of ``core_radius`` at the pin's centre.
-    Lengths share one unit. Collective over ``comm``; rank 0 meshes.
+    ``refinements`` as for `quarter_joint`. Lengths share one unit. Collective over ``comm``; rank 0 meshes.
     """
+    coarsening = 2.0**refinements
     hole, outer, size, core = (1 + clearance / radius, *(v / radius for v in (outer_radius, element_size, core_radius)))
+    size, growth = coarsening * size, coarsening * growth
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
@@ -58,7 +61,7 @@ def half_ring(
         curves[Facets.PIN_ARC], curves[Facets.HOLE_ARC] = pin_arcs, hole_arcs
         curves[Facets.BLOCK_HELD], curves[Facets.SYMMETRY] = edge, [*axis, below, above]
         from_arcs = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
-        from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
+        from_core = f"{coarsening * core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
         sizes = {}
         for body, arcs, on_arc in ((Cells.PIN, pin_arcs, size_ratio * size), (Cells.BLOCK, hole_arcs, size)):
             for arc in arcs:
@@ -70,5 +73,6 @@ def half_ring(
         radii = {Facets.PIN_ARC: 1.0, Facets.HOLE_ARC: hole, Facets.BLOCK_HELD: outer}
         return on_circle(x, (0.0, 0.0), radii[Facets(tag)]) if tag in radii else x
 
-    key = ("half ring", hole, outer, size, growth, core, size_ratio)
-    return JointMesh(*gmsh_to_mesh(comm, build, exact, order=degree, scale=radius, partitioner=partitioner, key=key))
+    options = {"order": degree, "scale": radius, "refinements": refinements, "partitioner": partitioner}
+    key = ("half ring", hole, outer, size, growth, core, size_ratio, refinements)
+    return JointMesh(*gmsh_to_mesh(comm, build, exact, **options, key=key))

@@ -29,6 +29,9 @@ class Facets(IntEnum):
     SYMMETRY = 5
 
 
+_CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
+
+
 @dataclass(frozen=True)
 class JointMesh:
     """A mesh of the joint with its tags; all bodies live in one mesh."""
@@ -64,6 +67,14 @@ def tag_and_size(gmsh, faces: dict[Cells, int], curves: dict[Facets, list[int]],
 def edges_on(angle: float, size: float) -> int:
     """Number of edges, at least two, of an arc of unit radius over ``angle`` [rad], none longer than ``size``."""
     return max(2, math.ceil(angle / size))
+
+
+def refinements(cells: float) -> int:
+    """How often a mesh that is to have about so many ``cells`` is made by cutting triangles in four.
+
+    gmsh's time grows faster than the number of triangles, that of the cutting does not.
+    """
+    return sum(cells > limit for limit in _CUT_ABOVE)
 
 
 def on_circle(x: Array, centre: tuple[float, float], radius: float) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import basix.ufl
 import numpy as np
 import ufl
@@ -12,7 +14,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.curve import RigidCircle
 from archord.geometry.half_ring import half_ring
-from archord.geometry.joint_mesh import Cells, Facets, JointMesh
+from archord.geometry.joint_mesh import Cells, Facets, JointMesh, refinements
 from archord.geometry.quarter_joint import quarter_joint
 from archord.solver.bulk import Body, Bulk
 from archord.solver.contact import Contact
@@ -21,6 +23,10 @@ from archord.solver.equilibrium import Equilibrium, Support
 from archord.solver.newton import NewtonSolver
 from archord.solver.scene import Scene
 from archord.solver.timer import Timer
+from archord.solver.walk import Position, Walk
+
+if TYPE_CHECKING:
+    from archord.solver.coarse_start import CoarseStart
 
 SIDES = ("pin", "hole")
 
@@ -80,6 +86,7 @@ class Joint:
         g = self.scene.joint
         sizes = (g.radius, g.dR, g.W, g.h, g.growth)
         options = {"size_ratio": g.size_ratio, "degree": self.scene.analysis.degree, "partitioner": partitioner}
+        options["refinements"] = refinements(g.expected_cells)
         if g.model == "ring":
             return half_ring(self.comm, *sizes, self.scene.load.core_radius * g.radius, **options)
         edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
@@ -128,6 +135,10 @@ class Joint:
         if not scene.pin.rigid:
             u[np.unique(self.V.dofmap.list[self.model.cells.find(Cells.PIN)]), 1] = -shift
         return np.append(u, shift)
+
+    def walk(self, at: Position | None = None, coarse: CoarseStart | None = None) -> Walk:
+        """The way of this joint along its path of loads, from the position ``at`` or the beginning."""
+        return Walk(self.solver, self.rigid_translation, from_rest=self.scene.joint.dR > 0, at=at, coarse=coarse)
 
     def delta(self) -> float:
         """Displacement of the pin from first touch: of its diameter, or in a ring the mean over the core."""

@@ -87,7 +87,7 @@ class Report:
         self.content["warnings"] += _warnings(self.joint, profiles, m, step.residual)
         self.content["steps"].append(
             asdict(m)
-            | {"substeps": step.substeps}
+            | {"substeps": step.substeps, "coarse_iterations": step.coarse_iterations}
             | {"factorisations": sum(a.factorisations for a in step.attempts)}
             | {"evaluations": sum(a.evaluations for a in step.attempts)}
             | {"residuals": [a.residuals for a in step.attempts]}

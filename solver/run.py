@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from mpi4py import MPI
 
 from archord.solver.checkpoint import write as write_checkpoint
+from archord.solver.coarse_start import coarse_start
 from archord.solver.contact_file import ContactWriter
 from archord.solver.contact_profile import ArcProfile
 from archord.solver.disk import WriteError, naming, on_root, replace_text
@@ -27,8 +28,9 @@ from archord.solver.run_folder import CHECKPOINT, clear, occupied
 from archord.solver.scene import Scene
 from archord.solver.scene_file import resolved
 from archord.solver.standing import Standing, halt, resume
-from archord.solver.stepping import Position, Step, StepFailure, march
+from archord.solver.stepping import Step, StepFailure, march
 from archord.solver.timer import Timer
+from archord.solver.walk import Position
 
 if TYPE_CHECKING:
     from archord.solver.fields import FieldWriter
@@ -86,21 +88,20 @@ def solve_scene(
         try:
             with Interrupt() as joint.equilibrium.interrupt:
                 position, work = output.begin(start)
+                # what a coarse mesh went through before a halt is not kept
+                coarse = coarse_start(joint) if position is None else None
 
                 def target_done(step: Step, position: Position) -> None:
                     on_step(output.add(step, position, work))
 
                 march(
-                    joint.solver,
+                    joint.walk(position, coarse),
                     scene.targets,
-                    joint.rigid_translation,
                     rules=scene.stepping,
-                    from_rest=scene.joint.dR > 0,
                     substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
                     target_done=target_done,
                     attempted=on_attempt,
                     gave_up=output.debug if debug else lambda load: None,
-                    start=position,
                 )
         except StepFailure as failure:
             status, message, failed = "stopped", str(failure), failure.attempt

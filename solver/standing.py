@@ -13,7 +13,8 @@ from archord.solver.measures import Measures, Work
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.newton import Newton
 from archord.solver.scene_file import resolved
-from archord.solver.stepping import Position, Step
+from archord.solver.stepping import Step
+from archord.solver.walk import Position
 
 
 @dataclass

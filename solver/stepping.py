@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from archord.geometry.basis import Array
-from archord.solver.newton import Newton, NewtonSolver
+from archord.solver.newton import Newton
 from archord.solver.scene import Stepping
+from archord.solver.walk import Position, Walk
 
-_PREDICTOR_LIMIT = 4.0  # an increment is not extrapolated to more than this many times its length
 _SLIVER = 1e-3  # of an output step: a step that would leave less than this goes to the target
 
 
@@ -34,11 +33,12 @@ class StepFailure(RuntimeError):
 class Step:
     """What happened on the way to an output target: Newton iterations (failed attempts included), cutbacks, substeps.
 
-    ``attempts`` are the solves, the failed ones with their diagnostics.
+    ``attempts`` are the solves, the failed ones with their diagnostics; ``coarse_iterations`` those on coarser meshes.
     """
 
     load: float
     iterations: int = 0
+    coarse_iterations: int = 0
     cutbacks: int = 0
     substeps: int = 0
     attempts: list[Newton] = field(default_factory=list)
@@ -76,99 +76,55 @@ class StepSize:
         return 1.0 if end > 1 - _SLIVER else end
 
 
-@dataclass
-class Position:
-    """Where a march stands between two steps: what it needs besides the state of the joint to go on as if never halted.
-
-    ``targets_done`` output targets were reached, the last step being of length ``stride`` in the load; ``increment`` is
-    what it changed in the state of the equilibrium. None before the first step.
-    """
-
-    targets_done: int = 0
-    load: float = 0.0
-    stride: float = 0.0
-    increment: Array | None = None
-    size: float | None = None
-
-
 def march(
-    solver: NewtonSolver,
+    walk: Walk,
     targets: Sequence[float],
-    first_guess: Callable[[float], Array],
     *,
     rules: Stepping,
     substep_done: Callable[[float], None],
     target_done: Callable[[Step, Position], None],
     attempted: Callable[[float, int], None] = lambda load, iterations: None,
     gave_up: Callable[[float], None] = lambda load: None,
-    start: Position | None = None,
-    from_rest: bool = True,
 ) -> None:
-    """Reach the loads ``targets`` in turn and, where a step fails or ``rules`` ask for it, loads between them.
+    """Lead ``walk`` to the loads ``targets`` in turn and, where a step fails or ``rules`` ask for it, to loads between
+    them.
 
-    The guess for a step extrapolates the last increment; where that fails an elastic joint starts from the last state
-    itself before the step is cut. Where the path starts or turns, it comes from the elastic
-    solution, at the start from ``first_guess(load)``. ``substep_done(load)`` follows every accepted step with its
-    history still to be committed, ``target_done(step, position)`` every output target, ``attempted(load, iterations)``
-    every solve, ``gave_up(load)`` the one after which nothing smaller is allowed, before it is taken back. ``start``
-    continues a march whose state the equilibrium has been given back. Without ``from_rest`` the joint is not in
-    equilibrium before the first step (a pin too large for its hole), whose increment then says nothing about the next.
-    Raises `StepFailure`.
+    ``substep_done(load)`` follows every accepted step with its history still to be committed,
+    ``target_done(step, position)`` every output target, ``attempted(load, iterations)`` every solve, ``gave_up(load)``
+    the one after which nothing smaller is allowed, before it is taken back. Raises `StepFailure`.
     """
-    equilibrium = solver.equilibrium
-    at = start or Position()
+    at = walk.at
     size = StepSize(rules)
     size.length = at.size or size.length
-    state = equilibrium.state()
     for number in range(at.targets_done, len(targets)):
         begun, target, passed = at.load, targets[number], 0.0
         record = Step(target)
         while passed < 1:
             end = size.within(passed)
             load = target if end == 1 else begun + end * (target - begun)
-            stride = load - at.load
-            guess, afar = _guess(at, state, stride, load, first_guess)
-            result = solver.solve(load, guess, afar=afar)
-            if not result.converged and solver.elastic and not afar and guess is not state:
-                # an extrapolated state has a kink where the contact ended, which fine meshes resolve
-                result = solver.solve(load, state, afar=True).after(result)
+            result = walk.attempt(load)
             record.iterations += result.iterations
+            record.coarse_iterations += walk.coarse_iterations
             record.attempts.append(result)
             attempted(load, result.iterations)
             if not result.converged:
                 record.cutbacks += 1
                 tried = size.length
-                if not size.failed():
+                smallest = not size.failed()
+                if smallest:
                     gave_up(load)
-                    equilibrium.restore(at.load, state)
-                    raise StepFailure(_why(result, equilibrium.load_name, load, at.load, tried), record)
-                equilibrium.restore(at.load, state)
+                walk.take_back()
+                if smallest:
+                    raise StepFailure(_why(result, walk.solver.equilibrium.load_name, load, at.load, tried), record)
                 continue
             record.substeps += 1
             size.accepted(result.iterations)
-            new = equilibrium.state()
-            if stride:
-                known = from_rest or at.increment is not None
-                at.increment, at.stride = (new - state if known else np.zeros_like(new)), stride
-            at.load, at.size, state, passed = load, size.length, new, end
+            walk.accept(load)
+            at.size, passed = size.length, end
             substep_done(load)
-            equilibrium.commit()
+            walk.commit()
         at.targets_done = number + 1
         target_done(record, at)
-
-
-def _guess(
-    at: Position, state: Array, stride: float, load: float, first_guess: Callable[[float], Array]
-) -> tuple[Array, bool]:
-    """A guess for a step of length ``stride`` to ``load``, and whether to find the elastic solution first.
-
-    Where the path turns, the joint first goes back the way it came, elastically.
-    """
-    if at.increment is None:
-        return first_guess(load), True
-    ratio = stride / at.stride
-    guess = state if abs(ratio) > _PREDICTOR_LIMIT else state + at.increment * ratio
-    return guess, ratio < 0
 
 
 def _why(result: Newton, name: str, load: float, held: float, length: float) -> str:

@@ -185,3 +185,23 @@ def test_the_expected_number_of_triangles_is_about_what_the_mesh_has(size, growt
     ).expected_cells
     made = quarter_joint(MPI.COMM_SELF, R, DR, width, size, growth).mesh.topology.index_map(2).size_global
     assert 0.5 < expected / made < 1.5
+
+
+@pytest.mark.parametrize("ring", [False, True], ids=["quarter joint", "half ring"])
+@pytest.mark.parametrize("degree", [2, 3])
+def test_a_mesh_made_by_cutting_is_like_one_made_at_once(ring, degree):
+    """The same edges on the arcs, nodes on their circles to the last digits, no fewer triangles and few more, the same areas."""
+    at_once, cut = (
+        half_ring(MPI.COMM_SELF, R, DR, W, 0.02, 0.05, 0.5, degree=degree, refinements=k)
+        if ring
+        else quarter_joint(MPI.COMM_SELF, R, DR, W, 0.02, 0.05, degree=degree, refinements=k)
+        for k in (0, 2)
+    )
+    for tag, radius, centre in ((Facets.HOLE_ARC, R + DR, 0.0), (Facets.PIN_ARC, R, 0.0 if ring else -DR)):
+        assert len(cut.facets.find(tag)) == pytest.approx(len(at_once.facets.find(tag)), abs=6)
+        assert edge_lengths(cut, tag).max() <= 0.02 * (1 + DR)
+        x = facet_nodes(cut, tag).reshape(-1, 2) - [0, centre]
+        np.testing.assert_allclose(np.linalg.norm(x, axis=1), radius, rtol=1e-14)
+    for body in Cells:
+        assert 0.95 < len(cut.cells.find(body)) / len(at_once.cells.find(body)) < 1.2
+        assert area(cut, body) == pytest.approx(area(at_once, body), rel=1e-6)

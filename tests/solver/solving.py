@@ -37,11 +37,9 @@ def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Sol
         solution.steps.append(measure(joint, len(solution.steps) + 1, step, profiles, work, 0.0, largest))
 
     march(
-        joint.solver,
+        joint.walk(),
         scene.targets,
-        joint.rigid_translation,
         rules=scene.stepping,
-        from_rest=scene.joint.dR > 0,
         substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
         target_done=target_done,
     )

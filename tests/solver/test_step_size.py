@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from archord.solver.newton import Newton
 from archord.solver.scene import Stepping
 from archord.solver.stepping import StepFailure, StepSize, march
+from archord.solver.walk import Walk
 
 
 class Spring:
@@ -44,9 +45,8 @@ class Spring:
 def follow(targets, cost=lambda load, stride: 3, **rules):
     spring, done, accepted = Spring(cost), [], []
     march(
-        spring,
+        Walk(spring, lambda load: np.zeros(1)),
         targets,
-        lambda load: np.zeros(1),
         rules=Stepping(**rules),
         substep_done=accepted.append,
         target_done=lambda step, position: done.append(SimpleNamespace(step=step, at=position.load)),
@@ -75,9 +75,8 @@ def test_an_elastic_step_that_fails_starts_from_the_last_state_before_it_is_cut(
     """No cutback, and the iterations of both solves count."""
     spring, done = Kinked(), []
     march(
-        spring,
+        Walk(spring, lambda load: np.zeros(1)),
         [1.0, 2.0, 3.0],
-        lambda load: np.zeros(1),
         rules=Stepping(),
         substep_done=lambda load: None,
         target_done=lambda step, position: done.append(step),

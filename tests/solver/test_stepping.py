@@ -49,9 +49,8 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
         StepFailure, match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller"
     ):
         march(
-            joint.solver,
+            joint.walk(),
             targets,
-            joint.rigid_translation,
             rules=Stepping(minimum=1.0),
             substep_done=lambda load: None,
             target_done=lambda step, position: accepted.append(step.load),

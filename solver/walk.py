@@ -1,0 +1,108 @@
+"""One joint on its way along a path of loads: where it stands, and from which guess it takes the next step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from archord.geometry.basis import Array
+from archord.solver.newton import Newton, NewtonSolver
+
+if TYPE_CHECKING:
+    from archord.solver.coarse_start import CoarseStart
+
+_PREDICTOR_LIMIT = 4.0  # an increment is not extrapolated to more than this many times its length
+
+
+@dataclass
+class Position:
+    """Where a march stands between two steps: what it needs besides the state of the joint to go on as if never halted.
+
+    ``targets_done`` output targets were reached, the last step being of length ``stride`` in the load; ``increment`` is
+    what it changed in the state of the equilibrium. None before the first step.
+    """
+
+    targets_done: int = 0
+    load: float = 0.0
+    stride: float = 0.0
+    increment: Array | None = None
+    size: float | None = None
+
+
+class Walk:
+    """The walk of ``solver``'s equilibrium, whose state stands ``at`` a position, the beginning if absent.
+
+    The guess for a step is, where there is a ``coarse`` start, what a coarser mesh found. Else it extrapolates the last
+    increment; where that fails an elastic joint starts from the last state itself. Where the path starts or turns, the
+    guess comes from the elastic solution, at the start from ``first_guess(load)``. Without ``from_rest`` the joint is
+    not in equilibrium before the first step (a pin too large for its hole), whose increment then says nothing about the
+    next.
+    """
+
+    def __init__(
+        self,
+        solver: NewtonSolver,
+        first_guess: Callable[[float], Array],
+        *,
+        from_rest: bool = True,
+        at: Position | None = None,
+        coarse: CoarseStart | None = None,
+    ) -> None:
+        self.solver, self.at, self.coarse = solver, at or Position(), coarse
+        self._first_guess, self._from_rest = first_guess, from_rest
+        self.state = solver.equilibrium.state()
+        self.coarse_iterations = 0  # of the last attempt
+
+    def attempt(self, load: float) -> Newton:
+        """Solve for equilibrium at ``load``, from one guess after the other. Collective."""
+        result = None
+        for guess, afar in self._guesses(load):
+            result = self.solver.solve(load, guess, afar=afar).after(result)
+            if result.converged:
+                break
+        assert result is not None
+        return result
+
+    def _guesses(self, load: float) -> Iterator[tuple[Array, bool]]:
+        """Guesses for a step to ``load``, and whether to find the elastic solution from there first."""
+        self.coarse_iterations = 0
+        if self.coarse is not None:
+            ahead = self.coarse.increment(load)
+            self.coarse_iterations = self.coarse.iterations
+            if ahead is not None:
+                yield self.state + ahead, False
+        if self.at.increment is None:
+            yield self._first_guess(load), True
+            return
+        ratio = (load - self.at.load) / self.at.stride
+        near = abs(ratio) <= _PREDICTOR_LIMIT
+        # where the path turns, the joint first goes back the way it came, elastically
+        afar = ratio < 0
+        yield self.state + self.at.increment * ratio if near else self.state, afar
+        if near and not afar and self.solver.elastic:
+            # an extrapolated state has a kink where the contact ended, which fine meshes resolve
+            yield self.state, True
+
+    def accept(self, load: float) -> None:
+        """Go to ``load``, where the last attempt has found equilibrium; its history waits for `commit`."""
+        at, new = self.at, self.solver.equilibrium.state()
+        if load != at.load:
+            known = self._from_rest or at.increment is not None
+            at.increment = new - self.state if known else np.zeros_like(new)
+            at.stride = load - at.load
+        at.load, self.state = load, new
+
+    def commit(self) -> None:
+        """Keep the history of the step that was accepted."""
+        self.solver.equilibrium.commit()
+        if self.coarse is not None and not self.coarse.commit():
+            self.coarse = None
+
+    def take_back(self) -> None:
+        """Undo the last attempt."""
+        self.solver.equilibrium.restore(self.at.load, self.state)
+        if self.coarse is not None:
+            self.coarse.take_back()

@@ -1,0 +1,34 @@
+"""Interpolation between meshes of curved triangles."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.geometry.interpolation import Interpolation
+from archord.geometry.joint_mesh import Cells
+from archord.geometry.quarter_joint import quarter_joint
+
+
+def nodes_of(mesh, cells):
+    return mesh.geometry.x[:, :2], mesh.geometry.dofmap[cells]
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize("body", list(Cells))
+def test_linear_fields_are_kept_everywhere_and_curved_ones_to_the_order_of_the_mesh(degree, body):
+    """Isoparametric cells hold linear fields exactly, beyond their edges too; others converge."""
+    fine = quarter_joint(MPI.COMM_SELF, 1.0, 0.005, 10.0, 0.1, 0.3, degree=degree)
+    x, cells = nodes_of(fine.mesh, fine.cells.find(body))
+    to = x[np.unique(cells)]
+    errors = []
+    for size in (0.3, 0.15):
+        coarse = quarter_joint(MPI.COMM_SELF, 1.0, 0.005, 10.0, size, size, degree=degree)
+        y, of = nodes_of(coarse.mesh, coarse.cells.find(body))
+        f = Interpolation(y, of, degree, to)
+        linear = lambda z: np.stack([1 + 2 * z[:, 0] - z[:, 1], z[:, 1]], axis=1)  # noqa: E731
+        assert f(linear(y)) == pytest.approx(linear(to), abs=1e-11)
+        wave = lambda z: np.sin(z[:, :1]) * np.cos(z[:, 1:])  # noqa: E731
+        near = np.hypot(*to.T) < 1.5
+        errors.append(np.sqrt(np.mean((f(wave(y)) - wave(to))[near] ** 2)))
+    assert errors[1] < errors[0] / 2**degree
+    assert errors[1] < 0.01

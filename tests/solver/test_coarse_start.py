@@ -1,0 +1,107 @@
+"""A coarse start is a guess: it changes the way to the solution and nothing else."""
+
+import json
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.benchmarks.paper_joint import paper_joint
+from archord.solver import coarse_start
+from archord.solver.run import solve_scene
+from archord.solver.scene import Stepping
+
+SOFT = {"rigid": True}
+SCENES = {
+    "elastic": paper_joint(0.06, 2),
+    "plastic": paper_joint(0.1, 4, yield_stress=0.002),
+    "released": paper_joint(0.1, 1, 0.002, load={"displacement": [1.5, 1.0, -0.2, 1.2]}),
+    "by force": paper_joint(0.08, 1, load={"displacement": None, "relative_force": 0.005}),
+    "rigid pin": paper_joint(0.04, 2, pin=SOFT),
+    "cubic": paper_joint(0.16, 2, analysis={"degree": 3}),
+}
+
+
+@pytest.fixture
+def always(monkeypatch):
+    monkeypatch.setattr(coarse_start, "_FEWEST_DOFS", 1000)
+    monkeypatch.setattr(coarse_start, "_COARSEST", 0.3)
+
+
+def run(scene, folder, comm=MPI.COMM_SELF):
+    folder = comm.bcast(folder)
+    if comm.rank == 0:
+        folder.mkdir()
+    comm.barrier()
+    outcome = solve_scene(scene, folder, comm)
+    assert outcome.status == "done", outcome.message
+    return outcome.steps, json.loads((folder / "run.json").read_text())
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_solution_is_that_without_it(name, tmp_path, monkeypatch):
+    """Forces, peak pressures and dissipation agree to the tolerance of Newton's method, in fewer fine iterations."""
+    scene = SCENES[name]
+    plain, without = run(scene, tmp_path / "plain")
+    monkeypatch.setattr(coarse_start, "_FEWEST_DOFS", 1000)
+    monkeypatch.setattr(coarse_start, "_COARSEST", 0.3)
+    guessed, report = run(scene, tmp_path / "guessed")
+    assert sum(s["coarse_iterations"] for s in report["steps"]) > 0
+    assert not any(s["coarse_iterations"] for s in without["steps"])
+    for a, b in zip(plain, guessed, strict=True):
+        for quantity in ("P", "p0", "plastic_dissipation", "elastic_energy"):
+            largest = max(abs(getattr(m, quantity)) for m in plain)
+            assert getattr(b, quantity) == pytest.approx(getattr(a, quantity), abs=1e-8 * largest + 1e-300)
+    assert sum(m.iterations for m in guessed) < sum(m.iterations for m in plain)
+
+
+def test_iterations_hardly_grow_with_the_mesh(tmp_path):
+    """Elastic, one step to 2 dR: as many on 31 thousand dofs as on 9 thousand, give or take one."""
+    counts = []
+    for k, size in enumerate((0.0275, 0.0135)):
+        scene = paper_joint(size, 1, joint={"growth": 6 * size})
+        steps, report = run(scene, tmp_path / str(k))
+        assert report["mesh"]["dofs"] > 8000
+        counts.append(steps[0].iterations)
+    assert counts[1] <= counts[0] + 1 <= 6
+
+
+def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always):
+    """The fine joint goes on by itself."""
+    scene = paper_joint(0.1, 4, yield_stress=0.002)
+    plain = solve_scene(scene, _made(tmp_path / "plain"), MPI.COMM_SELF)
+    make = coarse_start._coarser
+    easy = {"max_iterations": 2}
+    monkeypatch.setattr(
+        coarse_start,
+        "_coarser",
+        lambda s: make(s).model_copy(update={"analysis": make(s).analysis.model_copy(update=easy)}),
+    )
+    outcome = solve_scene(scene, _made(tmp_path / "left"), MPI.COMM_SELF)
+    assert [m.P for m in outcome.steps] == pytest.approx([m.P for m in plain.steps], rel=1e-8)
+
+
+def test_cut_steps_take_the_coarse_joint_back_too(tmp_path, monkeypatch, always):
+    """Where few iterations are allowed steps are cut, and both joints go the same way."""
+    scene = paper_joint(0.1, 3, yield_stress=0.002, analysis={"max_iterations": 5})
+    scene = scene.model_copy(update={"stepping": Stepping(minimum=0.01)})
+    outcome = solve_scene(scene, _made(tmp_path / "cut"), MPI.COMM_SELF)
+    assert outcome.status == "done"
+    assert sum(m.cutbacks for m in outcome.steps) > 0
+    assert all(np.isfinite(m.P) for m in outcome.steps)
+
+
+def _made(folder):
+    folder.mkdir()
+    return folder
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", ["elastic", "plastic", "rigid pin"])
+def test_ranks_find_the_same_guess(name, tmp_path, always):
+    """On any number of ranks as on one: iterations, and P to the tolerance."""
+    comm = MPI.COMM_WORLD
+    together, _ = run(SCENES[name], tmp_path / "together", comm)
+    alone = comm.bcast(run(SCENES[name], tmp_path / "alone") if comm.rank == 0 else None)
+    assert [m.P for m in together] == pytest.approx([m.P for m in alone[0]], rel=1e-8)
+    assert [m.iterations for m in together] == [m.iterations for m in alone[0]]
