@@ -1,15 +1,18 @@
-"""``archord fit``: the law of a joint, calibrated on runs."""
+"""``archord fit``: the law of a joint, calibrated on runs, or on all cases of a sweep."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
 
+from archord.fit_sweep import fit_sweep, is_sweep
 from archord.plain_typer import typer
 
 
 def fit(
-    folders: Annotated[list[Path], typer.Argument(metavar="RUN...", help="run folders, one or more")],
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="RUN...|SWEEP", help="run folders, or the folder of a sweep, or its fit.csv")
+    ],
     load_range: Annotated[
         tuple[float, float] | None,
         typer.Option("--range", help="steps to fit: delta from ... to ..., in clearances [all]"),
@@ -29,8 +32,20 @@ def fit(
             "--python", metavar="FILE", help="write force and stiffness over delta as a module that needs only math"
         ),
     ] = None,
+    csv_file: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="sweep: write k, c, curves here [SWEEP/fit.csv]")
+    ] = None,
+    law_file: Annotated[
+        Path | None, typer.Option("--law", metavar="FILE", help="sweep: write the model of k and c as JSON")
+    ] = None,
+    held_out: Annotated[
+        float, typer.Option("--held-out", metavar="SHARE", help="sweep: cases kept to judge the model by")
+    ] = 0.15,
 ) -> int:
-    """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields."""
+    """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields.
+
+    Of a sweep, k and c of every case, and a model of both over all that decides a joint.
+    """
     import math
 
     from rich.console import Console
@@ -41,6 +56,16 @@ def fit(
     from archord.solver.output_file import check_output, writing
     from archord.solver.scene import SceneError
 
+    if any(is_sweep(folder) for folder in folders):
+        if len(folders) > 1:
+            raise SceneError(f"{folders[0]}: a sweep is fitted alone, but {len(folders)} folders are given.")
+        if hold_k is not None or residuals or python:
+            raise SceneError(f"{folders[0]}: --hold-k, --residuals and --python are for runs, this is a sweep.")
+        return fit_sweep(
+            folders[0], load_range or (0.0, math.inf), confidence, held_out, csv_file, law_file, json_file, picture
+        )
+    if csv_file or law_file:
+        raise SceneError(f"{folders[0]}: --csv and --law are for a sweep, and this is none.")
     runs = [read_run(folder).loading() for folder in folders]
     calibration = calibrate(runs, load_range or (0.0, math.inf), confidence, hold_k)
     law = calibration.law()

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from archord.postprocess.law import Law, Outside
     from archord.postprocess.law_joint import LawJoint
 
+DEFAULT = "calibrated"  # the law that is meant where none is named
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this file to ``app``."""
@@ -39,7 +41,10 @@ def laws(
 
 
 def law(
-    names: Annotated[list[str], typer.Argument(metavar="NAME...", help="laws, as archord laws lists them")],
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="NAME...", help=f"laws, as archord laws lists them [{DEFAULT}]", show_default=False),
+    ] = None,
     scene: Annotated[Path | None, typer.Option(help="take the joint from this scene file")] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="override a key of the scene")
@@ -51,10 +56,11 @@ def law(
     length: Annotated[float | None, typer.Option(help="length of the joint, for the laws that need one")] = None,
     k: Annotated[float, typer.Option("--k", help="Winkler's coefficient")] = 0.85,
     c: Annotated[float | None, typer.Option("--c", help="plateau of the pressure over the yield stress [1]")] = None,
-    plane: Annotated[str | None, typer.Option(help="strain or stress, for the regime law")] = None,
-    nu: Annotated[float | None, typer.Option(help="Poisson's ratio of both bodies, for the regime law")] = None,
+    plane: Annotated[str | None, typer.Option(help="strain or stress, for the calibrated law")] = None,
+    nu: Annotated[float | None, typer.Option(help="Poisson's ratio of both bodies, for the calibrated law")] = None,
+    pin_nu: Annotated[float | None, typer.Option(help="Poisson's ratio of the pin, if another than --nu")] = None,
     yielding: Annotated[
-        str | None, typer.Option(help="which bodies yield, for the regime law: both, block or pin [both]")
+        str | None, typer.Option(help="which bodies yield, for the calibrated law: both, block or pin [both]")
     ] = None,
     dundurs_alpha: Annotated[
         float | None, typer.Option(help="(E1' - E2')/(E1' + E2'), positive for the stiffer pin [0, or the scene's]")
@@ -76,7 +82,7 @@ def law(
     from archord.postprocess.laws import find_law
     from archord.solver.scene import SceneError
 
-    chosen = [find_law(name) for name in dict.fromkeys(names)]
+    chosen = [find_law(name) for name in dict.fromkeys(names or [DEFAULT])]
     if not (math.isfinite(to) and to > 0):
         raise SceneError(f"--to {to:g}: must be a positive number.")
     if not 1 <= points <= 100000:
@@ -93,6 +99,7 @@ def law(
         "c": c,
         "plane": plane,
         "nu": nu,
+        "pin_nu": pin_nu,
         "yielding": yielding,
     }
     joint, units = _joint(scene, overrides or [], given, k)
@@ -118,7 +125,7 @@ def _joint(
 
     values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if "nu" in values:
-        values["pin_nu"] = None  # one for both
+        values.setdefault("pin_nu", None)  # one for both
     if scene is not None:
         from archord.solver.scene_file import load_scene
 

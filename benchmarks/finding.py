@@ -17,14 +17,14 @@ from mpi4py import MPI
 
 from archord.benchmarks.finding_variants import CROSSED, ELASTIC, VARIANTS, Variant
 from archord.benchmarks.paper_runs import PLANES, Plane
+from archord.postprocess.calibrated_law import joint_calibrated
 from archord.postprocess.calibration import calibrate
 from archord.postprocess.chord_laws import plastic_force
 from archord.postprocess.finding_rows import LOADS, FindingRow, read_rows, write_rows
-from archord.postprocess.regime_fit import fit_regimes, row_joint
-from archord.postprocess.regime_law import RegimeFit, to_json
 from archord.postprocess.run_curve import read_run
 from archord.solver.run import solve_scene
 
+_LATE = LOADS > 0.45
 HEADINGS = ("joint", "plane", "P(2 dR)/(E* R)", "over eq. 12", "p0/sigY", "k", "c", "R2 of P", "c of the plateau")
 
 
@@ -59,7 +59,7 @@ def solve(variant: Variant, plane: Plane, element_size: float) -> FindingRow | s
 
 def _entries(row: FindingRow) -> list[str]:
     """The entries below `HEADINGS`."""
-    law = float(plastic_force(row_joint(row, 0.85, 1.0), np.array(2 * row.clearance)))
+    law = float(plastic_force(row.joint_with(0.85, 1.0), np.array(2 * row.clearance)))
     force, peak = row.P[-1] * row.clearance, "-" if math.isinf(row.s) else f"{row.p0_over_sigY:.3f}"
     c = "-" if math.isnan(row.c) else f"{row.c:.3f} ± {row.c_error:.3f}"
     plateau = "-" if math.isnan(row.plateau) else f"{row.plateau:.3f}"
@@ -67,16 +67,30 @@ def _entries(row: FindingRow) -> list[str]:
     return [row.joint, row.plane, *numbers, f"{row.r2:.4f}", plateau]
 
 
-def _laws(rows: list[FindingRow]) -> tuple[RegimeFit, ...]:
-    """Print how the regime law is fitted, and how good it is."""
-    fits = fit_regimes(rows)
-    print("\n| plane | yields | joints | k off by | c off by | P off by, 0.5 to 2 dR | rms | 0.1 to 0.4 dR |")
-    print("|" + "---|" * 8)
-    for f in fits:
-        errors = (f.k_error, f.c_error if f.ln_c else None, f.P_error, f.P_rms, f.P_early)
-        words = ["-" if error is None else f"{error:.1%}" for error in errors]
-        print(f"| {f.plane} | {f.yielding} | {f.rows} | {' | '.join(words)} |")
-    return fits
+def judged(rows: list[FindingRow]) -> list[tuple[str, str, int, float, float, float]]:
+    """How far the calibrated law, which was not fitted to these ``rows``, is from them where it holds: plane, which
+    bodies yield, number of rows, rms and largest size of its error of P over 0.5 to 2 dR, and rms with own k and c."""
+    found = []
+    for plane in PLANES:
+        for kind in ("none", "both", "block"):
+            off, own = [], []
+            for row in rows:
+                if (row.plane, row.yielding, row.kinematics) == (plane, kind, "current"):
+                    law = joint_calibrated(row.joint_with(row.k, row.c))
+                    if not law.outside:
+                        off.append(row.force_error(law.k, law.c)[_LATE])
+                        own.append(row.force_error(row.k, row.c)[_LATE])
+            errors, floor = np.array(off), np.array(own)
+            rms, least = (float(np.sqrt((part**2).mean())) for part in (errors, floor))
+            found.append((plane, kind, len(off), rms, float(np.abs(errors).max()), least))
+    return found
+
+
+def _print_judged(rows: list[FindingRow]) -> None:
+    print("\n| plane | yields | joints | P off by, rms | at most | rms with own k and c |")
+    print("|" + "---|" * 6)
+    for plane, kind, number, rms, largest, own in judged(rows):
+        print(f"| {plane} | {kind} | {number} | {rms:.1%} | {largest:.1%} | {own:.1%} |")
 
 
 def main() -> None:
@@ -85,7 +99,6 @@ def main() -> None:
     parser.add_argument("--element-size", type=float, default=0.04, help="on the arcs, over R [0.04]")
     parser.add_argument("--rows", type=Path, help="take the rows of this file (postprocess/finding.csv), solve nothing")
     parser.add_argument("--csv", type=Path, help="write all rows into this file as well")
-    parser.add_argument("--json", type=Path, help="write the coefficients of the regime law into this file")
     arguments = parser.parse_args()
     rows = read_rows(arguments.rows) if arguments.rows else _solve_all(arguments.element_size)
     if MPI.COMM_WORLD.rank > 0:
@@ -98,9 +111,7 @@ def main() -> None:
     for row in rows:
         if row.joint in shown:
             print("| " + " | ".join(_entries(row)) + " |")
-    fits = _laws(rows)
-    if arguments.json:
-        arguments.json.write_text(to_json(fits), encoding="utf-8")
+    _print_judged(rows)
 
 
 def _solve_all(element_size: float) -> list[FindingRow]:

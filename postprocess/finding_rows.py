@@ -7,14 +7,17 @@ dR up to 2 dR. k and c are those of the plastic-Winkler law fitted to P from 0.1
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.postprocess.chord_laws import plastic_force
+from archord.postprocess.law_joint import LawJoint
 
 LOADS = np.linspace(0.1, 2.0, 20)  # delta/dR of the columns P(...)
 TABLE = Path(__file__).parent / "finding.csv"
@@ -46,6 +49,21 @@ class FindingRow:
     p0_over_sigY: float
     plateau: float
     P: Array
+
+
+    def joint_with(self, k: float, c: float) -> LawJoint:
+        """The joint in units of R = E* = 1, with these coefficients of the plastic-Winkler law."""
+        alpha = 1.0 if math.isinf(self.ratio) else (self.ratio - 1) / (self.ratio + 1)
+        stress = None if math.isinf(self.s) else self.s * self.clearance
+        return LawJoint(1.0, self.clearance, 1.0, stress, k=k, c=c if math.isfinite(c) else 1.0, dundurs_alpha=alpha,
+                        plane=self.plane, nu=self.nu,
+                        yielding="both" if self.yielding == "none" else self.yielding)  # fmt: skip
+
+    def force_error(self, k: float, c: float) -> Array:
+        """``P of the law/P - 1`` at `LOADS` ``(20,)``; elastic where c is not finite."""
+        joint = self.joint_with(k, c)
+        law = plastic_force(joint if math.isfinite(c) else replace(joint, yield_stress=None), LOADS * self.clearance)
+        return law / self.clearance / self.P - 1
 
 
 def read_rows(file: Path = TABLE) -> list[FindingRow]:

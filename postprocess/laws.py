@@ -6,11 +6,11 @@ import difflib
 from collections.abc import Callable
 from functools import partial
 
+from archord.postprocess import calibrated_law
 from archord.postprocess import chord_laws as chord
 from archord.postprocess import hertz_laws as hertz
 from archord.postprocess import logarithmic_laws as log
 from archord.postprocess import persson_law as persson
-from archord.postprocess import regime_law
 from archord.postprocess.law import Law
 from archord.postprocess.law_joint import LawJoint
 from archord.solver.scene import SceneError
@@ -78,6 +78,23 @@ _SECOND_HAND = "not checked against the original, which was out of reach"
 
 _ALL = [
     Law(
+        "calibrated",
+        "plastic-Winkler law with k and c of archord's simulations",
+        "as paper-plastic with k, and c sigY in place of sigY; 1/k_e = p, q, pm, qn and more, ln(k/k_e) = A exp(-b s), "
+        "ln c = C: polynomials of Dundurs' alpha, Poisson's ratios and s = sigY R/(E* dR), by plane and yielding body "
+        "(docs/calibration.md)",
+        calibrated_law.range_in_words(),
+        "ours: fitted by archord fit to the cases of scenes/calibration.sweep.toml",
+        calibrated_law.quality_in_words(),
+        limit=_deepest,
+        unfit=calibrated_law.unfit,
+        needs=("plane", "nu"),
+        force_at=calibrated_law.calibrated_force,
+        stiffness_at=calibrated_law.calibrated_stiffness,
+        peak_at=calibrated_law.calibrated_peak,
+        angle_at=chord.chord_angle,
+    ),
+    Law(
         "paper",
         "elastic law of Hu et al. (eq. 9)",
         "P = (8/3) k E* delta sqrt(delta/(2 (dR + delta))); p0 = k E* delta/R; cos eps = dR/(dR + delta)",
@@ -106,22 +123,6 @@ _ALL = [
         force_at=chord.plastic_force,
         stiffness_at=chord.plastic_stiffness,
         peak_at=chord.plastic_peak,
-        angle_at=chord.chord_angle,
-    ),
-    Law(
-        "regime",
-        "plastic-Winkler law with k and c of archord's simulations",
-        "as paper-plastic with k, and c sigY in place of sigY; ln k, ln c = polynomials of ln(sigY R/(0.4 E* "
-        "dR)), nu - 0.3, alpha and beta, by plane and yielding body",
-        regime_law.range_in_words(),
-        "ours: fitted to postprocess/finding.csv, which python3 -m archord.benchmarks.finding solves anew",
-        regime_law.quality_in_words(),
-        limit=_deepest,
-        unfit=regime_law.unfit,
-        needs=("plane", "nu"),
-        force_at=regime_law.regime_force,
-        stiffness_at=regime_law.regime_stiffness,
-        peak_at=regime_law.regime_peak,
         angle_at=chord.chord_angle,
     ),
     Law(

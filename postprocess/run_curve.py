@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ class RunCurve:
     peeq_max: Array
     folder: Path | None = None
 
-    @property
+    @cached_property
     def E_star(self) -> float:
         """Contact modulus."""
         return self.scene.E_star
@@ -37,12 +38,12 @@ class RunCurve:
         """Radius of the pin."""
         return self.scene.joint.radius
 
-    @property
+    @cached_property
     def dR(self) -> float:
         """Clearance."""
         return self.scene.joint.dR
 
-    @property
+    @cached_property
     def sigY(self) -> float | None:
         """Yield stress of the weaker body; None if neither yields."""
         given = [s.yield_stress for s in (self.scene.pin, self.scene.block) if s.yield_stress is not None]
