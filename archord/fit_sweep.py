@@ -109,7 +109,9 @@ def _print_model(result, total: int) -> None:
     from archord.postprocess.sweep_report import error_lines, formulas, worst_line
 
     model, used, held = result.model, result.used, result.held
-    print(f"model: {model.numbers} coefficients from {len(used)} of {total} cases; {len(held)} held out until the end\n")
+    print(
+        f"model: {model.numbers} coefficients from {len(used)} of {total} cases; {len(held)} held out until the end\n"
+    )
     for line in formulas(model):
         print(f"    {line}")
     print()

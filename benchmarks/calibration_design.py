@@ -1,4 +1,4 @@
-"""The design of the calibrated law: ``python3 -m archord.benchmarks.calibration_design > scenes/calibration.sweep.toml``.
+"""The design of the calibrated law, printed by ``python3 -m archord.benchmarks.calibration_design``.
 
 Joints of R = 10 mm and E* = 100 GPa, which no dimensionless result depends on, pressed by twice the clearance. Each
 plane has joints that stay elastic, joints both of whose bodies yield at one stress, and joints of which only the block
@@ -8,6 +8,7 @@ range by hand. ``s = sigY R/(E* dR)`` takes the place of sigY/E*, as it decides 
 
 from __future__ import annotations
 
+import argparse
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -28,7 +29,7 @@ _HEAD = """\
 #     python3 -m archord.benchmarks.calibration_design > scenes/calibration.sweep.toml
 # Solve them, and fit the law anew (docs/calibration.md):
 #     mpirun -n 2 archord sweep scenes/calibration.sweep.toml
-#     archord fit runs/calibration --law postprocess/calibrated_law.json --rows postprocess/calibrated_rows.csv
+#     archord fit runs/calibration --law postprocess/calibrated_law.json --csv postprocess/calibrated_rows.csv
 """
 _BASE = """\
 [base.joint]
@@ -129,16 +130,29 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS}g}")
 
 
-def as_sweep(element_size: float = 0.05) -> str:
-    """The sweep file; ``element_size`` is that on the arcs, over R."""
+def as_sweep(every: int = 1, element_sizes: tuple[float, ...] = (0.05,)) -> str:
+    """The sweep file: ``every`` joint, every second and so on, on meshes with ``element_sizes`` on the arcs, over R."""
     from archord.solver.scene_format import toml_value
 
     rows = [
         "    { " + ", ".join(f"{key} = {toml_value(value)}" for key, value in joint.overrides().items()) + " },"
-        for joint in joints()
+        for joint in joints()[every // 2 :: every]
     ]
-    return "\n".join([_HEAD, "list = [", *rows, "]", "", _BASE.format(R=R, size=element_size)])
+    head = "" if every > 1 else _HEAD
+    parts = [head, "list = [", *rows, "]", "", _BASE.format(R=R, size=element_sizes[0])]
+    if len(element_sizes) > 1:
+        parts += ["[grid]", f"joint.relative_element_size = {toml_value(list(element_sizes))}", ""]
+    return "\n".join(parts)
+
+
+def main() -> None:
+    """Print the sweep file."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--every", type=int, default=1, help="print every so many joints only [1]")
+    parser.add_argument("--element-size", type=float, nargs="+", default=[0.05], help="on the arcs, over R [0.05]")
+    arguments = parser.parse_args()
+    print(as_sweep(arguments.every, tuple(arguments.element_size)), end="")
 
 
 if __name__ == "__main__":
-    print(as_sweep(), end="")
+    main()

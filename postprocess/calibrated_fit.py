@@ -17,7 +17,7 @@ from archord.postprocess.fitted_cases import FittedCase
 
 FORM = Form(
     "calibrated",
-    elastic=("p", "q", "pm", "qn", "pq", "pqm", "pmm", "qnn"),
+    elastic=("p", "q", "pm", "qn", "qnn", "qqnn", "pqmn", "ppmmm"),
     late=("1", "p", "x"),
     strain=("1", "x", "p", "pm", "qn", "xp", "xpm", "xqn"),
     stress=("1", "x", "p"),

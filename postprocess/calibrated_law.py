@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -32,7 +33,8 @@ from archord.solver.scene import SceneError
 
 TABLE = Path(__file__).parent / "calibrated_law.json"
 ROWS = Path(__file__).parent / "calibrated_rows.csv"
-_LAST_DIGITS = 1e-4  # of the bounds as they are stored, and of moduli that a scene has rounded
+_RATIO = "E'(pin)/E'(block)"
+_LAST_DIGITS = 1e-3  # of the bounds as they are stored, and of moduli that a scene has rounded
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ def joint_calibrated(joint: LawJoint, model: CalibratedModel | None = None) -> C
     numbers = (joint.dundurs_alpha, equivalent(pin, kind[0]), equivalent(joint.nu, kind[0]))
     ratio = joint.clearance / joint.radius
     k, c = model.coefficients(kind, Points(*(np.array([v]) for v in (*numbers, s, ratio))))
-    reason = _unfit(joint) or _stray(joint, s, model.bounds_of(kind))
+    reason = _unfit(joint) or _stray(joint, s, range_of(model, kind))
     return Calibrated(float(k[0]), float(c[0]), reason, _errors(model, kind))
 
 
@@ -130,22 +132,45 @@ def _stray(joint: LawJoint, s: float, bounds: Bounds | None) -> str:
     if bounds is None:
         return "no joint of this plane and kind of yielding was fitted"
     alpha = joint.dundurs_alpha
-    checks = [("Poisson's ratio of the block, nu", joint.nu, bounds.nu)]
+    checks = [("nu of the block", joint.nu, bounds.nu)]
     if alpha < 1:
         pin = joint.pin_nu if joint.pin_nu is not None else joint.nu or 0.0
-        checks.append(("Poisson's ratio of the pin, nu", pin, bounds.pin_nu))
+        checks.append(("nu of the pin", pin, bounds.pin_nu))
+        checks.append((SOFT_WORDS, (1 - alpha) / 2 * equivalent(pin, bounds.plane), (0.0, SOFT)))
     low, high = (_stiffness(value) for value in bounds.alpha)
-        checks.append((SOFT_WORDS, (1 - alpha) / 2 * equivalent(pin, joint.plane or "strain"), (0.0, SOFT)))
-    checks.append(("the ratio of the moduli, E'(pin)/E'(block)", _stiffness(alpha), (low, high)))
-    checks.append(("the clearance, dR/R", joint.clearance / joint.radius, bounds.clearance))
+    checks.append((_RATIO, _stiffness(alpha), (low, high)))
+    checks.append(("dR/R", joint.clearance / joint.radius, bounds.clearance))
     if math.isfinite(s):
         checks.append(("sigY R/(E* dR)", s, (bounds.s[0], math.inf)))
     for name, value, (low, high) in checks:
-        slack = _LAST_DIGITS * max(abs(low), abs(high) if math.isfinite(high) else 0.0, 1e-9)
+        slack = _LAST_DIGITS * max(abs(low), abs(high) if math.isfinite(high) else 0.0)
         if value is not None and not low - slack <= value <= high + slack:
-            upper = "" if math.isinf(high) else f" to {high:.4g}"
-            return f"{name} = {value:.4g} is outside {low:.4g}{upper or ' and more'}"
+            upper = "and more" if math.isinf(high) else f"to {high:.4g}"
+            return f"{name} = {value:.4g} is outside {low:.4g} {upper}"
     return ""
+
+
+def range_of(model: CalibratedModel, kind: Kind) -> Bounds | None:
+    """The range of a kind, None if it was not fitted.
+
+    One design covers all kinds, so Poisson's ratios, clearance and the softest pin are from all cases together, the
+    smallest s from those in the plane; the stiffest pin is the kind's own.
+    """
+    own = model.bounds_of(kind)
+    if own is None:
+        return None
+
+    def widest(name: str, bounds: Iterable[Bounds]) -> tuple[float, float]:
+        pairs = [getattr(b, name) for b in bounds]
+        return min(low for low, _ in pairs), max(high for _, high in pairs)
+
+    same = [b for b in model.bounds if b.plane == own.plane and b.yielding != "none"]
+    return replace(
+        own,
+        **{name: widest(name, model.bounds) for name in ("nu", "pin_nu", "clearance")},
+        alpha=(widest("alpha", model.bounds)[0], own.alpha[1]),
+        s=widest("s", same) if same else own.s,
+    )
 
 
 def _stiffness(alpha: float) -> float:
@@ -184,19 +209,15 @@ _WORDS = {"none": "elastic", "both": "both yield", "block": "only the block yiel
 def range_in_words() -> str:
     """The range of the law, from the cases that it was fitted to."""
     model = shipped_model()
-    said = []
-    for kind in (("strain", "none"), ("stress", "none"), *KINDS):
-        b = model.bounds_of(kind)
-        if b is not None:
-            low, high = (_stiffness(alpha) for alpha in b.alpha)
-            stiff = f"E'(pin)/E'(block) = {low:.3g} to {'rigid' if math.isinf(high) else format(high, '.3g')}"
-            s = f", sigY R/(E* dR) from {b.s[0]:.3g}" if math.isfinite(b.s[0]) else ""
-            said.append(f"plane {kind[0]}, {_WORDS[kind[1]]}: nu of either body {b.nu[0]:.3g} to {b.nu[1]:.3g}, {stiff}, "
-                        f"dR/R = {b.clearance[0]:.2%} to {b.clearance[1]:.2%}{s}")  # fmt: skip
-    low, high = model.load_range
+    found = {kind: b for kind in (("strain", "none"), *KINDS) if (b := range_of(model, kind))}
+    b = found["strain", "none"]
+    stiffest = {yielding: _stiffness(b.alpha[1]) for (_, yielding), b in found.items()}
+    pins = "; ".join(f"to {value:.3g}, {_WORDS[yielding]}" for yielding, value in stiffest.items() if value < math.inf)
+    least = ", ".join(f"{plane} {bound.s[0]:.3g}" for (plane, kind), bound in found.items() if kind == "both")
     return (
-        f"delta <= {high:g} dR (fitted from {low:g} dR), perfect plasticity; {SOFT_WORDS} at most {SOFT:g}; "
-        f"{'; '.join(said)}"
+        f"delta <= {model.load_range[1]:g} dR, perfect plasticity, nu of either body = {b.nu[0]:.3g} to {b.nu[1]:.3g}, "
+        f"{_RATIO} from {_stiffness(b.alpha[0]):.3g} to a rigid pin{f' ({pins})' if pins else ''}, dR/R = "
+        f"{b.clearance[0]:.2g} to {b.clearance[1]:.2g}, sigY R/(E* dR) from (plane) {least}, {SOFT_WORDS} at most {SOFT:g}"
     )
 
 

@@ -104,7 +104,7 @@ class Form:
 
 @dataclass(frozen=True)
 class Plastic:
-    """Coefficients of one plane and kind of yielding: ``rate`` b, of A, and of ln c; and how many cases each is from."""
+    """Coefficients of one plane and kind of yielding: ``rate`` b, of A, and of ln c; how many cases they are from."""
 
     plane: str
     yielding: str

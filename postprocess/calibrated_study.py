@@ -31,8 +31,8 @@ Row = tuple[str, str, str, dict[str, Any]]  # what, plane, which bodies yield, s
 
 @dataclass(frozen=True)
 class Study:
-    """A ``model`` fitted to the cases ``used``, those ``held`` out, and the errors as rows of tables: by kind, each case
-    foretold by the others or held out of all, and ``simpler`` forms, each case foretold by the others."""
+    """A ``model`` fitted to the cases ``used``, those ``held`` out, and the errors as rows of tables: by kind, each
+    case foretold by the others or held out of all, and of ``simpler`` forms, each case foretold by the others."""
 
     model: CalibratedModel
     used: list[FittedCase]

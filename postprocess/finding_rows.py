@@ -50,7 +50,6 @@ class FindingRow:
     plateau: float
     P: Array
 
-
     def joint_with(self, k: float, c: float) -> LawJoint:
         """The joint in units of R = E* = 1, with these coefficients of the plastic-Winkler law."""
         alpha = 1.0 if math.isinf(self.ratio) else (self.ratio - 1) / (self.ratio + 1)

@@ -34,7 +34,8 @@ class FittedCase:
 
     ``ratio`` is E of the pin over E of the block (infinite: a rigid pin), ``pin_nu`` nan for a rigid pin, ``clearance``
     dR/R, ``strength`` sigY/E* of the weaker body (infinite: elastic), ``yielding`` one of `YIELDING`. ``c`` is nan
-    where too few steps have yielded, ``plateau`` the median pressure over sigY (nan: none was measured). ``rms`` and
+    where too few steps have yielded, ``k_mesh`` and ``c_mesh`` the errors of the mesh, nan where there was but one,
+    ``plateau`` the median pressure over sigY (nan: none was measured). ``rms`` and
     ``largest`` are those of ``law/run - 1`` with the joint's own k and c. ``load`` is delta/dR, ``P`` the force over
     E* dR, ``(n,)`` each; ``mesh`` the element size on the arcs over R.
     """
@@ -50,8 +51,10 @@ class FittedCase:
     mesh: float
     k: float
     k_error: float
+    k_mesh: float
     c: float
     c_error: float
+    c_mesh: float
     plateau: float
     rms: float
     largest: float
@@ -111,6 +114,8 @@ _HEADINGS = {
     "mesh": "h/R",
     "k_error": "k s.e.",
     "c_error": "c s.e.",
+    "k_mesh": "k mesh",
+    "c_mesh": "c mesh",
     **_CURVES,
 }
 _NAMES = tuple(field.name for field in fields(FittedCase))
@@ -145,15 +150,21 @@ def _row(run: RunCurve, force: CurveFit, plateau: CurveFit | None, name: str) ->
         strength=math.inf if run.sigY is None else run.sigY / run.E_star,
         mesh=run.scene.joint.h / run.R,
         k=k.value,
-        k_error=k.error,
+        k_error=k.standard_error,
+        k_mesh=_known(k.discretisation_error),
         c=c.value if c else math.nan,
-        c_error=c.error if c else math.nan,
+        c_error=c.standard_error if c else math.nan,
+        c_mesh=_known(c.discretisation_error) if c else math.nan,
         plateau=plateau.c.value if plateau and plateau.c else math.nan,
         rms=force.rms,
         largest=force.largest,
         load=part.load,
         P=part.data,
     )
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def read_cases(file: str | Path) -> tuple[list[FittedCase], dict[str, str]]:

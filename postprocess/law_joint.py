@@ -33,7 +33,7 @@ class LawJoint:
     coefficient (0.85: Hu et al., eq. 6), ``c`` the plateau of the pressure over the yield stress (1: Hu et al., eq.
     10), ``length`` the length of the joint along its axis. ``dundurs_alpha`` =
     (E1' - E2')/(E1' + E2') is positive where the pin is the stiffer body, ``dundurs_beta`` goes with it; both are zero
-    for like bodies. Only the calibrated law asks for the rest: ``plane`` ("strain" or "stress"), ``nu`` of the block and
+    for like bodies. Only the calibrated law asks for the rest: ``plane`` ("strain" or "stress"), ``nu`` of the block,
     ``pin_nu`` of the pin (None: the block's, or rigid), and which bodies have the yield stress, ``yielding``: "both",
     "block", "pin", or "unlike" where each has its own. Raises `SceneError` for values that make no joint.
     """

@@ -109,7 +109,9 @@ def _k_over_nu(axis, cases: list[FittedCase], model: CalibratedModel | None) -> 
             joints = [_Joint(plane, alpha, n) for n in nu]
             _line(axis, nu, joints, model, 0, color=f"C{i}", lw=1, label=words if plane == "strain" else None)
     axis.axhline(PAPER_K, color="black", lw=0.8, label="k = 0.85")
-    axis.set(xlabel="ν of both bodies", ylabel="k, elastic", title="○ — plane strain, □ -- plane stress", ylim=(0.4, 1.3))
+    axis.set(
+        xlabel="ν of both bodies", ylabel="k, elastic", title="○ — plane strain, □ -- plane stress", ylim=(0.4, 1.3)
+    )
 
 
 def _k_over_moduli(axis, cases: list[FittedCase], model: CalibratedModel | None) -> None:
@@ -134,7 +136,9 @@ def _k_over_onset(axis, cases: list[FittedCase], model: CalibratedModel | None) 
             k = model.elastic_k(Points.of(same))
             axis.plot([c.s for c in same] / k, [c.k for c in same] / k, _PLANES[kind[0]][0], ms=4, mfc="none",
                       color=color, label=f"plane {kind[0]}, {kind[1]}")  # fmt: skip
-    axis.set(xlabel="s / k of the elastic joint,  s = sigY R/(E* ΔR)", ylabel="k / k of the elastic joint", xscale="log")
+    axis.set(
+        xlabel="s / k of the elastic joint,  s = sigY R/(E* ΔR)", ylabel="k / k of the elastic joint", xscale="log"
+    )
 
 
 def _c_over(

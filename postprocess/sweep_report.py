@@ -19,15 +19,22 @@ def case_table(numbers: list[int], cases: list[FittedCase], varied: dict[str, li
     """One row per case: number, what is ``varied`` (a column by heading), k and c with their errors, the plateau's
     median pressure over sigY, and rms and largest of ``law/run - 1``."""
     table = Table(box=None, pad_edge=False, header_style="")
-    for heading in ("case", *varied, "k", "s.e.", "c", "s.e.", "plateau", "rms", "largest"):
+    meshes = any(math.isfinite(case.k_mesh) for case in cases)
+    errors, kinds = (("s.e.", "mesh"), ("_error", "_mesh")) if meshes else (("s.e.",), ("_error",))
+    for heading in ("case", *varied, "k", *errors, "c", *errors, "plateau", "rms", "largest"):
         table.add_column(heading, justify="right", no_wrap=True)
     for i, (number, case) in enumerate(zip(numbers, cases, strict=True)):
-        c = [f"{case.c:.4f}", f"{case.c_error:.1e}"] if math.isfinite(case.c) else ["-", "-"]
-        plateau = f"{case.plateau:.3f}" if math.isfinite(case.plateau) else "-"
-        quality = [plateau, f"{case.rms:.1%}", f"{case.largest:+.1%}"]
-        row = [str(number), *(column[i] for column in varied.values()), f"{case.k:.4f}", f"{case.k_error:.1e}"]
-        table.add_row(*row, *c, *quality)
+        k, c = (
+            [_number(getattr(case, name), ".4f"), *(_number(getattr(case, name + error), ".1e") for error in kinds)]
+            for name in "kc"
+        )
+        quality = [_number(case.plateau, ".3f"), f"{case.rms:.1%}", f"{case.largest:+.1%}"]
+        table.add_row(str(number), *(column[i] for column in varied.values()), *k, *c, *quality)
     return table
+
+
+def _number(value: float, form: str) -> str:
+    return format(value, form) if math.isfinite(value) else "-"
 
 
 def numbers_of(cases: list[FittedCase]) -> dict[str, list[str]]:
@@ -78,7 +85,9 @@ def error_lines(rows: list[tuple[str, str, str, dict[str, Any]]]) -> list[str]:
     for law, plane, yielding, found in rows:
         cells = [_of(found, name, what) for name in ("k", "c", "P") for what in ("rms", "largest")]
         cells += [_of(found, "P own", "rms"), _of(found, "P early", "rms")]
-        lines.append(f"| {law} | {plane} | {_YIELDS.get(yielding, yielding)} | {found['cases']} | {' | '.join(cells)} |")
+        lines.append(
+            f"| {law} | {plane} | {_YIELDS.get(yielding, yielding)} | {found['cases']} | {' | '.join(cells)} |"
+        )
     return lines
 
 
@@ -113,19 +122,23 @@ def as_json(
     model: CalibratedModel | None,
 ) -> str:
     """Everything as JSON; what is not a finite number is null."""
-    return json.dumps(
-        {
-            "from": notes,
-            "cases": [
-                {name: _plain(value) for name, value in asdict(case).items()} | {"s": _plain(case.s)} for case in cases
-            ],
-            "left_out": [{"run": name, "reason": reason} for name, reason in left_out],
-            "model": None if model is None else json.loads(model.to_json()),
-        },
-        indent=1,
-        ensure_ascii=False,
-        allow_nan=False,
-    ) + "\n"
+    return (
+        json.dumps(
+            {
+                "from": notes,
+                "cases": [
+                    {name: _plain(value) for name, value in asdict(case).items()} | {"s": _plain(case.s)}
+                    for case in cases
+                ],
+                "left_out": [{"run": name, "reason": reason} for name, reason in left_out],
+                "model": None if model is None else json.loads(model.to_json()),
+            },
+            indent=1,
+            ensure_ascii=False,
+            allow_nan=False,
+        )
+        + "\n"
+    )
 
 
 def _plain(value: Any) -> Any:

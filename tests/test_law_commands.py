@@ -106,18 +106,33 @@ def test_a_table_needs_no_plotting():
     assert {"matplotlib", "dolfinx", "petsc4py"}.isdisjoint(result.stdout.split())
 
 
-def test_regime_law_beside_the_paper_s(capsys):
+def test_calibrated_law_beside_the_paper_s(capsys):
     """Of a scene, or of numbers; what it needs is named."""
     numbers = [*JOINT, "--yield-stress", "230.77", "--points", "2"]
-    assert run(["law", "regime", "paper-plastic", *numbers, "--plane", "strain", "--nu", "0.3"]) == 0
-    regime, paper = map(table, capsys.readouterr().out.split("\n\n"))
-    assert regime["P/E*dR"][-1] > 1.3 * paper["P/E*dR"][-1]
-    assert run(["law", "regime", *numbers, "--plane", "strain"]) == 2
-    assert capsys.readouterr().err == "regime: this law needs nu.\n"
-    assert run(["law", "regime", *numbers, "--plane", "strain", "--nu", "0.3", "--yielding", "pin"]) == 0
+    assert run(["law", "calibrated", "paper-plastic", *numbers, "--plane", "strain", "--nu", "0.3"]) == 0
+    ours, paper = map(table, capsys.readouterr().out.split("\n\n"))
+    assert ours["P/E*dR"][-1] > 1.3 * paper["P/E*dR"][-1]
+    assert run(["law", "calibrated", *numbers, "--plane", "strain"]) == 2
+    assert capsys.readouterr().err == "calibrated: this law needs nu.\n"
+    assert run(["law", "calibrated", *numbers, "--plane", "strain", "--nu", "0.3", "--yielding", "pin"]) == 0
     out, err = capsys.readouterr()
     assert "only the pin yields" in err
     assert "nan" in out
+
+
+def test_without_a_name_the_law_is_the_calibrated_one(capsys):
+    """From a scene as from numbers; Poisson's ratio of the pin alone changes it."""
+    printed = []
+    for words in (["law"], ["law", "calibrated"]):
+        assert run([*words, "--scene", SCENE, "--points", "2"]) == 0
+        printed.append(capsys.readouterr().out)
+    assert printed[0] == printed[1]
+    forces = []
+    for words in ([], ["--pin-nu", "0.1"]):
+        assert run(["law", *JOINT, "--plane", "strain", "--nu", "0.3", "--points", "2", *words]) == 0
+        forces.append(table(capsys.readouterr().out)["P"])
+    assert (0.005 < abs(forces[1] / forces[0] - 1)).all()
+    assert (abs(forces[1] / forces[0] - 1) < 0.2).all()
 
 
 def test_the_plateau_of_the_plastic_law_can_be_chosen(capsys):
