@@ -68,8 +68,11 @@ def _entries(row: FindingRow) -> list[str]:
 
 
 def judged(rows: list[FindingRow]) -> list[tuple[str, str, int, float, float, float]]:
-    """How far the calibrated law, which was not fitted to these ``rows``, is from them where it holds: plane, which
-    bodies yield, number of rows, rms and largest size of its error of P over 0.5 to 2 dR, and rms with own k and c."""
+    """How far the calibrated law, fitted to solutions other than these ``rows``, is from them where it holds.
+
+    Plane, which bodies yield, number of rows, rms and largest size of its error of P over 0.5 to 2 dR, and the rms with
+    each row's own k and c.
+    """
     found = []
     for plane in PLANES:
         for kind in ("none", "both", "block"):

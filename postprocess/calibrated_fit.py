@@ -18,15 +18,15 @@ from archord.postprocess.fitted_cases import FittedCase
 FORM = Form(
     "calibrated",
     elastic=("p", "q", "pm", "qn", "qnn", "qqnn", "pqmn", "ppmmm"),
-    late=("1", "p", "x"),
-    strain=("1", "x", "p", "pm", "qn", "xp", "xpm", "xqn"),
-    stress=("1", "x", "p"),
+    late=("1", "p", "x", "pm", "qn"),
+    strain=("1", "x", "p", "xp", "pp", "pn", "ppm"),
+    stress=("1", "pm", "n", "d"),
 )
 SIMPLER = (  # to compare with
     Form("constants", ("1",), (), ("1",), ("1",)),
     Form("k by alpha, c by s", ("p", "q"), (), ("1", "x"), ("1", "x")),
     Form("and k by nu and s", ("p", "q", "pm", "qn"), ("1",), ("1", "x"), ("1", "x")),
-    Form("and c by alpha and nu", ("p", "q", "pm", "qn"), ("1",), ("1", "x", "p", "pm", "qn"), ("1", "x", "p")),
+    Form("and c by alpha and nu", ("p", "q", "pm", "qn"), ("1",), ("1", "x", "p", "pm", "qn"), ("1", "pm", "n")),
 )
 LATE = 0.45  # delta/dR from which errors of P count; the contact is Hertz's before
 FOLDS = 10
@@ -86,7 +86,7 @@ def _plastic(cases: list[FittedCase], kind: Kind, model: CalibratedModel, plenty
     yielded = [case for case in cases if math.isfinite(case.told_c)]
     _suffice(cases, plenty * (len(form.late) + bool(form.late)), what)
     _suffice(yielded, plenty * len(form.threshold(kind[0])), what)
-    rate, late = 0.0, ()
+    rate, late = 0.0, tuple[float, ...]()
     if form.late:
         points = Points.of(cases)
         k = model.elastic_k(points)

@@ -213,11 +213,11 @@ def range_in_words() -> str:
     b = found["strain", "none"]
     stiffest = {yielding: _stiffness(b.alpha[1]) for (_, yielding), b in found.items()}
     pins = "; ".join(f"to {value:.3g}, {_WORDS[yielding]}" for yielding, value in stiffest.items() if value < math.inf)
-    least = ", ".join(f"{plane} {bound.s[0]:.3g}" for (plane, kind), bound in found.items() if kind == "both")
+    least = ", ".join(f"{v.s[0]:.3g} (plane {plane})" for (plane, kind), v in found.items() if kind == "both")
     return (
         f"delta <= {model.load_range[1]:g} dR, perfect plasticity, nu of either body = {b.nu[0]:.3g} to {b.nu[1]:.3g}, "
         f"{_RATIO} from {_stiffness(b.alpha[0]):.3g} to a rigid pin{f' ({pins})' if pins else ''}, dR/R = "
-        f"{b.clearance[0]:.2g} to {b.clearance[1]:.2g}, sigY R/(E* dR) from (plane) {least}, {SOFT_WORDS} at most {SOFT:g}"
+        f"{b.clearance[0]:.2g} to {b.clearance[1]:.2g}, sigY R/(E* dR) from {least}; {SOFT_WORDS} at most {SOFT:g}"
     )
 
 
@@ -229,7 +229,7 @@ def quality_in_words() -> str:
         if found:
             said.append(f"plane {kind[0]}, {_WORDS[kind[1]]} {found['rms']:.1%} (largest {abs(found['largest']):.0%})")
     return (
-        f"Cross-validated rms of P over 0.5 to 2 dR: {'; '.join(said)}. At smaller displacements the contact is Hertz's, "
-        "which the law's shape is not; nor has the pressure a plateau beyond yield in plane strain. p0 is an estimate: "
-        "k and c are fitted to P. Without a yield stress, or where the joint yields beyond 2 dR, the law is elastic."
+        f"Cross-validated rms of P over 0.5 to 2 dR: {'; '.join(said)}. At smaller displacements the contact is "
+        "Hertz's, which the law's shape is not; nor has the pressure a plateau beyond yield in plane strain. p0 is an "
+        "estimate: k and c are fitted to P. Without a yield stress, or yielding beyond 2 dR, the law is elastic."
     )

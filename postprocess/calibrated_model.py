@@ -186,8 +186,7 @@ class CalibratedModel:
         """The model in ``text``, written by `to_json`. Raises `SceneError`."""
         try:
             data = json.loads(text)
-            form = Form(**{name: value if isinstance(value, str) else tuple(value)
-                           for name, value in data["form"].items()})  # fmt: skip
+            form = Form(**_tuples(data["form"]))
             plastic = tuple(Plastic(**_tuples(part)) for part in data["plastic"])
             bounds = tuple(Bounds(**_tuples(part)) for part in data["bounds"])
             low, high = data["load_range"]

@@ -150,9 +150,9 @@ def _c_over(
     for i, value in enumerate(values):
         same = [c for c in _like(cases) if math.isclose(getattr(c, by), value, rel_tol=0.02)]
         _draw(axis, same, lambda c: (getattr(c, over), c.c), f"C{i}")
-        for plane in _PLANES if model else ():
-            bounds = model.bounds_of((plane, "both"))
-            if bounds is None:
+        for plane in _PLANES:
+            bounds = model.bounds_of((plane, "both")) if model else None
+            if model is None or bounds is None:
                 continue
             low, high = max(0.1, bounds.s[0]), 1.2
             s = np.geomspace(low, high, 50)

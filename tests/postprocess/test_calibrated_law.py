@@ -91,7 +91,7 @@ def test_held_out_cases_are_met_as_well_as_foretold():
 
 
 def test_joints_of_another_study_are_met():
-    """The 98 joints of the finding, on another mesh, none of them fitted: P hardly worse than with their own k, c."""
+    """Those of the finding, solved apart and on another mesh: P hardly worse than with each joint's own k and c."""
     found = judged(read_rows())
     assert sum(number for _, _, number, *_ in found) > 80
     for plane, kind, _, rms, _, own in found:

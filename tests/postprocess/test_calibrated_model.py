@@ -26,10 +26,12 @@ COMPLIANCE = (1.1, 1.3, -0.6, 0.7)
 RATE, LATE, THRESHOLD = 3.0, (-0.5, -0.4), (0.2, -0.3, -0.1)
 
 
-def case(plane, yielding, ratio, pin_nu, nu, s, clearance, k=1.0, c=math.nan, run=""):
+def case(plane, yielding, ratio, pin_nu, nu, s, clearance, k=1.0, c=math.nan):
     """A case whose curve is the law itself."""
-    found = FittedCase(run or f"{plane}{yielding}{ratio:.4g}{pin_nu:.4g}{nu:.4g}{s:.4g}{clearance:.4g}", plane, yielding,
-                       ratio, pin_nu, nu, clearance, s * clearance, 0.05, k, 0.0, math.nan, c, 0.0, math.nan, c, 0.0, 0.0, LOAD, LOAD)  # fmt: skip
+    name = f"{plane}{yielding}{ratio:.4g}{pin_nu:.4g}{nu:.4g}{s:.4g}{clearance:.4g}"
+    numbers = (ratio, pin_nu, nu, clearance, s * clearance, 0.05)
+    fitted = (k, 0.0, math.nan, c, 0.0, math.nan, c, 0.0, 0.0)
+    found = FittedCase(name, plane, yielding, *numbers, *fitted, LOAD, LOAD)
     return replace(found, P=plastic_force(found.joint(k, c), LOAD * clearance) / clearance)
 
 
@@ -96,10 +98,9 @@ def test_cross_validation_detects_a_useless_model():
 def test_cases_held_out_are_held_out():
     """They leave no trace in the coefficients, and do not depend on order."""
     cases = synthetic(60, noise=0.01)
-    used, held = split(cases)
-    again = split(cases[::-1])
-    assert {c.run for c in again[1]} == {c.run for c in held}
-    spoiled = [replace(c, k=5 * c.k) if c in held else c for c in cases]
+    held, again = ({c.run for c in split(some)[1]} for some in (cases, cases[::-1]))
+    assert again == held
+    spoiled = [replace(c, k=5 * c.k) if c.run in held else c for c in cases]
     one, other = study(cases, form=SMALL), study(spoiled, form=SMALL)
     assert one.model.elastic == other.model.elastic
     assert one.model.plastic == other.model.plastic

@@ -44,7 +44,7 @@ def solved(tmp_path_factory) -> Path:
 
 
 def test_a_small_sweep_gets_its_table(solved, capsys):
-    """k of every case is that of archord fit RUN; the coarse mesh and the hardening joint are named, no model is made."""
+    """k of every case is that of archord fit RUN; the coarse mesh and the hardening joint are named."""
     assert run(["fit", str(solved)]) == 0
     printed = capsys.readouterr().out
     cases = read_sweep(solved / "sweep.toml").distinct
