@@ -80,9 +80,8 @@ _ALL = [
     Law(
         "calibrated",
         "plastic-Winkler law with k and c of archord's simulations",
-        "as paper-plastic with k, and c sigY in place of sigY; 1/k_e = p, q, pm, qn and more, ln(k/k_e) = A exp(-b s), "
-        "ln c = C: polynomials of Dundurs' alpha, Poisson's ratios and s = sigY R/(E* dR), by plane and yielding body "
-        "(docs/calibration.md)",
+        "as paper-plastic with k, and c sigY in place of sigY; 1/k_e, A and ln c = polynomials of Dundurs' alpha, "
+        "Poisson's ratios and ln s, ln(k/k_e) = A exp(-b s/k_e), s = sigY R/(E* dR), by plane and yielding body",
         calibrated_law.range_in_words(),
         "ours: fitted by archord fit to the cases of scenes/calibration.sweep.toml",
         calibrated_law.quality_in_words(),
