@@ -130,3 +130,18 @@ def test_the_reader_of_the_progress_may_leave(tmp_path):
     process.stdout.close()
     process.wait(60)
     assert len(done(tmp_path / "out")) == len(read_sweep(file).distinct) == 4
+
+
+def test_the_job_script_calls_what_exists(tmp_path):
+    """Without SLURM it is one part of one; within an array, it is the task's part."""
+    root = Path(__file__).parents[2]
+    script, file = root / "docs" / "cluster" / "sweep.sbatch", written(tmp_path, TEXT)
+    command = ["bash", str(script), file, "-o", str(tmp_path / "out")]
+    plain = subprocess.run([*command, "--dry-run"], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    assert plain.returncode == 0, plain.stderr
+    assert plain.stdout.startswith("12 cases; ")
+    task = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_COUNT": "12", "TMPDIR": str(tmp_path)}
+    part = subprocess.run([*command, "-q"], cwd=tmp_path, env=task, capture_output=True, text=True)
+    assert part.returncode == 0, part.stderr
+    assert len(done(tmp_path / "out")) == 1
+    assert not list(tmp_path.glob("archord.*"))  # its scratch is gone
