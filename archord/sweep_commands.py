@@ -43,6 +43,7 @@ def sweep(
     from archord.solver.scene import SceneError
     from archord.sweep.cases import read_sweep
     from archord.sweep.run import FILE, Share, check_ranks, claim, default_folder, gather, open_jobs
+    from archord.sweep_progress import SweepProgress, say
 
     comm = MPI.COMM_WORLD
     share = Share.parse(array)
@@ -54,7 +55,7 @@ def sweep(
     def prepared():
         design = read_sweep(source, overrides or [])
         if show:
-            print(_announced(design), flush=True)
+            say(_announced(design))
         if dry_run:
             return design, ([], [])
         if gather_only and not (folder / FILE).exists():
@@ -72,22 +73,23 @@ def sweep(
     received, results = 0, []
     if comm.bcast(bool(jobs)):
         from archord.sweep.farm import Farm  # imports PETSc, on all ranks together
-        from archord.sweep_progress import SweepProgress
 
         farm = Farm(comm, ranks_per_case)
         with SweepProgress(jobs, ended, farm.workers, begun, silent=not show) as progress:
             received = farm.run(jobs, progress.ended, progress.running)
         results = progress.results
         if show:
-            print(progress.meshes)
-    failed = 0
-    if comm.rank == 0:
+            say(progress.meshes)
+
+    def concluded() -> int:
         tables = gather(design, folder, results)
         mine = {case.run for case in share.of(design.distinct)}
-        failed = _report(tables.results, design, folder, mine, quiet=quiet, seconds=perf_counter() - begun)
+        return _report(tables.results, design, folder, mine, quiet=quiet, seconds=perf_counter() - begun)
+
+    failed = agreed(comm, concluded)
     if received:
         return 128 + received
-    return comm.bcast(3 if failed else 0)
+    return 3 if failed else 0
 
 
 def _announced(design) -> str:
@@ -129,6 +131,8 @@ def _print_cases(design) -> None:
 
 def _report(results, design, folder: Path, mine: set[str], *, quiet: bool, seconds: float) -> int:
     """Say how the distinct cases ended; returns how many of this share, ``mine``, failed."""
+    from archord.sweep_progress import say
+
     number = {case.run: case.number for case in design.distinct}
     failed = [r for r in results if r.run in mine and r.status in ("stopped", "failed")]
     for result in failed:
@@ -137,5 +141,5 @@ def _report(results, design, folder: Path, mine: set[str], *, quiet: bool, secon
     if not quiet:
         counts = Counter(result.status for result in results)
         told = ", ".join(f"{n} {status}" for status in STATUS if (n := counts[status]))
-        print(f"{told} in {seconds:.1f} s, tables in {folder}")
+        say(f"{told} in {seconds:.1f} s, tables in {folder}")
     return len(failed)

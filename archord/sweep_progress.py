@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from contextlib import nullcontext
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -11,6 +13,14 @@ from archord.ranks import on_terminal
 if TYPE_CHECKING:
     from archord.sweep.case_run import Result
     from archord.sweep.farm import Job
+
+
+def say(text: str) -> None:
+    """Print a line; if nobody reads any more, that is no reason to stop, nor to leave other ranks waiting."""
+    try:
+        print(text, flush=True)
+    except OSError:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
 
 
 class SweepProgress:
@@ -34,7 +44,7 @@ class SweepProgress:
         if silent:
             return
         if ended:
-            print(f"{len(ended)} of {self._total} cases are there already", flush=True)
+            say(f"{len(ended)} of {self._total} cases are there already")
         if on_terminal():
             from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -74,10 +84,7 @@ class SweepProgress:
             self._bar.update(self._task, advance=1, description=self._counts())
         elif result.message != "not begun":
             word = f"{result.status}, {result.steps} steps in {result.seconds:.1f} s"
-            try:
-                print(f"{perf_counter() - self.begun:7.1f} s  {result.run} {word}; {self._counts()}", flush=True)
-            except OSError:  # nobody reads any more: no reason to stop
-                self.silent = True
+            say(f"{perf_counter() - self.begun:7.1f} s  {result.run} {word}; {self._counts()}")
 
     def _counts(self) -> str:
         """Done, running, failed, and the time left."""

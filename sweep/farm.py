@@ -11,8 +11,9 @@ import gc
 import signal
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -111,16 +112,20 @@ class Farm:
                 report(result)
                 running(sum(future.running() for future in handed))
 
-        def ended(future: Future) -> None:
+        def ended(job: Job, future: Future) -> None:
             if not future.cancelled():
-                finish(future.result())
+                error = future.exception()
+                finish(Result(job.folder.name, "failed", f"{error}") if error else future.result())
 
         for job in jobs:
             handed.append(executor.submit(_solve_there, job))
-            handed[-1].add_done_callback(ended)
+            handed[-1].add_done_callback(partial(ended, job))
+        threads = MPI.Query_thread() == MPI.THREAD_MULTIPLE
         for job, future in zip(jobs, handed, strict=True):
             if interrupted.is_set() or _here.interrupt.received:
                 future.cancel()
+            elif not threads:
+                wait([future])  # the manager's thread must be the only one that calls MPI
             elif future.cancel():
                 running(1 + sum(f.running() for f in handed))
                 finish(_here.solve(job))

@@ -51,7 +51,7 @@ def test_a_killed_sweep_goes_on_where_it_was(whole, tmp_path):
     """kill -9 at random moments: what is done stays as it is, and the end is that of the sweep in one go."""
     chance, out, file = random.Random(3), tmp_path / "out", written(tmp_path, TEXT)
     continued = 0
-    for cases in (1, 2, 3):
+    for cases in (1, 3):
         finished, before = done(out), times(out)
         process = started(file, out)
         until_cases_are_done(process, cases)
@@ -129,4 +129,21 @@ def test_the_reader_of_the_progress_may_leave(tmp_path):
     process.stdout.readline()
     process.stdout.close()
     process.wait(60)
+    assert process.returncode == 0
     assert len(done(tmp_path / "out")) == len(read_sweep(file).distinct) == 4
+    assert {row["status"] for row in table(tmp_path / "out" / "cases.csv")} == {"done"}
+
+
+def test_the_job_script_calls_what_exists(tmp_path):
+    """Without SLURM it is one part of one; within an array, it is the task's part."""
+    root = Path(__file__).parents[2]
+    script, file = root / "docs" / "cluster" / "sweep.sbatch", written(tmp_path, TEXT)
+    command = ["bash", str(script), file, "-o", str(tmp_path / "out")]
+    plain = subprocess.run([*command, "--dry-run"], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    assert plain.returncode == 0, plain.stderr
+    assert plain.stdout.startswith("12 cases; ")
+    task = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_COUNT": "12", "TMPDIR": str(tmp_path)}
+    part = subprocess.run([*command, "-q"], cwd=tmp_path, env=task, capture_output=True, text=True)
+    assert part.returncode == 0, part.stderr
+    assert len(done(tmp_path / "out")) == 1
+    assert not list(tmp_path.glob("archord.*"))  # its scratch is gone
