@@ -6,7 +6,7 @@ Everything that is concluded here is concluded from measured costs; `extrapolate
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +49,13 @@ class Costs:
 
     @property
     def finished(self) -> list[Cost]:
-        """Runs without a fault."""
-        return [cost for cost in self.all if not cost.fault]
+        """Runs without a fault, and with a coarse start."""
+        return [cost for cost in self.all if not cost.fault and cost.case.guided]
+
+    def unguided(self) -> list[tuple[Cost, Cost]]:
+        """Pairs of runs of one case: with a coarse start, and without."""
+        alone = [c for c in self.all if not c.fault and not c.case.guided]
+        return [(c, a) for a in alone for c in self.finished if replace(a.case, guided=True) == c.case]
 
     def series(self, ranks: int, *, plastic: bool = False) -> list[Cost]:
         """Finished runs on ``ranks`` ranks by size, without those of the weak series alone."""

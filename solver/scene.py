@@ -235,6 +235,10 @@ class Analysis(_Section):
         le=1e6,
     )
     degree: Literal[2, 3] = _key("polynomial degree of displacements and of the curved geometry", default=2)
+    coarse_start: bool = _key(
+        "take the guess for every step from a coarser mesh, where the mesh is fine; false is for comparison",
+        default=True,
+    )
     tolerance: float = _key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
     max_iterations: int = _key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
 
