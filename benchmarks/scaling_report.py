@@ -90,7 +90,8 @@ def _cost(series: list[Cost]) -> list[str]:
             ]
         )
     headings = ("dofs N", "iterations", "on coarser meshes", "factorisations", "seconds", "linear solve [s]",
-                "per factorisation [s]", "mesh and setup [s]", "contact", "peak memory [MB]", "power of N since the line before")  # fmt: skip
+                "per factorisation [s]", "mesh and setup [s]", "contact", "peak memory [MB]",
+                "power of N since the line before")  # fmt: skip
     lines = _table(headings, rows)
     if len(series) > 1:
         n = [c.dofs for c in series]
