@@ -22,6 +22,7 @@ from archord.fit_commands import fit
 from archord.plain_typer import typer
 from archord.ranks import launcher_rank, run_on_ranks
 from archord.reproduce_commands import reproduce
+from archord.sweep_commands import sweep
 
 app = typer.Typer(
     name="archord",
@@ -154,6 +155,7 @@ def picture(
 
 app.command()(fit)
 app.command()(reproduce)
+app.command()(sweep)
 app.command("export-deck")(export_deck)
 app.add_typer(benchmark, name="benchmark")
 

@@ -9,6 +9,8 @@ import numpy as np
 from dolfinx.mesh import GhostMode, Mesh, MeshTags, create_cell_partitioner
 from mpi4py import MPI
 
+from archord.geometry.mesh_cache import MESHES, Answers
+
 try:
     from dolfinx.io.gmsh import model_to_mesh  # dolfinx >= 0.10
 except ImportError:
@@ -30,15 +32,18 @@ def gmsh_to_mesh(
     scale: float = 1.0,
     refinements: int = 0,
     partitioner=None,
+    key: tuple = (),
 ) -> tuple[Mesh, MeshTags, MeshTags]:
     """Mesh what ``build(gmsh)`` describes, in triangles of the given ``order``, and distribute it over ``comm``.
 
     The triangles are cut in four ``refinements`` times before they are curved.
     ``adjust(x, tag)`` may move the nodes ``x`` ``(n, 3)`` of the physical curve ``tag``; the mesh is scaled by
     ``scale`` at the end. An error on rank 0 is raised on every rank. Returns mesh, cell tags and facet tags.
+    ``key`` says all that enters ``build`` and ``adjust``; a mesh that `MESHES` keeps by the same key is used again.
     """
     model, failure = None, None
-    if comm.rank == 0:
+    known = MESHES.find((*key, order, refinements)) if comm.rank == 0 and key else None
+    if comm.rank == 0 and known is None:
         try:
             import gmsh
 
@@ -65,10 +70,14 @@ def gmsh_to_mesh(
         raise RuntimeError(failure)
     if partitioner is None:
         partitioner = create_cell_partitioner(GhostMode.none)
-    result = model_to_mesh(model, comm, 0, gdim=2, partitioner=partitioner)
+    asked = model if model is None or not (key and MESHES.capacity) else Answers(model)
+    asked = known if known is not None else asked
+    result = model_to_mesh(asked, comm, 0, gdim=2, partitioner=partitioner)
     mesh, cells, facets = tuple(result)[:3]
-    if comm.rank == 0:
+    if model is not None:
         gmsh.finalize()
+        if isinstance(asked, Answers):
+            MESHES.keep((*key, order, refinements), asked)
     mesh.geometry.x[:] *= scale
     return mesh, cells, facets
 

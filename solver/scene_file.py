@@ -31,15 +31,15 @@ def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) ->
 
     Raises `SceneError` with one sentence per fault: file, key, value, and what is allowed.
     """
-    data = _read(path)
+    data = read_toml(path)
     origin = {}
     for override in overrides:
-        origin[_override(data, override)] = f"--set {override}"
-    _read_targets(data, Path(path))
+        origin[override_key(data, override)] = f"--set {override}"
+    read_targets(data, Path(path))
     return parse_scene(data, str(path), origin)
 
 
-def _read_targets(data: dict[str, Any], scene: Path) -> None:
+def read_targets(data: dict[str, Any], scene: Path) -> None:
     """Put the targets of the file ``load.path``, beside the file ``scene``, into ``data``; each is one step by default.
 
     Raises `SceneError`.
@@ -67,7 +67,7 @@ def _read_targets(data: dict[str, Any], scene: Path) -> None:
     load.setdefault("steps", 1)
 
 
-def _read(path: str | Path) -> dict[str, Any]:
+def read_toml(path: str | Path) -> dict[str, Any]:
     """What the TOML file ``path`` holds. Raises `SceneError`."""
     try:
         with Path(path).open("rb") as file:
@@ -133,7 +133,7 @@ def _key_shown(part: str) -> str:
     )
 
 
-def _override(data: dict[str, Any], override: str) -> str:
+def override_key(data: dict[str, Any], override: str) -> str:
     """Set one ``a.b=value`` in ``data`` (value: TOML, a number, else text; nothing: drop it); returns the dotted
     key."""
     key, sign, text = override.partition("=")
@@ -143,21 +143,28 @@ def _override(data: dict[str, Any], override: str) -> str:
     section, dot, name = key.partition(".")
     if not (sign and dot and section and name and "." not in name):
         raise SceneError(f"--set {override}: must read section.key=value, like joint.clearance=0.01.")
+    put(data, section, name, _value(text.strip()) if text.strip() else None, f"--set {override}")
+    return key
+
+
+def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) -> None:
+    """Set a key of scene ``data``, or drop it if ``value`` is None; what it is an alternative to goes, too.
+
+    Raises `SceneError`, beginning with ``said``, if there can be no such section.
+    """
     table = data.setdefault(section, {})
     if not isinstance(table, dict):
-        raise SceneError(f"--set {override}: {section} is not a section of the scene.")
+        raise SceneError(f"{said}: {section} is not a section of the scene.")
     for pair in ALTERNATIVES.get(section, []):
         if name in pair:
             for other in pair:
                 table.pop(other, None)
-    if not text.strip():
+    if value is None:
         table.pop(name, None)
-        return key
-    value = _value(text.strip())
-    if key == "pin.rigid" and value is True:
+        return
+    if (section, name, value) == ("pin", "rigid", True):
         table.clear()
     table[name] = value
-    return key
 
 
 def _value(text: str) -> Any:

@@ -1,0 +1,1 @@
+"""Designs of many cases, solved side by side into one table."""

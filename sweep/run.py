@@ -1,0 +1,106 @@
+"""A sweep solved into its folder: sweep.toml, cases/, and the tables."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from archord.solver.disk import replace_text
+from archord.solver.scene import SceneError
+from archord.sweep import tables
+from archord.sweep.case_run import Result, standing
+from archord.sweep.cases import Case, Sweep
+from archord.sweep.cost import expected_seconds
+from archord.sweep.sweep_file import SweepFile
+from archord.sweep.tables import CASES, Tables, of_case
+
+if TYPE_CHECKING:
+    from archord.sweep.farm import Job
+
+FILE = "sweep.toml"
+
+
+@dataclass(frozen=True)
+class Share:
+    """Part ``index`` of ``total`` of a sweep, for a job array."""
+
+    index: int = 1
+    total: int = 1
+
+    @classmethod
+    def parse(cls, text: str) -> Share:
+        """``"3/10"``. Raises `SceneError`."""
+        found = re.fullmatch(r"(\d+)/(\d+)", text)
+        if not found or not 1 <= int(found[1]) <= int(found[2]):
+            raise SceneError(f"--array {text}: must be I/N, with I from 1 to N.")
+        return cls(int(found[1]), int(found[2]))
+
+    def of(self, cases: list[Case]) -> list[Case]:
+        """Every ``total``-th of ``cases``, the longest first, so that all parts take about as long."""
+        longest = sorted(cases, key=lambda case: -expected_seconds(case.scene))
+        return longest[self.index - 1 :: self.total]
+
+
+def check_ranks(ranks: int, ranks_per_case: int) -> None:
+    """Raise `SceneError` if ``ranks`` are no whole number of groups."""
+    if ranks % ranks_per_case:
+        raise SceneError(f"--ranks-per-case {ranks_per_case}: must divide the number of ranks, {ranks}.")
+
+
+def default_folder(path: Path) -> Path:
+    """runs/NAME for NAME.sweep.toml or NAME.toml."""
+    return Path("runs") / path.stem.removesuffix(".sweep")
+
+
+def claim(sweep: Sweep, folder: Path) -> None:
+    """Make ``folder`` ready for the sweep, or go on in it, and write the resolved sweep file.
+
+    Raises `SceneError` if it cannot be, or holds something else.
+    """
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise SceneError(f"{folder}: is a file, not the folder of a sweep.")
+        if folder.exists() and any(folder.iterdir()) and not (folder / FILE).exists():
+            raise SceneError(f"{folder}: is not empty and holds no sweep; choose another folder with -o.")
+        (folder / CASES).mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise SceneError(f"{folder}: cannot be used for a sweep: Permission denied.")
+        with tables.alone(folder):
+            replace_text(folder / FILE, resolved(sweep.file))
+    except OSError as error:
+        raise SceneError(f"{folder}: cannot be used for a sweep: {error.strerror}.") from None
+
+
+def resolved(file: SweepFile) -> str:
+    """The sweep as TOML with its base scene in it; it gives the same cases."""
+    import tomli_w
+
+    return tomli_w.dumps(file.model_dump(by_alias=True, exclude_none=True, exclude_defaults=True))
+
+
+def open_jobs(sweep: Sweep, folder: Path, share: Share, *, retry: bool) -> tuple[list[Result], list[Job]]:
+    """What of this ``share`` has ended already, and the jobs that are left; with ``retry`` also those that failed."""
+    from archord.sweep.farm import Job
+
+    ended, jobs = [], []
+    for case in share.of(sweep.distinct):
+        run = of_case(case, folder)
+        result = standing(run)
+        if result.status == "done" or (result.ended and not retry):
+            ended.append(result)
+        else:
+            rest = 1 - result.steps / max(1, len(case.scene.targets))
+            jobs.append(Job(case.scene, run, expected_seconds(case.scene) * max(rest, 0.05)))
+    return ended, jobs
+
+
+def gather(sweep: Sweep, folder: Path, results: list[Result]) -> Tables:
+    """Write the tables of what is there, with the ``results`` of this process. Raises `SceneError` if they cannot be
+    written."""
+    try:
+        return tables.write(sweep, folder, {r.run: r for r in results if r.status in ("failed", "busy")})
+    except OSError as error:
+        raise SceneError(f"{error.filename} cannot be written: {error.strerror}.") from None

@@ -1,0 +1,164 @@
+"""Cases on any number of ranks: each is solved once, all ranks take part, and the numbers are those of one rank."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from archord.geometry.mesh_cache import MESHES
+from archord.solver.history import read_history
+from archord.solver.ranks import agreed
+from archord.solver.run import solve_scene
+from archord.solver.run_folder import claim_folder
+from archord.sweep import case_run
+from archord.sweep.case_run import report_of, solve_case, standing
+from archord.sweep.cases import read_sweep
+from archord.sweep.farm import Farm, Job
+from tests.sweep.parts import SOFT, written
+
+CLOCK = {"seconds", "force_balance"}
+
+
+def jobs_of(comm, folder: Path, text: str = SOFT) -> tuple[Path, list[Job]]:
+    """Jobs in a folder that all ranks share; the longer ones are the later ones."""
+    folder = comm.bcast(folder)
+
+    def made() -> list[Job]:
+        cases = read_sweep(written(folder, text)).cases
+        return [Job(case.scene, folder / case.run, float(case.number)) for case in cases]
+
+    return folder, agreed(comm, made)
+
+
+@pytest.mark.mpi
+def test_each_job_is_solved_once_by_somebody(comm, tmp_path):
+    """Results come to rank 0 alone, longest first; each history is that of a solve by itself on one rank."""
+    folder, jobs = jobs_of(comm, tmp_path)
+    results, running = [], []
+    assert Farm(comm).run(jobs, results.append, running.append) == 0
+    if comm.rank:
+        assert results == running == []
+        return
+    assert sorted(result.run for result in results) == sorted(job.folder.name for job in jobs)
+    assert {result.status for result in results} == {"done"}
+    assert results[-1].run != jobs[-1].folder.name  # the longest does not end last
+    assert sum(result.meshes for result in results) <= comm.size
+    assert sum(result.meshes + result.reused for result in results) == len(jobs)
+    for job in jobs:
+        assert report_of(job.folder)["ranks"] == 1
+    from mpi4py import MPI
+
+    alone = folder / "alone"
+    claim_folder(alone, force=True)
+    solve_scene(jobs[0].scene, alone, MPI.COMM_SELF)
+    a, b = (read_history(place / "history.csv") for place in (alone, jobs[0].folder))
+    assert {name: a[name] for name in a if name not in CLOCK} == {name: b[name] for name in b if name not in CLOCK}
+
+
+@pytest.mark.mpi
+def test_a_group_solves_what_one_rank_does(comm, tmp_path):
+    """All ranks on each case: the same numbers to round-off."""
+    folder, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 1.82]\n")
+    results = []
+    assert Farm(comm, comm.size).run(jobs, results.append) == 0
+    if comm.rank == 0:
+        from mpi4py import MPI
+
+        assert [result.status for result in results] == ["done", "done"]
+        for job in jobs:
+            assert report_of(job.folder)["ranks"] == comm.size
+        alone = folder / "alone"
+        claim_folder(alone, force=True)
+        solve_scene(jobs[1].scene, alone, MPI.COMM_SELF)
+        a, b = (read_history(place / "history.csv") for place in (alone, jobs[1].folder))
+        for name in set(a) - CLOCK:
+            assert a[name] == pytest.approx(b[name], rel=1e-9), name
+
+
+@pytest.mark.mpi
+def test_a_signal_ends_the_batch_on_all_ranks(comm, tmp_path):
+    """Whoever gets it: no case begins after it, and what is there is continued by the next call."""
+    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 0.6, 0.7, 0.8, 1.0, 1.82]\n")
+    results = []
+
+    def ended(result) -> None:
+        if not results:
+            os.kill(os.getpid(), signal.SIGTERM)
+        results.append(result)
+
+    before = signal.getsignal(signal.SIGTERM)
+    assert Farm(comm).run(jobs, ended) == signal.SIGTERM
+    assert signal.getsignal(signal.SIGTERM) == before
+    if comm.rank == 0:
+        assert "interrupted" in {result.status for result in results} or len(results) < len(jobs)
+        assert any(standing(job.folder).status != "done" for job in jobs)
+    rest = agreed(comm, lambda: [job for job in jobs if standing(job.folder).status != "done"])
+    assert Farm(comm).run(rest, lambda result: None) == 0
+    if comm.rank == 0:
+        assert {standing(job.folder).status for job in jobs} == {"done"}
+
+
+@pytest.mark.mpi
+def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
+    """Whichever rank has them."""
+    from archord.solver.joint import Joint
+
+    true_mesh = Joint._mesh
+
+    def broken(self, partitioner):
+        if self.scene.pin.E < 0.75:
+            raise ValueError("broken")
+        return true_mesh(self, partitioner)
+
+    monkeypatch.setattr(Joint, "_mesh", broken)
+    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 0.6, 0.7, 0.8, 1.0, 1.82]\n")
+    results = []
+    assert Farm(comm).run(jobs, results.append) == 0
+    if comm.rank == 0:
+        by_run = {result.run: result for result in results}
+        assert [by_run[job.folder.name].status for job in jobs] == 3 * ["failed"] + 3 * ["done"]
+        assert [standing(job.folder).message for job in jobs] == 3 * ["ValueError: broken"] + 3 * [""]
+
+
+@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")
+def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(comm, tmp_path, monkeypatch):
+    """ffcx waits for a file that nobody will write; only an old one is removed, as a new one is somebody's work."""
+    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5]\n")
+    half = tmp_path / "libffcx_forms_0.c"
+    half.touch()
+    complaint = (
+        "JIT compilation timed out, probably due to a failed previous compile. "
+        f"Try cleaning cache (e.g. remove {half}) or increase timeout option."
+    )
+    from archord.solver import run
+
+    true_solve, calls = run.solve_scene, []
+
+    def solve(*arguments, **named):
+        calls.append(half.exists())
+        if half.exists():
+            raise TimeoutError(complaint)
+        return true_solve(*arguments, **named)
+
+    monkeypatch.setattr(run, "solve_scene", solve)
+    assert solve_case(jobs[0].scene, jobs[0].folder, comm).status == "failed"
+    assert calls == [True, True, True]
+    os.utime(half, (1, 1))
+    calls.clear()
+    assert solve_case(jobs[0].scene, jobs[0].folder, comm).status == "done"
+    assert calls == [True, False]
+    assert not (jobs[0].folder / case_run.FAILURE).exists()
+
+
+@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")
+def test_a_farm_keeps_meshes_only_while_it_works(comm, tmp_path):
+    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 1.0]\n")
+    results = []
+    Farm(comm).run(jobs, results.append)
+    assert [(result.meshes, result.reused) for result in results] == [(1, 0), (0, 1)]
+    results.clear()
+    jobs = [Job(job.scene, job.folder.with_name(job.folder.name + "x"), job.cost) for job in jobs[:1]]
+    Farm(comm).run(jobs, results.append)
+    assert (results[0].meshes, results[0].reused) == (1, 0)
+    assert MESHES.capacity == 0
