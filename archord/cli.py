@@ -22,6 +22,7 @@ from archord.fit_commands import fit
 from archord.plain_typer import typer
 from archord.ranks import launcher_rank, run_on_ranks
 from archord.reproduce_commands import reproduce
+from archord.result_commands import compare, show
 
 app = typer.Typer(
     name="archord",
@@ -152,6 +153,8 @@ def picture(
     return 0
 
 
+app.command()(show)
+app.command()(compare)
 app.command()(fit)
 app.command()(reproduce)
 app.command("export-deck")(export_deck)

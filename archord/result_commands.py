@@ -1,0 +1,127 @@
+"""``archord show``, ``compare`` and ``export``: what runs and sweeps hold, in tables, pictures and other formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from archord.plain_typer import typer
+
+if TYPE_CHECKING:
+    from archord.postprocess.run_result import Run
+    from archord.postprocess.sweep_result import Sweep
+
+
+def show(
+    folder: Annotated[Path, typer.Argument(metavar="RUN|SWEEP", help="folder of a run or of a sweep")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for the pictures [the run's]")
+    ] = None,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="draw pictures, too")] = True,
+) -> int:
+    """Print a run's joint, state, history, peaks, cost and warnings, or a sweep's cases; and draw them.
+
+    The pictures of a run are force.png, pressure.png, field.png and iterations.png.
+    """
+    from archord.postprocess.sweep_result import Sweep, is_sweep
+
+    if is_sweep(folder):
+        return _show_sweep(Sweep(folder), output if pictures else None, pictures)
+    from archord.postprocess.run_result import Run
+
+    return _show_run(Run(folder), output or folder, pictures)
+
+
+def _make(folder: Path) -> None:
+    """Make ``folder`` unless it is there. Raises `SceneError`."""
+    from archord.solver.scene import SceneError
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SceneError(f"{folder}: cannot be made: {error.strerror or error}.") from None
+
+
+def _show_run(run: Run, target: Path, pictures: bool) -> int:
+    from archord.postprocess import run_tables
+
+    files, left_out = [], ["no picture: no step was accepted."]
+    if pictures and run.steps:
+        from archord.postprocess.run_pictures import draw_run
+
+        _make(target)
+        files, left_out = draw_run(run, target)
+    console = wide_console()
+    print(run_tables.state_line(run))
+    print()
+    print(run_tables.paragraph(run_tables.joint_lines(run)))
+    if run.steps:
+        print()
+        console.print(run_tables.history_table(run), markup=False)
+        if run.steps > run_tables.MOST_ROWS:
+            print(f"{run_tables.MOST_ROWS} of {run.steps} steps; {run.folder / 'history.csv'} has all of them")
+        print()
+        print(run_tables.paragraph(run_tables.peak_lines(run)))
+    print()
+    print(run_tables.paragraph(run_tables.cost_lines(run)))
+    if pictures:
+        print()
+        for sentence in left_out:
+            print(sentence)
+        for file in files:
+            print(file)
+    return 0
+
+
+def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
+    raise NotImplementedError
+
+
+def wide_console() -> Any:
+    """A console as wide as the terminal, or wide enough for whole rows where nobody watches."""
+    from rich.console import Console
+
+    from archord.ranks import on_terminal
+
+    watched = on_terminal()
+    return Console(highlight=False, width=None if watched else 200, force_terminal=watched)
+
+
+def compare(
+    folders: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="run folders; the first is the measure")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="picture to draw")
+    ] = Path("comparison.png"),
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="draw the picture, too")] = True,
+) -> int:
+    """Compare runs with the first: P, p0 and eps at common displacements, scenes, cost; and draw them.
+
+    Where R, dR or E* differ, they are compared in dimensionless form, too.
+    """
+    from archord.postprocess import comparison_tables as tables
+    from archord.postprocess.comparison import compare_runs
+    from archord.postprocess.run_result import Run
+
+    comparison = compare_runs([Run(folder) for folder in folders])
+    if pictures:
+        from archord.postprocess.comparison_picture import draw_comparison
+
+        draw_comparison(comparison.runs, comparison.names, output, absolute=bool(comparison.absolute),
+                        dimensionless=bool(comparison.dimensionless))  # fmt: skip
+    console = wide_console()
+    for compared in comparison.compared:
+        console.print(tables.quantity_table(compared, comparison.names), markup=False)
+        print()
+    for note in tables.notes(comparison):
+        print(note)
+    print()
+    scenes = tables.scene_table(comparison)
+    if scenes is None:
+        print("scenes: the same in every key")
+    else:
+        console.print(scenes, markup=False)
+    print()
+    console.print(tables.run_table(comparison), markup=False)
+    if pictures:
+        print(f"\n{output}")
+    return 0
