@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from archord.plain_typer import typer
 
+_WIDE = 10_000  # characters
+
 if TYPE_CHECKING:
     from archord.postprocess.run_result import Run
     from archord.postprocess.sweep_result import Sweep
@@ -26,7 +28,7 @@ def show(
     from archord.postprocess.sweep_result import Sweep, is_sweep
 
     if is_sweep(folder):
-        return _show_sweep(Sweep(folder), output if pictures else None, pictures)
+        return _show_sweep(Sweep(folder), output or folder, pictures)
     from archord.postprocess.run_result import Run
 
     return _show_run(Run(folder), output or folder, pictures)
@@ -74,17 +76,37 @@ def _show_run(run: Run, target: Path, pictures: bool) -> int:
 
 
 def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
-    raise NotImplementedError
+    from archord.postprocess import sweep_tables
+
+    files, left_out = [], "no picture: no case has an accepted step."
+    if pictures and sweep.runs():
+        from archord.postprocess.sweep_picture import draw_sweep
+
+        _make(target)
+        file, left_out = draw_sweep(sweep, target / "sweep.png")
+        files = [file]
+    print(sweep_tables.state_line(sweep))
+    if constant := sweep_tables.constant_line(sweep):
+        print(constant)
+    print()
+    wide_console().print(sweep_tables.case_table(sweep, sweep_tables.winkler_coefficients(sweep)), markup=False)
+    if len(sweep) > sweep_tables.MOST_ROWS:
+        print(f"{sweep_tables.MOST_ROWS} of {len(sweep)} cases; {sweep.folder / 'cases.csv'} has all of them")
+    for message in sweep_tables.messages(sweep):
+        print(message)
+    if pictures:
+        print()
+        for line in (left_out, *files):
+            if line:
+                print(line)
+    return 0
 
 
 def wide_console() -> Any:
-    """A console as wide as the terminal, or wide enough for whole rows where nobody watches."""
+    """A console that leaves rows whole: on a narrow terminal long ones wrap, rather than lose digits."""
     from rich.console import Console
 
-    from archord.ranks import on_terminal
-
-    watched = on_terminal()
-    return Console(highlight=False, width=None if watched else 200, force_terminal=watched)
+    return Console(highlight=False, width=_WIDE)
 
 
 def compare(

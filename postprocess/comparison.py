@@ -1,8 +1,8 @@
 """Runs against the first of them: P, p0 and eps at common displacements, and what differs in their scenes.
 
-Runs that were led through the same displacements are compared step by step, unloading included. Of others the loading
-counts (the steps at which the pin is deeper than ever before), at those displacements of the first run that all
-reach; between their steps the others are interpolated by monotone cubics (Fritsch and Carlson 1980).
+Runs that were led through the same displacements are compared step by step, unloading included. Of others the first
+loading counts, the steps before the pin first goes back, at those displacements of the first run that all reach;
+between their steps the others are interpolated by monotone cubics (Fritsch and Carlson 1980).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -80,31 +80,48 @@ def compare_runs(runs: list[Run]) -> Comparison:
         raise SceneError("compare: needs two runs or more.")
     curves = [run.curve for run in runs]
     step_by_step = _alike([c.delta for c in curves], [c.dR for c in curves])
-    units = {(c.scene.units.length, c.scene.units.stress) for c in curves}
-    sizes = np.array([[c.R, c.dR, c.E_star] for c in curves])
-    absolute = [] if len(units) > 1 else _quantities(curves, False, step_by_step)
-    scaled = len(units) > 1 or not np.allclose(sizes, sizes[0], rtol=_SAME, atol=0)
-    dimensionless = _quantities(curves, True, step_by_step) if scaled else []
+    scenes = [run.scene for run in runs]
+    absolute = _quantities(curves, False, step_by_step) if same_units(scenes) else []
+    dimensionless = [] if same_size(scenes) else _quantities(curves, True, step_by_step)
     if not absolute and not dimensionless:
         raise SceneError(f"{runs[0].folder}: shares no range of displacements with the others.")
     return Comparison(runs, short_names([run.folder for run in runs]), step_by_step, absolute, dimensionless)
 
 
+def same_units(scenes: list[Scene]) -> bool:
+    """Whether all ``scenes`` have the same units."""
+    return len({(scene.units.length, scene.units.stress) for scene in scenes}) == 1
+
+
+def same_size(scenes: list[Scene]) -> bool:
+    """Whether all ``scenes`` have the same units, R, dR and E*."""
+    sizes = np.array([[scene.joint.radius, scene.joint.dR, scene.E_star] for scene in scenes])
+    return same_units(scenes) and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0)
+
+
+def first_loading(curve: RunCurve) -> RunCurve:
+    """The steps before the pin first goes back."""
+    back = np.flatnonzero(np.diff(curve.delta) <= 0)
+    n = int(back[0]) + 1 if len(back) else len(curve.delta)
+    cut = {name: getattr(curve, name)[:n] for name in ("delta", "P", "p0", "eps", "peeq_max")}
+    return replace(curve, **cut)
+
+
 def _alike(deltas: list[Array], gaps: list[float]) -> bool:
     """Whether all runs have the same displacements over the clearance."""
-    loads = [delta / gap for delta, gap in zip(deltas, gaps, strict=True)]
+    loads = [delta / abs(gap) for delta, gap in zip(deltas, gaps, strict=True)]
     return all(len(load) == len(loads[0]) and np.allclose(load, loads[0], rtol=_SAME, atol=_SAME) for load in loads)
 
 
 def _quantities(curves: list[RunCurve], dimensionless: bool, step_by_step: bool) -> list[Compared]:
     units, same_gap = curves[0].scene.units, np.ptp([c.dR for c in curves]) <= _SAME * abs(curves[0].dR)
     whole = step_by_step and (dimensionless or same_gap)
-    parts = curves if whole else [c.loading() for c in curves]
-    loads = [part.delta / (part.dR if dimensionless else 1.0) for part in parts]
+    parts = curves if whole else [first_loading(c) for c in curves]
+    loads = [part.delta / (abs(part.dR) if dimensionless else 1.0) for part in parts]
     load = loads[0] if whole else _common(loads)
     if not len(load):
         return []
-    found = []
+    found, gap = [], "dR" if min(c.dR for c in curves) > 0 else "|dR|"
     for name in QUANTITIES:
         values, between = [], []
         for part, x in zip(parts, loads, strict=True):
@@ -112,20 +129,22 @@ def _quantities(curves: list[RunCurve], dimensionless: bool, step_by_step: bool)
             value, interpolated = (y, np.zeros(len(y), dtype=bool)) if whole else _at(load, x, y)
             values.append(value)
             between.append(interpolated)
-        shown, unit = _title(name, dimensionless, units.force, units.stress)
-        load_name = "delta/dR" if dimensionless else f"delta [{units.length}]"
+        shown, unit = _title(name, gap if dimensionless else "", units.force, units.stress)
+        load_name = f"delta/{gap}" if dimensionless else f"delta [{units.length}]"
         found.append(Compared(shown, unit, load_name, load, np.array(values), np.array(between)))
     return found
 
 
 def _scale(curve: RunCurve, quantity: str) -> float:
     """What makes a quantity dimensionless."""
-    return {"P": curve.E_star * curve.dR, "p0": curve.E_star * curve.dR / curve.R, "eps": 1.0}[quantity]
+    force = curve.E_star * abs(curve.dR)
+    return {"P": force, "p0": force / curve.R, "eps": 1.0}[quantity]
 
 
-def _title(quantity: str, dimensionless: bool, force: str, stress: str) -> tuple[str, str]:
-    if dimensionless:
-        return {"P": "P/(E* dR)", "p0": "p0 R/(E* dR)", "eps": "eps"}[quantity], "rad" if quantity == "eps" else ""
+def _title(quantity: str, gap: str, force: str, stress: str) -> tuple[str, str]:
+    """Name and unit; over powers of E*, R and ``gap``, if that is given."""
+    if gap and quantity != "eps":
+        return {"P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})"}[quantity], ""
     return quantity, {"P": force, "p0": stress, "eps": "rad"}[quantity]
 
 

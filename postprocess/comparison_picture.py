@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from archord.geometry.basis import Array
+from archord.postprocess.comparison import first_loading
+from archord.postprocess.run_curve import RunCurve
 from archord.postprocess.run_pictures import new_figure, save
 from archord.postprocess.run_result import Run
 from archord.solver.output_file import check_output
@@ -16,14 +20,32 @@ from archord.solver.scene import SceneError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_FEW = 10  # runs that get a colour of their own and a name in the legend
+FEW = 10  # runs that get a colour of their own and a name in the legend
+
+
+@dataclass(frozen=True)
+class Shades:
+    """What the colours of many runs mean: a value for each of them."""
+
+    label: str
+    values: list[float]
 
 
 def draw_comparison(
-    runs: Sequence[Run], names: Sequence[str], target: Path, *, absolute: bool, dimensionless: bool
+    runs: Sequence[Run],
+    names: Sequence[str],
+    target: Path,
+    *,
+    absolute: bool,
+    dimensionless: bool,
+    shades: Shades | None = None,
 ) -> Path:
     """Draw ``runs`` with their ``names`` as ``target``, in the scene's units, in ``dimensionless`` form, or both below
-    each other; returns the file. Raises `SceneError` if it cannot be written or a run's contact cannot be read."""
+    each other; returns the file.
+
+    ``shades`` colour the runs, instead of a colour and a name for each. Raises `SceneError` if the file cannot be
+    written or a run's contact cannot be read.
+    """
     figure = new_figure(15, 4.6 * (absolute + dimensionless))
     formats = figure.canvas.get_supported_filetypes()
     if target.suffix[1:].lower() not in formats:
@@ -31,43 +53,71 @@ def draw_comparison(
     check_output(target)
     rows = figure.subplots(absolute + dimensionless, 3, squeeze=False)
     for scaled, axes in zip([False] * absolute + [True] * dimensionless, rows, strict=True):
-        _row(axes, runs, names, scaled)
+        _row(axes, runs, names, scaled, shades)
     return save(figure, target)
 
 
-def _row(axes: Sequence[Axes], runs: Sequence[Run], names: Sequence[str], scaled: bool) -> None:
+def _row(
+    axes: Sequence[Axes], runs: Sequence[Run], names: Sequence[str], scaled: bool, shades: Shades | None
+) -> None:
     force, pressure, angle = axes
-    units = runs[0].scene.units
+    units, many = runs[0].scene.units, shades is not None or len(runs) > FEW
+    colours = _colours(len(runs), shades)
     curves = [run.curve for run in runs]
-    last = min(float((c.delta / c.dR if scaled else c.delta).max()) for c in curves)
+    last = min(float(loads(first_loading(c), scaled).max()) for c in curves)
     for k, (run, curve, name) in enumerate(zip(runs, curves, names, strict=True)):
-        style = {"color": colour(k, len(runs)), "lw": 1.3, "ls": "-" if k == 0 or len(runs) > _FEW else "--"}
-        E, R, dR = curve.E_star, curve.R, curve.dR
-        load = curve.delta / (dR if scaled else 1.0)
-        force.plot([0, *load], [0, *(curve.P / (E * dR if scaled else 1.0))], ".", ls=style["ls"], ms=4, lw=1.3,
-                   color=style["color"], label=name)  # fmt: skip
-        angle.plot(load, np.degrees(curve.eps), label=name, **style)
-        step = int(np.abs(load - last).argmin()) + 1
-        arc = list(run.contact(step).values())[-1]
-        phi, p = arc.facet_means()
-        at = f"{name}, δ = {load[step - 1]:.4g}{' ΔR' if scaled else f' {units.length}'}"
-        pressure.plot(np.degrees(phi), p / (E * dR / R if scaled else 1.0), label=at, **style)
-    length, stress = units.length, units.stress
-    x = "δ / ΔR" if scaled else f"δ [{length}]"
+        style = {"color": colours[k], "lw": 1.3, "ls": "-" if k == 0 or many else "--", "label": name}
+        stress = curve.E_star * abs(curve.dR) / curve.R if scaled else 1.0
+        load, P = loads(curve, scaled), curve.P / (stress * curve.R if scaled else 1.0)
+        force.plot([0, *load], [0, *P], marker="" if many else ".", ms=4, **style)
+        angle.plot(load, np.degrees(curve.eps), **style)
+        phi, p = pressure_at(run, loads(first_loading(curve), scaled), last)
+        pressure.plot(np.degrees(phi), p / stress, **style)
+    x = "δ / ΔR" if scaled else f"δ [{units.length}]"
     force.set(xlabel=x, ylabel="P / (E* ΔR)" if scaled else f"P [{units.force}]", title="force of the joint")
-    pressure.set(xlabel="angle from the contact axis [°]", ylabel="p R / (E* ΔR)" if scaled else f"p [{stress}]")
-    pressure.set(title="contact pressure on the hole, nearest step to the last common δ", xlim=(0, None), ylim=(0, None))
+    pressure.set(xlabel="angle from the contact axis [°]", xlim=(0, None), ylim=(0, None))
+    pressure.set_ylabel("p R / (E* ΔR)" if scaled else f"p [{units.stress}]")
+    pressure.set_title(f"contact pressure at δ = {last:.4g} {'ΔR' if scaled else units.length}")
     angle.set(xlabel=x, ylabel="contact semi-angle [°]", title="contact angle", ylim=(0, None))
     for one in axes:
         one.grid(alpha=0.3)
-        if len(runs) <= _FEW:
+        if not many:
             one.legend(frameon=False, fontsize="small")
+    if shades is not None:
+        from matplotlib.cm import ScalarMappable
+
+        mappable = ScalarMappable(_norm(shades), "viridis")
+        angle.get_figure().colorbar(mappable, ax=angle, label=shades.label)
 
 
-def colour(k: int, n: int) -> str | tuple[float, float, float, float]:
-    """Colour of run ``k`` of ``n``: one of its own, or where they are many a shade by its place."""
-    if n <= _FEW:
-        return f"C{k}"
+def loads(curve: RunCurve, scaled: bool) -> Array:
+    """Displacements ``(n,)``, over the clearance if ``scaled``."""
+    return curve.delta / (abs(curve.dR) if scaled else 1.0)
+
+
+def pressure_at(run: Run, load: Array, wanted: float) -> tuple[Array, Array]:
+    """Angle and mean pressure of each facet of the hole (of the pin, if that alone is integrated) where the rising
+    ``load`` of the first steps is ``wanted``, linearly between two steps; before the first, that step."""
+    n = len(load)
+    above = min(int(np.searchsorted(load, wanted * (1 - 1e-12))), n - 1)
+    below = max(above - 1, 0)
+    (phi, p), (_, q) = (list(run.contact(k + 1).values())[-1].facet_means() for k in (above, below))
+    share = 0.0 if above == below else np.clip((load[above] - wanted) / (load[above] - load[below]), 0.0, 1.0)
+    return phi, p + share * (q - p)
+
+
+def _colours(n: int, shades: Shades | None) -> list:
+    """Colours of ``n`` runs: shades, or one of its own for each."""
     from matplotlib import colormaps
 
-    return colormaps["viridis"](k / (n - 1))
+    if shades is not None:
+        return [colormaps["viridis"](value) for value in _norm(shades)(np.array(shades.values))]
+    return [f"C{k}" for k in range(n)] if n <= FEW else [colormaps["viridis"](k / (n - 1)) for k in range(n)]
+
+
+def _norm(shades: Shades):
+    """From values to the range of colours; logarithmic where they span decades."""
+    from matplotlib.colors import LogNorm, Normalize
+
+    low, high = min(shades.values), max(shades.values)
+    return LogNorm(low, high) if low > 0 and high > 30 * low else Normalize(low, high)

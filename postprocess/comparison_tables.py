@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from rich.table import Table
 
-from archord.postprocess.comparison import Compared, Comparison, differing_keys
+from archord.postprocess.comparison import Compared, Comparison, differing_keys, first_loading
 from archord.postprocess.run_result import Run
 from archord.postprocess.run_tables import number, plain_table, shown_rows
 
@@ -49,8 +49,8 @@ def notes(comparison: Comparison) -> list[str]:
     said = []
     if comparison.step_by_step:
         said.append("compared step by step: all runs went through the same delta/dR.")
-    elif any(len(run.curve.loading().delta) < run.steps for run in comparison.runs):
-        said.append("compared over loading alone: the runs went different ways, and unloading depends on the way.")
+    elif any(len(first_loading(run.curve).delta) < run.steps for run in comparison.runs):
+        said.append("compared up to the first unloading alone: the runs went different ways, and what follows depends on the way.")
     if any(part.interpolated.any() for part in comparison.compared):
         said.append("~: interpolated between steps by a monotone cubic.")
     if not comparison.absolute:

@@ -11,7 +11,7 @@ import pandas as pd
 from archord.postprocess.arc_pressure import ArcContact, undeformed
 from archord.postprocess.run_fields import BODIES, Fields
 from archord.postprocess.run_result import read_columns
-from archord.solver.scene import Scene
+from archord.solver.scene import Scene, SceneError
 
 _WHOLE = ("step", "iterations", "cutbacks")
 
@@ -86,3 +86,17 @@ def cell_frame(fields: Fields, scene: Scene) -> pd.DataFrame:
     frame = pd.DataFrame(columns | nodes | {"x": centre[:, 0], "y": centre[:, 1]} | fields.cell_fields())
     units = dict.fromkeys(("von_mises", "mean_stress", "contact_pressure"), stress)
     return with_units(frame, units | dict.fromkeys(("x", "y"), scene.units.length))
+
+
+def sweep_frame(path: Path) -> pd.DataFrame:
+    """A sweep.csv or cases.csv. Raises `SceneError` if it is none."""
+    text = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
+    try:
+        units = units_of_headings(path)
+        frame = pd.read_csv(path, dtype=text, keep_default_na=False, na_values=[""])
+        frame.columns = pd.Index(list(units))
+    except (OSError, ValueError, StopIteration):
+        raise SceneError(f"{path}: cannot be read as a table of a sweep.") from None
+    if "message" in frame:
+        frame["message"] = frame["message"].fillna("")
+    return with_units(frame, units)
