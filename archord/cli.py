@@ -22,7 +22,7 @@ from archord.fit_commands import fit
 from archord.plain_typer import typer
 from archord.ranks import launcher_rank, run_on_ranks
 from archord.reproduce_commands import reproduce
-from archord.result_commands import compare, show
+from archord.result_commands import compare, export, show
 
 app = typer.Typer(
     name="archord",
@@ -155,6 +155,7 @@ def picture(
 
 app.command()(show)
 app.command()(compare)
+app.command()(export)
 app.command()(fit)
 app.command()(reproduce)
 app.command("export-deck")(export_deck)

@@ -34,24 +34,15 @@ def show(
     return _show_run(Run(folder), output or folder, pictures)
 
 
-def _make(folder: Path) -> None:
-    """Make ``folder`` unless it is there. Raises `SceneError`."""
-    from archord.solver.scene import SceneError
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SceneError(f"{folder}: cannot be made: {error.strerror or error}.") from None
-
-
 def _show_run(run: Run, target: Path, pictures: bool) -> int:
     from archord.postprocess import run_tables
 
     files, left_out = [], ["no picture: no step was accepted."]
     if pictures and run.steps:
+        from archord.postprocess.export_files import make_folder
         from archord.postprocess.run_pictures import draw_run
 
-        _make(target)
+        make_folder(target)
         files, left_out = draw_run(run, target)
     console = wide_console()
     print(run_tables.state_line(run))
@@ -80,9 +71,10 @@ def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
 
     files, left_out = [], "no picture: no case has an accepted step."
     if pictures and sweep.runs():
+        from archord.postprocess.export_files import make_folder
         from archord.postprocess.sweep_picture import draw_sweep
 
-        _make(target)
+        make_folder(target)
         file, left_out = draw_sweep(sweep, target / "sweep.png")
         files = [file]
     print(sweep_tables.state_line(sweep))
@@ -147,3 +139,47 @@ def compare(
     if pictures:
         print(f"\n{output}")
     return 0
+
+
+def export(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="run folder")],
+    vtk: Annotated[
+        Path | None, typer.Option("--vtk", metavar="DIR", help="write .vtu files for each step and run.pvd into DIR")
+    ] = None,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="DIR", help="write history, contact, nodes and cells into DIR")
+    ] = None,
+    step: Annotated[
+        int | None,
+        typer.Option("--step", metavar="N", help="of the .vtu files this step alone [all]; of nodes and cells [last]"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite files that are there")] = False,
+) -> int:
+    """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything else."""
+    from archord.postprocess.run_result import Run
+    from archord.solver.scene import SceneError
+
+    if vtk is None and csv is None:
+        raise SceneError("export: give --vtk DIR, --csv DIR or both.")
+    run = Run(folder)
+    files: list[Path] = []
+    left_out: list[str] = []
+    if vtk is not None:
+        from archord.postprocess.vtk_export import export_vtk
+
+        files += export_vtk(run, vtk, step, force=force)
+    if csv is not None:
+        from archord.postprocess.csv_export import export_csv
+
+        tables, left_out = export_csv(run, csv, step, force=force)
+        files += tables
+    for line in (*left_out, *_shortened(files)):
+        print(line)
+    return 0
+
+
+def _shortened(files: list[Path]) -> list[str]:
+    """The first files and how many there are, if they are many."""
+    few = [str(file) for file in files if file.suffix != ".vtu"]
+    vtu = [file for file in files if file.suffix == ".vtu"]
+    return few + ([f"{len(vtu)} .vtu files beside it, {vtu[0].name} to {vtu[-1].name}"] if vtu else [])
