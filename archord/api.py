@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import atexit
+import logging
 import shutil
 import signal
 import tempfile
-import warnings
 import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -59,7 +59,8 @@ def solve(
 
     Without a ``folder`` the results are temporary: they go with the returned run, under MPI with rank 0's process.
     An occupied folder is refused without ``force``. ``progress`` reports steps on rank 0 as ``archord solve`` does. A
-    run that could not reach its end is a `RuntimeWarning` and has the status "stopped"; its accepted steps stay.
+    run that could not reach its end has the status "stopped", and the logger "archord" warns of it; its accepted steps
+    stay.
 
     Raises `SceneError` for bad input, on all ranks, and KeyboardInterrupt for Ctrl-C (SystemExit for SIGTERM and
     SIGHUP) once the steps accepted so far are on disk.
@@ -75,6 +76,8 @@ def solve(
     def claimed() -> tuple[Scene, Path]:
         checked = scene if isinstance(scene, Scene) else load_scene(scene)
         target = Path(tempfile.mkdtemp(prefix="archord-")) if folder is None else Path(folder)
+        if target.is_dir() and any(target.iterdir()) and not force:
+            raise SceneError(f"{target}: is not empty; choose another folder, or overwrite a run in it: force=True.")
         claim_folder(target, force)
         return checked, target
 
@@ -100,7 +103,8 @@ def solve(
             raise KeyboardInterrupt(outcome.message)
         raise SystemExit(128 + outcome.signal)
     if outcome.status == "stopped" and comm.rank == 0:
-        warnings.warn(f"{target}: {outcome.message}", RuntimeWarning, stacklevel=2)
+        # not warnings.warn: importing ffcx sends warnings to a logger that shows nothing
+        logging.getLogger("archord").warning("archord: %s: %s.", target, outcome.message)
     return run
 
 

@@ -90,10 +90,12 @@ class Progress:
             self._task = self._bar.add_task("meshing", total=len(scene.targets), completed=done)
 
     def __enter__(self) -> Progress:
+        """Show the bar."""
         self._bar.__enter__()
         return self
 
     def __exit__(self, *what) -> None:
+        """Leave the bar as it is."""
         self._bar.__exit__(*what)
 
     def start(self, joint) -> None:

@@ -103,9 +103,9 @@ def wide_console() -> Any:
 
 def compare(
     folders: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="run folders; the first is the measure")],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="picture to draw")
-    ] = Path("comparison.png"),
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="picture to draw")] = Path(
+        "comparison.png"
+    ),
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="draw the picture, too")] = True,
 ) -> int:
     """Compare runs with the first: P, p0 and eps at common displacements, scenes, cost; and draw them.

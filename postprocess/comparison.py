@@ -173,7 +173,8 @@ def short_names(folders: list[Path]) -> list[str]:
     parents = [path.parent.parts for path in paths]
     n = len(os.path.commonprefix(parents)) if len(set(paths)) > 1 else len(parents[0])
     names = [str(Path(*path.parts[n:])) for path in paths]
-    return [name if names.count(name) == 1 else f"{name} ({names[: k + 1].count(name)})" for k, name in enumerate(names)]
+    count = [names[: k + 1].count(name) for k, name in enumerate(names)]
+    return [name if names.count(name) == 1 else f"{name} ({n})" for name, n in zip(names, count, strict=True)]
 
 
 def scene_keys(scene: Scene) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from archord.postprocess.run_pictures import new_figure, save
 from archord.postprocess.run_result import Run
 from archord.solver.output_file import check_output
 from archord.solver.scene import SceneError
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 FEW = 10  # runs that get a colour of their own and a name in the legend
 
@@ -57,9 +54,7 @@ def draw_comparison(
     return save(figure, target)
 
 
-def _row(
-    axes: Sequence[Axes], runs: Sequence[Run], names: Sequence[str], scaled: bool, shades: Shades | None
-) -> None:
+def _row(axes: Sequence[Any], runs: Sequence[Run], names: Sequence[str], scaled: bool, shades: Shades | None) -> None:
     force, pressure, angle = axes
     units, many = runs[0].scene.units, shades is not None or len(runs) > FEW
     colours = _colours(len(runs), shades)

@@ -50,7 +50,7 @@ def notes(comparison: Comparison) -> list[str]:
     if comparison.step_by_step:
         said.append("compared step by step: all runs went through the same delta/dR.")
     elif any(len(first_loading(run.curve).delta) < run.steps for run in comparison.runs):
-        said.append("compared up to the first unloading alone: the runs went different ways, and what follows depends on the way.")
+        said.append("compared up to the first unloading: the runs went different ways, on which the rest depends.")
     if any(part.interpolated.any() for part in comparison.compared):
         said.append("~: interpolated between steps by a monotone cubic.")
     if not comparison.absolute:

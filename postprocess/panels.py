@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,14 +13,10 @@ from archord.postprocess.run_fields import SUBTRIANGLES, Fields
 from archord.postprocess.run_result import Run
 from archord.solver.scene import Scene
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 _EDGE_POINTS = 5  # along a curved edge
 
 
-def second_axis(axes: Axes, direction: str, divisor: float, label: str, opposite: str) -> None:
+def second_axis(axes: Any, direction: str, divisor: float, label: str, opposite: str) -> None:
     """A second axis at the ``opposite`` side with the first one's numbers over ``divisor``; none if they are the
     same."""
     if math.isclose(divisor, 1.0, rel_tol=1e-12):
@@ -31,7 +27,7 @@ def second_axis(axes: Axes, direction: str, divisor: float, label: str, opposite
     second.set_xlabel(label) if direction == "x" else second.set_ylabel(label)
 
 
-def force_panel(axes: Axes, run: Run) -> None:
+def force_panel(axes: Any, run: Run) -> None:
     """P over delta in the scene's units, with P/(E* R) and delta/dR opposite; where yielding began is marked."""
     scene, history = run.scene, run.columns
     delta, P = ([0.0, *history[name]] for name in ("delta", "P"))
@@ -53,7 +49,7 @@ def shown_steps(run: Run, most: int = 4) -> list[int]:
     return sorted({max(1, round(run.steps * k / most)) for k in range(1, most + 1)})
 
 
-def arc_panel(axes: Axes, run: Run) -> None:
+def arc_panel(axes: Any, run: Run) -> None:
     """Mean contact pressure of each facet over the angle from the contact axis, at up to four steps."""
     scene, loads = run.scene, run.columns["delta/dR"]
     for i, step in enumerate(shown_steps(run)):
@@ -73,7 +69,7 @@ def arc_panel(axes: Axes, run: Run) -> None:
     second_axis(axes, "y", scene.E_star, "p / E*", "right")
 
 
-def chord_panel(axes: Axes, run: Run) -> None:
+def chord_panel(axes: Any, run: Run) -> None:
     """Mean pressure of each facet projected onto the chord of the contact (see `chord`), at the steps of `arc_panel`.
 
     Steps without contact, or with one beyond a quarter circle, have no chord.
@@ -98,7 +94,7 @@ def chord_panel(axes: Axes, run: Run) -> None:
     second_axis(axes, "y", scene.E_star, "$p_y$ / E*", "right")
 
 
-def field_panel(figure: Figure, axes: Axes, run: Run, step: int | None = None) -> None:
+def field_panel(figure: Any, axes: Any, run: Run, step: int | None = None) -> None:
     """PEEQ, or von Mises stress where nothing can yield, on the deformed joint near the contact, with its outline
     before (dashed) and after; displacement and clearance are magnified by the factor in the title."""
     scene, fields = run.scene, run.fields(step)
@@ -145,7 +141,7 @@ def _window(scene: Scene, factor: float) -> tuple[float, float, float, float]:
     return 0.0, reach, -min(1.9 * R + gap, scene.joint.W), reach if scene.joint.model == "ring" else 0.06 * R
 
 
-def _outline(axes: Axes, fields: Fields, x: np.ndarray, **style: Any) -> None:
+def _outline(axes: Any, fields: Fields, x: np.ndarray, **style: Any) -> None:
     """Draw the boundary through the points ``x`` ``(n, 2)`` of the nodes, edges as the parabolas that they are."""
     from matplotlib.collections import LineCollection
 
@@ -154,7 +150,7 @@ def _outline(axes: Axes, fields: Fields, x: np.ndarray, **style: Any) -> None:
     axes.add_collection(LineCollection(list(shape @ x[fields.outline()]), **style), autolim=False)
 
 
-def _rigid_pin(axes: Axes, scene: Scene, delta: float, factor: float) -> None:
+def _rigid_pin(axes: Any, scene: Scene, delta: float, factor: float) -> None:
     for load, style in ((0.0, {"color": "0.35", "lw": 0.9, "ls": (0, (4, 3))}), (delta, {"color": "black", "lw": 1.1})):
         arc = rigid_arc(scene, load, factor)
         axes.plot(*arc.T, **style)
@@ -162,7 +158,7 @@ def _rigid_pin(axes: Axes, scene: Scene, delta: float, factor: float) -> None:
     axes.text(0.35 * scene.joint.radius, arc[-1, 1] - 0.35 * scene.joint.radius, "rigid pin", ha="center")
 
 
-def iterations_panel(axes: Axes, run: Run) -> None:
+def iterations_panel(axes: Any, run: Run) -> None:
     """Newton iterations of each step, with its cutbacks above it."""
     step, iterations, cutbacks = (np.array(run.columns[name]) for name in ("step", "iterations", "cutbacks"))
     axes.bar(step, iterations, color="tab:blue", width=0.8)

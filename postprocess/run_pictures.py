@@ -4,29 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from archord.postprocess import panels
 from archord.postprocess.run_result import Run
 from archord.solver.output_file import check_output, writing
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 DOTS = 110  # per inch
 
 
-def new_figure(*size: float) -> Figure:
-    """A figure of ``size`` in inches that belongs to no window."""
+def new_figure(width: float, height: float) -> Any:
+    """A figure so wide and high in inches that belongs to no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=size, layout="constrained")
+    figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
-def save(figure: Figure, target: Path) -> Path:
+def save(figure: Any, target: Path) -> Path:
     """Write ``figure`` as ``target``; returns it. Raises `SceneError` if it cannot be written."""
     with writing(target):
         figure.savefig(target, dpi=DOTS)
@@ -39,7 +36,7 @@ def draw_run(run: Run, folder: Path) -> tuple[list[Path], list[str]]:
     Raises `SceneError` if the run has no accepted step, a file of it is damaged, or one cannot be written.
     """
     run.number(None)
-    drawings: dict[str, Callable[[Figure, Run], None]] = {"force.png": _force, "pressure.png": _pressure}
+    drawings: dict[str, Callable[[Any, Run], None]] = {"force.png": _force, "pressure.png": _pressure}
     left_out = []
     if run.scene.output.fields:
         drawings["field.png"] = _field
@@ -48,32 +45,31 @@ def draw_run(run: Run, folder: Path) -> tuple[list[Path], list[str]]:
     drawings["iterations.png"] = _iterations
     for name in drawings:
         check_output(folder / name)
-    files = []
+    figures = {}
     for name, draw in drawings.items():
-        figure = new_figure(*_SIZES[name])
+        figures[name] = new_figure(*_SIZES[name])
         if name == "field.png" and run.scene.joint.model == "ring":
-            figure.set_figwidth(5.2)
-        draw(figure, run)
-        files.append(save(figure, folder / name))
-    return files, left_out
+            figures[name].set_figwidth(5.2)
+        draw(figures[name], run)
+    return [save(figure, folder / name) for name, figure in figures.items()], left_out
 
 
 _SIZES = {"force.png": (6.4, 4.8), "pressure.png": (12, 4.8), "field.png": (7, 6), "iterations.png": (6.4, 3.6)}
 
 
-def _force(figure: Figure, run: Run) -> None:
+def _force(figure: Any, run: Run) -> None:
     panels.force_panel(figure.subplots(), run)
 
 
-def _pressure(figure: Figure, run: Run) -> None:
+def _pressure(figure: Any, run: Run) -> None:
     arc, chord = figure.subplots(1, 2)
     panels.arc_panel(arc, run)
     panels.chord_panel(chord, run)
 
 
-def _field(figure: Figure, run: Run) -> None:
+def _field(figure: Any, run: Run) -> None:
     panels.field_panel(figure, figure.subplots(), run)
 
 
-def _iterations(figure: Figure, run: Run) -> None:
+def _iterations(figure: Any, run: Run) -> None:
     panels.iterations_panel(figure.subplots(), run)

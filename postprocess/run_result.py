@@ -14,6 +14,9 @@ from archord.solver.history import read_history
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import load_scene
 
+_NEEDED = {"step", "delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "iterations", "cutbacks",
+           "seconds"}  # fmt: skip
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -38,6 +41,7 @@ class Run:
         self.summary: dict[str, Any] = _read_report(self.folder / "run.json")
 
     def __repr__(self) -> str:
+        """Folder, status and how far it came."""
         end = f", delta/dR = {self.columns['delta/dR'][-1]:g}" if self.steps else ""
         return f"<Run {self.folder}: {self.status}, {self.steps} step{'s' if self.steps != 1 else ''}{end}>"
 
@@ -128,7 +132,7 @@ def read_columns(path: Path) -> dict[str, list[float]]:
     """The columns of the history.csv ``path`` by name without unit. Raises `SceneError` if it is none."""
     try:
         columns = read_history(path)
-        if not {"step", "delta", "delta/dR", "P", "p0", "eps"} <= columns.keys():
+        if not columns.keys() >= _NEEDED:
             raise KeyError("columns")
     except (ValueError, IndexError, KeyError, OSError):
         raise SceneError(f"{path}: cannot be read as the history of a run.") from None

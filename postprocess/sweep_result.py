@@ -1,4 +1,4 @@
-"""A sweep's folder as an object: its cases, their histories in one table, and their runs. It reads, and never solves."""
+"""A sweep's folder as an object: its cases, their histories in one table, and their runs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,11 @@ class Sweep:
             with path.open(newline="", encoding="utf-8") as file:
                 reader = csv.DictReader(file)
                 headings, self.rows = list(reader.fieldnames or []), list(reader)
-            if headings[:3] != _FIRST or "message" not in headings or any(None in row.values() for row in self.rows):
+            if (
+                headings[:3] != _FIRST
+                or "message" not in headings
+                or any(None in (*row, *row.values()) for row in self.rows)
+            ):
                 raise ValueError("headings")
         except (OSError, ValueError, csv.Error):
             raise SceneError(f"{path}: cannot be read as the cases of a sweep.") from None
@@ -46,9 +50,11 @@ class Sweep:
         self.varied = headings[len(_FIRST) : headings.index("message")]
 
     def __len__(self) -> int:
+        """Number of cases."""
         return len(self.rows)
 
     def __repr__(self) -> str:
+        """Folder, keys and number of cases by status."""
         states = [row["status"] for row in self.rows]
         counted = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
         return f"<Sweep {self.folder}: {len(self)} cases over {', '.join(self.keys)}; {counted}>"

@@ -19,7 +19,7 @@ def state_line(sweep: Sweep) -> str:
     """Folder, and number of cases by status."""
     states = [row["status"] for row in sweep.rows]
     counted = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
-    return f"{sweep.folder}: {len(sweep)} cases: {counted}"
+    return f"{sweep.folder}: {len(sweep)} case{'s' if len(sweep) != 1 else ''}: {counted}"
 
 
 def constant_line(sweep: Sweep) -> str:

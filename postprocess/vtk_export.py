@@ -8,6 +8,7 @@ pressure, the gap and the displacement of the points, so that the same filters d
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -40,7 +41,7 @@ def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool =
     run.fields(steps[-1])
     check_new([collection, *(folder / name for _, name in parts)], folder, force)
     delta = run.columns["delta"]
-    grows = all(a < b for a, b in zip(delta, delta[1:], strict=False))
+    grows = all(a < b for a, b in pairwise(delta))
     times = {n: delta[n - 1] if grows else float(n) for n in steps}
     for n in steps:
         for name, mesh in zip(("bodies", "contact"), _meshes(run, n), strict=True):
