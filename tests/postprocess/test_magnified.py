@@ -26,8 +26,9 @@ def test_the_clearance_grows_by_the_factor(runs, factor):
     size, pin = np.hypot(*fields.coordinates.T), fields.body_of_node == BODIES["pin"]
     hole = ~pin & (np.abs(size - R - dR) < 1e-9)
     np.testing.assert_allclose(np.hypot(*x[hole].T), R + factor * dR, rtol=1e-12)
-    arc = pin & (np.abs(np.hypot(*(fields.coordinates + [0, dR]).T) - R) < 1e-9)
-    np.testing.assert_allclose(np.hypot(*(x[arc] + [0, factor * dR]).T), R, rtol=1e-12)
+    down = np.array([0.0, -dR])
+    arc = pin & (np.abs(np.hypot(*(fields.coordinates - down).T) - R) < 1e-9)
+    np.testing.assert_allclose(np.hypot(*(x[arc] - factor * down).T), R, rtol=1e-12)
     assert x[arc, 1].min() == pytest.approx(x[hole, 1].min(), rel=1e-12)
     circle = nominal(run.scene, fields)
     np.testing.assert_allclose(np.hypot(*circle[arc | hole].T), R, rtol=1e-12)
