@@ -6,6 +6,7 @@ Arrays and tables are read when they are asked for, and pandas is imported only 
 from __future__ import annotations
 
 import json
+import math
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -132,10 +133,13 @@ def read_columns(path: Path) -> dict[str, list[float]]:
     """The columns of the history.csv ``path`` by name without unit. Raises `SceneError` if it is none."""
     try:
         columns = read_history(path)
-        if not columns.keys() >= _NEEDED:
+        finite = all(math.isfinite(value) for name in _NEEDED & columns.keys() for value in columns[name])
+        if finite and not columns.keys() >= _NEEDED:
             raise KeyError("columns")
     except (ValueError, IndexError, KeyError, OSError):
         raise SceneError(f"{path}: cannot be read as the history of a run.") from None
+    if not finite:
+        raise SceneError(f"{path}: holds numbers that are not finite.")
     return columns
 
 
