@@ -11,6 +11,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.postprocess.comparison import first_loading
+from archord.postprocess.panels import gap_name
 from archord.postprocess.run_curve import RunCurve
 from archord.postprocess.run_pictures import new_figure, save
 from archord.postprocess.run_result import Run
@@ -68,11 +69,12 @@ def _row(axes: Sequence[Any], runs: Sequence[Run], names: Sequence[str], scaled:
         angle.plot(load, np.degrees(curve.eps), **style)
         phi, p = pressure_at(run, loads(first_loading(curve), scaled), last)
         pressure.plot(np.degrees(phi), p / stress, **style)
-    x = "δ / ΔR" if scaled else f"δ [{units.length}]"
-    force.set(xlabel=x, ylabel="P / (E* ΔR)" if scaled else f"P [{units.force}]", title="force of the joint")
+    gap = gap_name([curve.dR for curve in curves])
+    x = f"δ / {gap}" if scaled else f"δ [{units.length}]"
+    force.set(xlabel=x, ylabel=f"P / (E* {gap})" if scaled else f"P [{units.force}]", title="force of the joint")
     pressure.set(xlabel="angle from the contact axis [°]", xlim=(0, None), ylim=(0, None))
-    pressure.set_ylabel("p R / (E* ΔR)" if scaled else f"p [{units.stress}]")
-    pressure.set_title(f"contact pressure at δ = {last:.4g} {'ΔR' if scaled else units.length}")
+    pressure.set_ylabel(f"p R / (E* {gap})" if scaled else f"p [{units.stress}]")
+    pressure.set_title(f"contact pressure at δ = {last:.4g} {gap if scaled else units.length}")
     angle.set(xlabel=x, ylabel="contact semi-angle [°]", title="contact angle", ylim=(0, None))
     for one in axes:
         one.grid(alpha=0.3)

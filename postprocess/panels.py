@@ -14,6 +14,17 @@ from archord.postprocess.run_result import Run
 from archord.solver.scene import Scene
 
 _EDGE_POINTS = 5  # along a curved edge
+_MANY_STEPS = 60  # whose bars touch
+
+
+def gap_name(clearances: list[float]) -> str:
+    """The clearance as it stands in labels: of its size alone, where it is an interference."""
+    return "ΔR" if min(clearances) > 0 else "|ΔR|"
+
+
+def load_label(scene: Scene, delta: float) -> str:
+    """A displacement over the clearance, in words."""
+    return f"δ = {delta / abs(scene.joint.dR):.4g} {gap_name([scene.joint.dR])}"
 
 
 def second_axis(axes: Any, direction: str, divisor: float, label: str, opposite: str) -> None:
@@ -37,10 +48,10 @@ def force_panel(axes: Any, run: Run) -> None:
         axes.plot(delta[first + 1], P[first + 1], "o", ms=8, mfc="none", color="tab:red", label="first plastic strain")
         axes.legend(frameon=False, loc="upper left")
     axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{scene.units.force}]", title="force of the joint")
-    if scene.joint.dR > 0:
-        axes.set(xlim=(min(0.0, *delta), None), ylim=(min(0.0, *P), None))
+    axes.set(xlim=(min(delta), None), ylim=(min(P), None))
+    axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)
-    second_axis(axes, "x", scene.joint.dR, "δ / ΔR", "top")
+    second_axis(axes, "x", abs(scene.joint.dR), f"δ / {gap_name([scene.joint.dR])}", "top")
     second_axis(axes, "y", scene.E_star * scene.joint.radius, "P / (E* R)", "right")
 
 
@@ -51,13 +62,13 @@ def shown_steps(run: Run, most: int = 4) -> list[int]:
 
 def arc_panel(axes: Any, run: Run) -> None:
     """Mean contact pressure of each facet over the angle from the contact axis, at up to four steps."""
-    scene, loads = run.scene, run.columns["delta/dR"]
+    scene, delta = run.scene, run.columns["delta"]
     for i, step in enumerate(shown_steps(run)):
         arcs = run.contact(step)
         for name, arc in arcs.items():
             angle, p = arc.facet_means()
             style = {"color": f"C{i}", "lw": 1.4, "ls": "-" if name == list(arcs)[-1] else "--"}
-            label = f"δ = {loads[step - 1]:.4g} ΔR" if name == list(arcs)[-1] else None
+            label = load_label(scene, delta[step - 1]) if name == list(arcs)[-1] else None
             axes.plot(np.degrees(angle), p, label=label, **style)
     two = len(run.contact()) > 1
     reach = 180 if scene.joint.model == "ring" else 90
@@ -74,7 +85,7 @@ def chord_panel(axes: Any, run: Run) -> None:
 
     Steps without contact, or with one beyond a quarter circle, have no chord.
     """
-    scene, loads, side = run.scene, run.columns["delta/dR"], "hole"
+    scene, delta, side = run.scene, run.columns["delta"], "hole"
     for i, step in enumerate(shown_steps(run)):
         arcs, eps = run.contact(step), run.columns["eps"][step - 1]
         side, arc = list(arcs.items())[-1]
@@ -83,7 +94,7 @@ def chord_panel(axes: Any, run: Run) -> None:
             chord = chord_projection(angle, p, eps, arc.radius, arc.weight.sum(axis=1))
         except ValueError:
             continue
-        axes.plot(chord.x_over_l, chord.py, color=f"C{i}", lw=1.4, label=f"δ = {loads[step - 1]:.4g} ΔR")
+        axes.plot(chord.x_over_l, chord.py, color=f"C{i}", lw=1.4, label=load_label(scene, delta[step - 1]))
     axes.set(xlabel="x / l along the chord", ylabel=f"$p_y$ [{scene.units.stress}]", xlim=(0, 1.1), ylim=(0, None))
     axes.set_title(f"pressure on the chord, {side}")
     if axes.lines:
@@ -115,10 +126,10 @@ def field_panel(figure: Any, axes: Any, run: Run, step: int | None = None) -> No
     _outline(axes, fields, x, color="black", lw=1.1)
     if scene.pin.rigid:
         _rigid_pin(axes, scene, fields.delta, factor)
-    length, load = scene.units.length, fields.delta / scene.joint.dR
+    length = scene.units.length
     axes.set(xlim=(left, right), ylim=(low, high), aspect="equal", xlabel=f"x [{length}]", ylabel=f"y [{length}]")
-    what = "as it is" if factor == 1 else f"displacement and clearance × {factor:g}"
-    axes.set_title(f"step {fields.step}, δ = {load:.4g} ΔR\n{what}", fontsize="medium")
+    what = "not magnified" if factor == 1 else f"displacement and clearance × {factor:g}"
+    axes.set_title(f"step {fields.step}, {load_label(scene, fields.delta)}\n{what}", fontsize="medium")
 
 
 def _shown(scene: Scene, fields: Fields) -> tuple[np.ndarray, str]:
@@ -161,7 +172,7 @@ def _rigid_pin(axes: Any, scene: Scene, delta: float, factor: float) -> None:
 def iterations_panel(axes: Any, run: Run) -> None:
     """Newton iterations of each step, with its cutbacks above it."""
     step, iterations, cutbacks = (np.array(run.columns[name]) for name in ("step", "iterations", "cutbacks"))
-    axes.bar(step, iterations, color="tab:blue", width=0.8)
+    axes.bar(step, iterations, color="tab:blue", width=0.8 if len(step) <= _MANY_STEPS else 1.0)
     for x, y, cuts in zip(step, iterations, cutbacks, strict=True):
         if cuts:
             axes.annotate(f"{cuts:g} cut", (x, y), ha="center", va="bottom", fontsize="small", color="tab:red")

@@ -54,7 +54,7 @@ def draw_run(run: Run, folder: Path) -> tuple[list[Path], list[str]]:
     return [save(figure, folder / name) for name, figure in figures.items()], left_out
 
 
-_SIZES = {"force.png": (6.4, 4.8), "pressure.png": (12, 4.8), "field.png": (7, 6), "iterations.png": (6.4, 3.6)}
+_SIZES = {"force.png": (6.4, 4.8), "pressure.png": (12, 4.8), "field.png": (6.4, 6), "iterations.png": (6.4, 3.6)}
 
 
 def _force(figure: Any, run: Run) -> None:

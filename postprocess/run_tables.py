@@ -106,7 +106,7 @@ def peak_lines(run: Run) -> dict[str, list[str]]:
     unit, h, scene = run.scene.units, run.columns, run.scene
     R, E = scene.joint.radius, scene.E_star
     named = (
-        ("P", unit.force, 1.0, "{:.5g} E* R, {:.5g} E* dR", (E * R, E * scene.joint.dR)),
+        ("P", unit.force, 1.0, f"{{:.5g}} E* R, {{:.5g}} E* {_gap(run)}", (E * R, E * abs(scene.joint.dR))),
         ("p0", unit.stress, 1.0, "{:.5g} E*", (E,)),
         ("eps", "°", 180 / math.pi, "{:.5g} rad", (1.0,)),
     )
@@ -127,7 +127,13 @@ def peak_lines(run: Run) -> dict[str, list[str]]:
 
 
 def _at(run: Run, k: int) -> str:
-    return f"step {run.columns['step'][k]:g} (delta = {run.columns['delta/dR'][k]:.4g} dR)"
+    load = run.columns["delta"][k] / abs(run.scene.joint.dR)
+    return f"step {run.columns['step'][k]:g} (delta = {load:.4g} {_gap(run)})"
+
+
+def _gap(run: Run) -> str:
+    """The clearance; where it is an interference its size."""
+    return "dR" if run.scene.joint.dR > 0 else "|dR|"
 
 
 def cost_lines(run: Run) -> dict[str, list[str]]:
