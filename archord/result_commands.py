@@ -70,7 +70,7 @@ def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
     from archord.postprocess import sweep_tables
 
     files, left_out = [], "no picture: no case has an accepted step."
-    if pictures and sweep.runs():
+    if pictures and sweep.runs:
         from archord.postprocess.export_files import make_folder
         from archord.postprocess.sweep_picture import draw_sweep
 

@@ -15,20 +15,22 @@ _LONGEST = 40  # characters of a value
 
 def quantity_table(compared: Compared, names: list[str]) -> Table:
     """One row a load: the quantity of each run, and its relative difference to the first; ~ marks interpolated
-    values."""
+    values. Of many rows some 20, with those of the largest differences."""
     unit = f" [{compared.unit}]" if compared.unit else ""
     headings = [compared.load_name, f"{compared.quantity}{unit}: {names[0]}"]
     for name in names[1:]:
         headings += [name, "difference"]
     table = plain_table(*headings)
     relative, largest = compared.relative, np.abs(compared.values).max(initial=0.0)
-    for k in shown_rows(len(compared.load), _ROWS):
+    worst = [int(np.nanargmax(sizes)) for sizes in np.abs(relative[1:]) if np.isfinite(sizes).any()]
+    rows = sorted({*shown_rows(len(compared.load), _ROWS), *worst})
+    for k in rows:
         row = [f"{compared.load[k]:.6g}"]
         for r, value in enumerate(compared.values[:, k]):
             row.append(("~" if compared.interpolated[r, k] else "") + number(value, largest))
             row += [percent(relative[r, k])] if r else []
         table.add_row(*row)
-    row = ["", "largest difference"]
+    row = ["" if len(rows) == len(compared.load) else f"{len(rows)} of {len(compared.load)}", "largest difference"]
     for size in compared.largest[1:]:
         row += ["", percent(size, sign=False)]
     table.add_row(*row)

@@ -20,7 +20,7 @@ def draw_sweep(sweep: Sweep, target: Path) -> tuple[Path, str]:
 
     Raises `SceneError` if no case has an accepted step, or the file cannot be written.
     """
-    runs = sweep.runs()
+    runs = sweep.runs
     if not runs:
         raise SceneError(f"{sweep.folder}: no case has an accepted step to draw.")
     chosen = [list(runs)[k] for k in sorted({round(k) for k in np.linspace(0, len(runs) - 1, min(len(runs), _MOST))})]

@@ -91,11 +91,27 @@ class Sweep:
                 return Run(self.folder / "cases" / row["run"])
         raise SceneError(f"{self.folder}: has no case {case}; its cases are 1 to {len(self)}.")
 
+    @cached_property
     def runs(self) -> dict[int, Run]:
-        """The runs by case that have an accepted step; cases that share a run by the first of them."""
-        found: dict[str, tuple[int, Run]] = {}
-        for row in self.rows:
-            folder = self.folder / "cases" / row["run"]
-            if row["run"] not in found and (folder / "history.csv").is_file():
-                found[row["run"]] = int(row["case"]), Run(folder)
-        return {case: run for case, run in found.values() if run.steps}
+        """The runs by case that have an accepted step; cases that share a run by the first of them.
+
+        A run that cannot be read is left out; `unreadable` tells why.
+        """
+        return {case: run for case, run in self._read.items() if isinstance(run, Run) and run.steps}
+
+    @property
+    def unreadable(self) -> dict[int, str]:
+        """Sentences by case, for runs that have results which cannot be read."""
+        return {case: fault for case, fault in self._read.items() if isinstance(fault, str)}
+
+    @cached_property
+    def _read(self) -> dict[int, Run | str]:
+        found: dict[int, Run | str] = {}
+        for name, case in {row["run"]: int(row["case"]) for row in reversed(self.rows)}.items():
+            folder = self.folder / "cases" / name
+            if (folder / "history.csv").is_file():
+                try:
+                    found[case] = Run(folder)
+                except SceneError as error:
+                    found[case] = str(error)
+        return dict(sorted(found.items()))

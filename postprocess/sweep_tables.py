@@ -29,8 +29,9 @@ def constant_line(sweep: Sweep) -> str:
 
 
 def messages(sweep: Sweep) -> list[str]:
-    """Why cases stopped, a line each."""
-    return [f"case {row['case']}: {row['message']}" for row in sweep.rows if row["message"]]
+    """Why cases stopped or cannot be read, a line each."""
+    stopped = [f"case {row['case']}: {row['message']}" for row in sweep.rows if row["message"]]
+    return stopped + [f"case {case}: {fault}" for case, fault in sweep.unreadable.items()]
 
 
 def case_table(sweep: Sweep, k: dict[str, float] | None = None) -> Table:
@@ -70,7 +71,7 @@ def winkler_coefficients(sweep: Sweep) -> dict[str, float]:
     from archord.postprocess.calibration import calibrate
 
     found: dict[str, float] = {}
-    runs = sweep.runs()
+    runs = sweep.runs
     for run in runs.values() if len(runs) <= _MOST_FITS else ():
         if run.scene.joint.model == "block" and not any(run.columns["peeq_max"]):
             try:

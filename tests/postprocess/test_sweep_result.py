@@ -63,7 +63,7 @@ def test_cases_share_runs(sweep):
     """A run by the number of a case or its own name; each once."""
     loaded = archord.load(sweep)
     assert loaded.run(1).folder == loaded.run(3).folder == loaded.run("48976689e411").folder
-    assert list(loaded.runs()) == [1, 2]
+    assert list(loaded.runs) == [1, 2]
     with pytest.raises(archord.SceneError, match=r"has no case 5; its cases are 1 to 4\."):
         loaded.run(5)
     with pytest.raises(archord.SceneError, match=r"ffffffffffff: is not a run folder: scene\.toml is missing\."):
@@ -83,6 +83,17 @@ def test_show_prints_the_cases_and_draws_them(sweep, tmp_path, capsys):
     assert rows["1"][2:12] == rows["3"][2:12]
     assert "case 4: no mesh" in printed
     assert matplotlib.image.imread(tmp_path / "sweep.png").std() > 0.05
+
+
+def test_a_run_that_cannot_be_read_does_not_hide_the_others(sweep, tmp_path, capsys):
+    """Its case says why; the others are shown."""
+    copy = shutil.copytree(sweep, tmp_path / "sweep")
+    report = copy / "cases" / NAMES["coarse"] / "run.json"
+    report.write_text("{")
+    assert command(["show", str(copy)]) == 0
+    assert f"case 2: {report}: cannot be read as the report of a run." in capsys.readouterr().out
+    assert list(archord.load(copy).runs) == [1]
+    assert (copy / "sweep.png").is_file()
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "case,run,status,message\n1,2,3,4,5\n"])
