@@ -15,14 +15,13 @@ from typing import Annotated
 
 import click
 
-from archord import law_commands
+from archord import law_commands, result_commands
 from archord.benchmark_commands import benchmark
 from archord.deck_commands import export_deck
 from archord.fit_commands import fit
 from archord.plain_typer import typer
 from archord.ranks import launcher_rank, run_on_ranks
 from archord.reproduce_commands import reproduce
-from archord.result_commands import compare, export, show
 
 app = typer.Typer(
     name="archord",
@@ -141,6 +140,9 @@ def solve(
     )
 
 
+result_commands.register(app)
+
+
 @app.command()
 def picture(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="run folder")],
@@ -153,9 +155,6 @@ def picture(
     return 0
 
 
-app.command()(show)
-app.command()(compare)
-app.command()(export)
 app.command()(fit)
 app.command()(reproduce)
 app.command("export-deck")(export_deck)

@@ -14,6 +14,13 @@ if TYPE_CHECKING:
     from archord.postprocess.sweep_result import Sweep
 
 
+def register(app: typer.Typer) -> None:
+    """Add the commands of this file to ``app``."""
+    app.command()(show)
+    app.command()(compare)
+    app.command()(export)
+
+
 def show(
     folder: Annotated[Path, typer.Argument(metavar="RUN|SWEEP", help="folder of a run or of a sweep")],
     output: Annotated[
