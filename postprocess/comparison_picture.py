@@ -18,6 +18,7 @@ from archord.postprocess.run_result import Run
 from archord.solver.output_file import check_output
 from archord.solver.scene import SceneError
 
+_LEGEND_WIDTH = 190  # characters
 FEW = 10  # runs that get a colour of their own and a name in the legend
 
 
@@ -37,12 +38,14 @@ def draw_comparison(
     absolute: bool,
     dimensionless: bool,
     shades: Shades | None = None,
+    dashed: bool = True,
 ) -> Path:
     """Draw ``runs`` with their ``names`` as ``target``, in the scene's units, in ``dimensionless`` form, or both below
     each other; returns the file.
 
-    ``shades`` colour the runs, instead of a colour and a name for each. Raises `SceneError` if the file cannot be
-    written or a run's contact cannot be read.
+    ``shades`` colour the runs, instead of a colour and a name for each. ``dashed`` are all but the first, so that
+    curves below each other can be seen. Raises `SceneError` if the file cannot be written or a run's contact cannot be
+    read.
     """
     figure = new_figure(15, 4.6 * (absolute + dimensionless))
     formats = figure.canvas.get_supported_filetypes()
@@ -51,18 +54,23 @@ def draw_comparison(
     check_output(target)
     rows = figure.subplots(absolute + dimensionless, 3, squeeze=False)
     for scaled, axes in zip([False] * absolute + [True] * dimensionless, rows, strict=True):
-        _row(axes, runs, names, scaled, shades)
+        _row(axes, runs, names, scaled, shades, dashed)
+    if shades is None and len(runs) <= FEW:
+        columns = max(1, min(len(runs), _LEGEND_WIDTH // (max(map(len, names)) + 8)))
+        figure.legend(*rows[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=columns, frameon=False)
     return save(figure, target)
 
 
-def _row(axes: Sequence[Any], runs: Sequence[Run], names: Sequence[str], scaled: bool, shades: Shades | None) -> None:
+def _row(
+    axes: Sequence[Any], runs: Sequence[Run], names: Sequence[str], scaled: bool, shades: Shades | None, dashed: bool
+) -> None:
     force, pressure, angle = axes
     units, many = runs[0].scene.units, shades is not None or len(runs) > FEW
     colours = _colours(len(runs), shades)
     curves = [run.curve for run in runs]
     last = min(float(loads(first_loading(c), scaled).max()) for c in curves)
     for k, (run, curve, name) in enumerate(zip(runs, curves, names, strict=True)):
-        style = {"color": colours[k], "lw": 1.3, "ls": "-" if k == 0 or many else "--", "label": name}
+        style = {"color": colours[k], "lw": 1.3, "ls": "--" if dashed and k > 0 and not many else "-", "label": name}
         stress = curve.E_star * abs(curve.dR) / curve.R if scaled else 1.0
         load, P = loads(curve, scaled), curve.P / (stress * curve.R if scaled else 1.0)
         force.plot([0, *load], [0, *P], marker="" if many else ".", ms=4, **style)
@@ -78,8 +86,6 @@ def _row(axes: Sequence[Any], runs: Sequence[Run], names: Sequence[str], scaled:
     angle.set(xlabel=x, ylabel="contact semi-angle [°]", title="contact angle", ylim=(0, None))
     for one in axes:
         one.grid(alpha=0.3)
-        if not many:
-            one.legend(frameon=False, fontsize="small")
     if shades is not None:
         from matplotlib.cm import ScalarMappable
 

@@ -26,7 +26,7 @@ def draw_sweep(sweep: Sweep, target: Path) -> tuple[Path, str]:
     chosen = [list(runs)[k] for k in sorted({round(k) for k in np.linspace(0, len(runs) - 1, min(len(runs), _MOST))})]
     rows = {int(row["case"]): row for row in sweep.rows}
     moving = sweep.moving
-    names = [", ".join(f"{_short(h)} = {rows[c][h] or '-'}" for h in moving) or f"case {c}" for c in chosen]
+    names = [", ".join(_value(h, rows[c][h]) for h in moving) or f"case {c}" for c in chosen]
     shades = None
     if len(chosen) > FEW:
         heading = next((h for h in moving if all(_is_number(rows[c][h]) for c in chosen)), None)
@@ -34,12 +34,18 @@ def draw_sweep(sweep: Sweep, target: Path) -> tuple[Path, str]:
         shades = Shades(_short(heading) if heading else "case", values)
     scenes = [runs[c].scene for c in chosen]
     draw_comparison([runs[c] for c in chosen], names, target, absolute=same_units(scenes),
-                    dimensionless=not same_size(scenes), shades=shades)  # fmt: skip
+                    dimensionless=not same_size(scenes), shades=shades, dashed=False)  # fmt: skip
     return target, f"{len(chosen)} of {len(runs)} runs are drawn." if len(chosen) < len(runs) else ""
 
 
 def _short(heading: str) -> str:
     return heading.partition(".")[2] or heading
+
+
+def _value(heading: str, text: str) -> str:
+    """A varied key and its value: "clearance = 0.05 mm"."""
+    name, _, unit = _short(heading).partition(" [")
+    return f"{name} = {text} {unit.removesuffix(']')}".rstrip() if text else f"no {name}"
 
 
 def _is_number(text: str) -> bool:
