@@ -85,12 +85,14 @@ def _cost(series: list[Cost]) -> list[str]:
                 f"{linear / c.factorisations:.3f}",
                 f"{c.seconds['mesh'] + c.seconds['setup']:.1f}",
                 f"{c.contact_share:.1%}",
+                f"{c.share_around_factors:.0%}",
                 f"{c.peak / _MEGA:.0f}",
                 power,
             ]
         )
     headings = ("dofs N", "iterations", "on coarser meshes", "factorisations", "seconds", "linear solve [s]",
-                "per factorisation [s]", "mesh and setup [s]", "contact", "peak memory [MB]",
+                "per factorisation [s]", "mesh and setup [s]", "contact",
+                "contact, assembly and return map in the solve", "peak memory [MB]",
                 "power of N since the line before")  # fmt: skip
     lines = _table(headings, rows)
     if len(series) > 1:

@@ -56,6 +56,12 @@ class Cost:
         return self.seconds["contact"] / self.total
 
     @property
+    def share_around_factors(self) -> float:
+        """Part of the solve that is not the linear solver's: contact search, assembly, return map."""
+        around = self.seconds["contact"] + self.seconds["bulk"]
+        return around / (around + self.seconds["linear solve"])
+
+    @property
     def peak(self) -> int:
         """Memory of the rank that needs most, in bytes."""
         return max(self.memory)
