@@ -1,3 +1,49 @@
-"""archord: conformal contact of pins in holes, elastic and plastic, on FEniCSx."""
+"""archord: conformal contact of pins in holes, elastic and plastic, on FEniCSx.
+
+    import archord
+
+    run = archord.solve(archord.load_scene("scenes/steel_pin.toml"), "runs/thin")
+    run.history["P"], run.pressure(step=20), run.fields().peeq
+
+Everything is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from archord.api import load, load_scene, solve
+    from archord.postprocess.run_result import Run
+    from archord.postprocess.sweep_result import Sweep
+    from archord.solver.scene import Scene, SceneError
+
+__all__ = ["Run", "Scene", "SceneError", "Sweep", "load", "load_scene", "solve"]
+
+_HOME = {
+    "Run": "archord.postprocess.run_result",
+    "Scene": "archord.solver.scene",
+    "SceneError": "archord.solver.scene",
+    "Sweep": "archord.postprocess.sweep_result",
+    "load": "archord.api",
+    "load_scene": "archord.api",
+    "solve": "archord.api",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """What is there, imported already or not."""
+    return sorted({*globals(), *__all__})

@@ -15,7 +15,7 @@ from typing import Annotated
 
 import click
 
-from archord import law_commands
+from archord import law_commands, result_commands
 from archord.benchmark_commands import benchmark
 from archord.deck_commands import export_deck
 from archord.fit_commands import fit
@@ -139,6 +139,9 @@ def solve(
     return solve_with_progress(
         lambda: load_scene(scene, overrides or []), folder, force=force, debug=debug, quiet=quiet, begun=_begun
     )
+
+
+result_commands.register(app)
 
 
 @app.command()

@@ -87,9 +87,9 @@ def fit_sweep(
         with writing(json_file):
             json_file.write_text(as_json(found.cases, found.notes, found.left_out, model), encoding="utf-8")
     if picture:
-        from archord.postprocess.sweep_picture import draw_sweep
+        from archord.postprocess.calibrated_picture import draw_calibrated
 
-        draw_sweep(found.cases, model, picture)
+        draw_calibrated(found.cases, model, picture)
     Console(highlight=False, width=60 + 24 * (len(found.varied) + 6)).print(
         case_table(found.numbers, found.cases, found.varied)
     )

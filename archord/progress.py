@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -10,6 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from archord.postprocess.run_warnings import first_of_each_kind
 from archord.ranks import on_terminal
 from archord.solver.scene import Scene
 
@@ -46,7 +46,7 @@ def solve_with_progress(
 
     timer = Timer()
     timer.seconds["start-up"] = perf_counter() - begun
-    report = _Progress(scene, silent=quiet or comm.rank != 0, done=start.checkpoint.step if start else 0)
+    report = Progress(scene, silent=quiet or comm.rank != 0, done=start.checkpoint.step if start else 0)
     with report:
         outcome = solve_scene(
             scene,
@@ -60,7 +60,7 @@ def solve_with_progress(
             on_step=report.step,
             on_attempt=report.attempt,
         )
-    for warning in _shortened(outcome.warnings):
+    for warning in first_of_each_kind(outcome.warnings):
         print(f"archord: warning: {warning}.", file=sys.stderr)
     if comm.rank == 0 and outcome.status != "done":
         print(f"archord: {outcome.message}.", file=sys.stderr)
@@ -70,16 +70,7 @@ def solve_with_progress(
     return {"done": 0, "stopped": 3, "interrupted": 128 + outcome.signal}[outcome.status]
 
 
-def _shortened(warnings: list[str]) -> list[str]:
-    """Each kind of warning once, at the first step that gave it."""
-    first: dict[str, str] = {}
-    for warning in warnings:
-        kind = re.sub(r"[0-9.e+-]+", "#", warning.partition(": ")[2])
-        first.setdefault(kind, warning)
-    return list(first.values())
-
-
-class _Progress:
+class Progress:
     """Reports steps as they are accepted."""
 
     def __init__(self, scene: Scene, silent: bool, done: int = 0) -> None:
@@ -98,11 +89,13 @@ class _Progress:
             )
             self._task = self._bar.add_task("meshing", total=len(scene.targets), completed=done)
 
-    def __enter__(self) -> _Progress:
+    def __enter__(self) -> Progress:
+        """Show the bar."""
         self._bar.__enter__()
         return self
 
     def __exit__(self, *what) -> None:
+        """Leave the bar as it is."""
         self._bar.__exit__(*what)
 
     def start(self, joint) -> None:

@@ -12,8 +12,8 @@ from archord.benchmarks.figures import LABELS, MILD_YIELD, STYLES, Runs, Table, 
 from archord.benchmarks.paper_runs import PLANES, Plane, plastic
 from archord.postprocess.law_joint import LawJoint
 from archord.postprocess.laws import find_law
-from archord.postprocess.picture import draw_zone
 from archord.postprocess.run_curve import RunCurve
+from archord.postprocess.run_fields import SUBTRIANGLES, read_fields
 from archord.solver.step_file import step_name
 
 STAGES = (1.25, 1.6, 2.0)  # A, B and C in clearances: just after the paper's first yield, and on to its end
@@ -110,7 +110,22 @@ def fig8(runs: Runs) -> tuple[Table, Callable]:
                     name, (part["delta/dR"][step], part["P/(E* dR)"][step]), (5, -8), textcoords="offset points"
                 )
                 assert run.folder is not None
-                draw_zone(figure, one, run.folder, run.scene, step + 1)
+                _draw_zone(figure, one, run, step + 1)
                 one.set_title(f"{name}: δ = {run.delta[step] / run.dR:.3g} ΔR")
 
     return stacked(parts), draw
+
+
+def _draw_zone(figure, axes, run: RunCurve, step: int) -> None:
+    """PEEQ on the deformed shape near the contact."""
+    assert run.folder is not None
+    fields = read_fields(run.folder, run.scene, step)
+    assert fields.peeq is not None
+    x = fields.deformed / run.R
+    near = np.abs(x[fields.cells[:, :3]]).max(axis=(1, 2)) < 3
+    drawn = axes.tripcolor(
+        *x.T, fields.cells[near][:, SUBTRIANGLES].reshape(-1, 3),
+        facecolors=np.repeat(100 * fields.peeq[near], len(SUBTRIANGLES)), cmap="inferno_r",
+    )  # fmt: skip
+    figure.colorbar(drawn, ax=axes, label="equivalent plastic strain [%]", shrink=0.85)
+    axes.set(xlim=(0, 1.5), ylim=(-1.9, 0.05), aspect="equal", xlabel="x / R", ylabel="y / R")

@@ -6,7 +6,7 @@ Everything that is concluded here is concluded from measured costs; `extrapolate
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from archord.benchmarks.scaling_run import PARTS, REST, Cost, launcher, solve
 
 SPEED_UP, SPEED_UP_AT = 1.6, 1_000_000  # on 2 ranks at so many dofs
 CONTACT_SHARE = 0.1  # on 2 ranks
+AROUND_FACTORS = 0.25  # of the solve, at every size
 TIME_EXPONENT, MEMORY_EXPONENT = 1.3, 1.1
 SAME_FORCE = 1e-8  # relative difference of P between numbers of ranks
 SERIAL = ("start-up", "mesh", "output", REST)  # done by rank 0 alone, or by every rank in full
@@ -49,8 +50,13 @@ class Costs:
 
     @property
     def finished(self) -> list[Cost]:
-        """Runs without a fault."""
-        return [cost for cost in self.all if not cost.fault]
+        """Runs without a fault, and with a coarse start."""
+        return [cost for cost in self.all if not cost.fault and cost.case.guided]
+
+    def unguided(self) -> list[tuple[Cost, Cost]]:
+        """Pairs of runs of one case: with a coarse start, and without."""
+        alone = [c for c in self.all if not c.fault and not c.case.guided]
+        return [(c, a) for a in alone for c in self.finished if replace(a.case, guided=True) == c.case]
 
     def series(self, ranks: int, *, plastic: bool = False) -> list[Cost]:
         """Finished runs on ``ranks`` ranks by size, without those of the weak series alone."""
@@ -138,6 +144,10 @@ def goals(costs: Costs) -> list[tuple[str, str, bool]]:
     if shares:
         text = f"contact below {CONTACT_SHARE:.0%} of the time on 2 ranks"
         said.append((text, f"at most {max(shares):.1%}", max(shares) < CONTACT_SHARE))
+    parts = [c.share_around_factors for plastic in (False, True) for c in costs.series(1, plastic=plastic)]
+    if parts:
+        text = f"contact search, assembly and return map at most {AROUND_FACTORS:.0%} of the solve at every size"
+        said.append((text, f"at most {max(parts):.0%}", max(parts) <= AROUND_FACTORS))
     unfinished = [c for c in costs.all if c.fault]
     done = f"{len(costs.all) - len(unfinished)} of {len(costs.all)} runs"
     return [*said, ("every mesh finishes, plastic ones included", done, not unfinished)]

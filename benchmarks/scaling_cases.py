@@ -12,6 +12,7 @@ from archord.solver.scene import JointGeometry, Scene, SceneError
 
 ELASTIC = (5_000, 30_000, 100_000, 300_000, 1_000_000)  # dofs
 PLASTIC = (5_000, 30_000, 100_000)
+UNGUIDED = {False: (30_000, 100_000), True: (30_000,)}  # dofs by whether plastic
 WEAK = (30_000, 100_000, 300_000)  # dofs per rank
 ELASTIC_STEPS, PLASTIC_STEPS = 2, 5
 YIELD_STRESS = 0.002  # over E*
@@ -22,24 +23,30 @@ _DOFS_PER_CELL = 4.15  # expected, of fine meshes: two nodes a triangle, and gms
 
 @dataclass(frozen=True)
 class Case:
-    """The joint with about ``dofs`` unknowns, elastic or ``plastic``, on ``ranks`` ranks; ``weak``: only to compare
-    with a mesh smaller by the number of ranks."""
+    """The joint with about ``dofs`` unknowns, elastic or ``plastic``, on ``ranks`` ranks.
+
+    ``weak``: only to compare with a mesh smaller by the number of ranks; not ``guided``: to show what a coarse start
+    saves.
+    """
 
     dofs: int
     ranks: int
     plastic: bool = False
     weak: bool = False
+    guided: bool = True
 
     @property
     def name(self) -> str:
-        """Material, size and ranks."""
-        return f"{'plastic' if self.plastic else 'elastic'}_{self.dofs}_on_{self.ranks}"
+        """Material, size and ranks, and whether there is no coarse start."""
+        material, alone = "plastic" if self.plastic else "elastic", "" if self.guided else "_unguided"
+        return f"{material}_{self.dofs}_on_{self.ranks}{alone}"
 
     def scene(self) -> Scene:
         """The joint to solve."""
         size, growth = refined(self.dofs)
         steps, strength = (PLASTIC_STEPS, YIELD_STRESS) if self.plastic else (ELASTIC_STEPS, None)
-        return paper_joint(size, steps, strength, joint={"element_size": size, "growth": growth})
+        joint, analysis = {"element_size": size, "growth": growth}, {"coarse_start": self.guided}
+        return paper_joint(size, steps, strength, joint=joint, analysis=analysis)
 
 
 def refined(dofs: float) -> tuple[float, float]:
@@ -57,7 +64,10 @@ def refined(dofs: float) -> tuple[float, float]:
 
 def cases(largest: float, ranks: Sequence[int]) -> list[Case]:
     """All runs up to ``largest`` dofs, the smallest first: every size on every number of ``ranks``, the weak series on
-    several, the plastic series on one. Raises `SceneError` if no size is left, or ``ranks`` do not begin with 1."""
+    several, the plastic series and runs without a coarse start on one.
+
+    Raises `SceneError` if no size is left, or ``ranks`` do not begin with 1.
+    """
     if largest < ELASTIC[0]:
         raise SceneError(f"--largest {largest:g}: must be at least {ELASTIC[0]}, the dofs of the smallest mesh.")
     if not ranks or ranks[0] != 1 or sorted(set(ranks)) != list(ranks):
@@ -74,4 +84,5 @@ def cases(largest: float, ranks: Sequence[int]) -> list[Case]:
         if n * r <= largest and n * r not in sizes and n in sizes
     ]
     chosen += [Case(n, 1, plastic=True) for n in PLASTIC if n <= largest]
+    chosen += [Case(n, 1, plastic, guided=False) for plastic, sizes in UNGUIDED.items() for n in sizes if n <= largest]
     return sorted(chosen, key=lambda case: case.dofs * (PLASTIC_STEPS if case.plastic else 1))

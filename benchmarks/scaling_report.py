@@ -36,6 +36,7 @@ def row(cost: Cost) -> dict[str, str]:
         "ranks": str(case.ranks),
         "dofs": str(cost.dofs or ""),
         "iterations": str(cost.iterations or ""),
+        "coarse iterations": str(cost.coarse_iterations or ""),
         "factorisations": str(cost.factorisations or ""),
         "evaluations": str(cost.evaluations or ""),
         "P/(E* R)": f"{cost.force:.10g}" if finished else "",
@@ -56,6 +57,7 @@ def markdown(costs: Costs) -> str:
         ("Strong scaling", _strong(costs)),
         ("Weak scaling", _weak(costs)),
         ("Elastic-plastic, 1 rank", _cost(costs.series(1, plastic=True))),
+        ("What a coarse start saves, 1 rank", _guided(costs)),
         ("Extrapolation", _extrapolation(costs)),
     ):
         if lines:
@@ -78,17 +80,20 @@ def _cost(series: list[Cost]) -> list[str]:
         linear = c.seconds["linear solve"]
         rows.append(
             [
-                *(str(count) for count in (c.dofs, c.iterations, c.factorisations)),
+                *(str(count) for count in (c.dofs, c.iterations, c.coarse_iterations, c.factorisations)),
                 *(f"{seconds:.1f}" for seconds in (c.total, linear)),
                 f"{linear / c.factorisations:.3f}",
                 f"{c.seconds['mesh'] + c.seconds['setup']:.1f}",
                 f"{c.contact_share:.1%}",
+                f"{c.share_around_factors:.0%}",
                 f"{c.peak / _MEGA:.0f}",
                 power,
             ]
         )
-    headings = ("dofs N", "iterations", "factorisations", "seconds", "linear solve [s]", "per factorisation [s]",
-                "mesh and setup [s]", "contact", "peak memory [MB]", "power of N since the line before")  # fmt: skip
+    headings = ("dofs N", "iterations", "on coarser meshes", "factorisations", "seconds", "linear solve [s]",
+                "per factorisation [s]", "mesh and setup [s]", "contact",
+                "contact, assembly and return map in the solve", "peak memory [MB]",
+                "power of N since the line before")  # fmt: skip
     lines = _table(headings, rows)
     if len(series) > 1:
         n = [c.dofs for c in series]
@@ -145,6 +150,23 @@ def _weak(costs: Costs) -> list[str]:
     headings = ("dofs on 1 rank", "dofs", "ranks", "seconds on 1 rank", "seconds", "efficiency",
                 "of one factorisation", "peak memory on 1 rank [MB]", "per rank [MB]")  # fmt: skip
     return _table(headings, rows)
+
+
+def _guided(costs: Costs) -> list[str]:
+    """Runs with and without a coarse start side by side."""
+    rows = [
+        [
+            "plastic" if c.case.plastic else "elastic",
+            *(str(count) for count in (c.dofs, alone.iterations, c.iterations, c.coarse_iterations)),
+            *(f"{seconds:.1f}" for seconds in (alone.total, c.total)),
+            f"{alone.total / c.total:.2f}",
+            f"{abs(alone.force / c.force - 1):.1e}",
+        ]
+        for c, alone in costs.unguided()
+    ]
+    headings = ("material", "dofs", "iterations without", "with", "on coarser meshes", "seconds without", "with",
+                "times faster", "difference of P")  # fmt: skip
+    return _table(headings, rows) if rows else []
 
 
 def _extrapolation(costs: Costs) -> list[str]:

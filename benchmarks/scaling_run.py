@@ -45,6 +45,7 @@ class Cost:
     seconds: dict[str, float] = field(default_factory=dict)
     memory: list[int] = field(default_factory=list)
     iterations: int = 0
+    coarse_iterations: int = 0
     factorisations: int = 0
     evaluations: int = 0
     force: float = 0.0
@@ -53,6 +54,12 @@ class Cost:
     def contact_share(self) -> float:
         """Part of the time that the contact takes, evaluation and assembly."""
         return self.seconds["contact"] / self.total
+
+    @property
+    def share_around_factors(self) -> float:
+        """Part of the solve that is not the linear solver's: contact search, assembly, return map."""
+        around = self.seconds["contact"] + self.seconds["bulk"]
+        return around / (around + self.seconds["linear solve"])
 
     @property
     def peak(self) -> int:
@@ -108,6 +115,7 @@ def read_cost(case: Case, report: dict[str, Any], total: float) -> Cost:
         seconds=seconds,
         memory=report["peak_memory"],
         iterations=totals["newton_iterations"],
+        coarse_iterations=sum(step["coarse_iterations"] for step in report["steps"]),
         factorisations=totals["factorisations"],
         evaluations=totals["residual_evaluations"],
         force=report["steps"][-1]["P"] / model["E_star"],

@@ -42,7 +42,7 @@ def gmsh_to_mesh(
     ``key`` says all that enters ``build`` and ``adjust``; a mesh that `MESHES` keeps by the same key is used again.
     """
     model, failure = None, None
-    known = MESHES.find((*key, order)) if comm.rank == 0 and key else None
+    known = MESHES.find((*key, order, refinements)) if comm.rank == 0 and key else None
     if comm.rank == 0 and known is None:
         try:
             import gmsh
@@ -77,7 +77,7 @@ def gmsh_to_mesh(
     if model is not None:
         gmsh.finalize()
         if isinstance(asked, Answers):
-            MESHES.keep((*key, order), asked)
+            MESHES.keep((*key, order, refinements), asked)
     mesh.geometry.x[:] *= scale
     return mesh, cells, facets
 

@@ -73,6 +73,6 @@ def half_ring(
         radii = {Facets.PIN_ARC: 1.0, Facets.HOLE_ARC: hole, Facets.BLOCK_HELD: outer}
         return on_circle(x, (0.0, 0.0), radii[Facets(tag)]) if tag in radii else x
 
+    key = ("half ring", hole, outer, size, growth, core, size_ratio)
     options = {"order": degree, "scale": radius, "refinements": refinements, "partitioner": partitioner}
-    key = ("half ring", hole, outer, size, growth, core, size_ratio, refinements)
     return JointMesh(*gmsh_to_mesh(comm, build, exact, **options, key=key))

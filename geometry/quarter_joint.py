@@ -86,6 +86,6 @@ def quarter_joint(
             return on_circle(x, (0.0, 1 - hole), 1.0)
         return on_circle(x, (0.0, 0.0), hole) if tag == Facets.HOLE_ARC else x
 
-    shape = (hole, width, size, growth, size_ratio, edge and (edge[0], edge[1] / radius), rigid_pin, refinements)
+    key = ("quarter joint", hole, width, size, growth, size_ratio, edge and (edge[0], edge[1] / radius), rigid_pin)
     options = {"order": degree, "scale": radius, "refinements": refinements, "partitioner": partitioner}
-    return JointMesh(*gmsh_to_mesh(comm, build, exact, **options, key=("quarter joint", *shape)))
+    return JointMesh(*gmsh_to_mesh(comm, build, exact, **options, key=key))

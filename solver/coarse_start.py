@@ -25,8 +25,8 @@ _FEWEST_POINTS = 30  # in contact: of a contact of few coarse elements nothing c
 
 
 def coarse_start(joint: Joint) -> CoarseStart | None:
-    """The coarse start of ``joint``; None where the joint itself is coarse enough. Collective."""
-    if joint.n_dofs < _FEWEST_DOFS:
+    """The coarse start of ``joint``; None where that is coarse enough itself, or goes without. Collective."""
+    if joint.n_dofs < _FEWEST_DOFS or not joint.scene.analysis.coarse_start:
         return None
     with joint.timer("coarse start"):
         coarse = Joint(_coarser(joint.scene), joint.comm)

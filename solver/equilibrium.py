@@ -47,7 +47,7 @@ class Equilibrium:
     ``rigid_rate`` moves a rigid pin with the level; ``applied`` are nodal forces ``(n_owned, 2)`` per unit of load.
     The level is the load, or with ``by_force`` what makes the forces of supports and rigid pin, along their rates,
     sum up to ``by_force`` times the load. ``load_name`` is for messages, ``travel`` the displacement to be expected,
-    which limits what counts as round-off: an iterate that flew away is none.
+    which limits what counts as round-off: an iterate that flew away is none. ``condense`` as for `TangentMatrix`.
     """
 
     def __init__(
@@ -62,6 +62,7 @@ class Equilibrium:
         by_force: float | None = None,
         load_name: str = "delta",
         travel: float = np.inf,
+        condense: bool = False,
         timer: Timer | None = None,
     ) -> None:
         self.V, self.bulk, self.contact = V, bulk, contact
@@ -89,7 +90,7 @@ class Equilibrium:
         materials = [body.material for body in bulk.bodies]
         stiffness = max(float(elastic_tangent(m.E, m.nu, m.plane)[0, 0]) for m in materials)
         self._stiffest, self._travel = stiffness, travel
-        self.tangent = TangentMatrix(V, bulk, contact, self.fixed, self.rate, rigid_rate, self.timer)
+        self.tangent = TangentMatrix(V, bulk, contact, self.fixed, self.rate, rigid_rate, self.timer, condense=condense)
         self.border: Bordered | None = None
         if by_force is not None:
             self.border = Bordered(self.comm, self.tangent.A, stiffness)

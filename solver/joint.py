@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from archord.solver.coarse_start import CoarseStart
 
 SIDES = ("pin", "hole")
+_MOST_CONDENSED = 8_000  # dofs
+_LARGE_GAMMA = 5.0
 
 
 class Joint:
@@ -76,6 +78,7 @@ class Joint:
                 by_force=0.5 if scene.force_controlled and geometry.model == "block" else None,
                 load_name="P" if scene.force_controlled else "delta",
                 travel=self._travel(),
+                condense=self._condensable(),
                 timer=self.timer,
             )
             self.solver = NewtonSolver(
@@ -91,6 +94,13 @@ class Joint:
             return half_ring(self.comm, *sizes, self.scene.load.core_radius * g.radius, **options)
         edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
         return quarter_joint(self.comm, *sizes, edge=edge, rigid_pin=self.scene.pin.rigid, **options)
+
+    def _condensable(self) -> bool:
+        """Whether the linear systems shrink to the contact (`condensed`): the bodies are elastic and held, the mesh is
+        small (the work on contact dofs grows faster than a factorisation), gamma leaves the small system regular."""
+        held = self.scene.joint.model == "block" and not self.scene.force_controlled
+        small = self.comm.size == 1 and self.n_dofs < _MOST_CONDENSED
+        return held and small and not self.bulk.plastic and self.scene.analysis.gamma_factor <= _LARGE_GAMMA
 
     def _core_force(self) -> Array:
         """Downward nodal forces ``(n_owned, 2)`` of half a unit force, spread over the core as ``1 - (r/core)^2``."""
@@ -154,6 +164,11 @@ class Joint:
         ring = self.scene.joint.model == "ring"
         pin = self.equilibrium.load if ring else 2 * self.equilibrium.force_on_level()
         return {"pin": pin, "contact": contact, "block": block}
+
+    @property
+    def tangent_factorisations(self) -> int:
+        """Number of sparse factorisations so far."""
+        return self.equilibrium.tangent.factorisations
 
     @property
     def n_dofs(self) -> int:

@@ -81,20 +81,21 @@ class NewtonSolver:
         snes = PETSc.SNES().create(self.comm)
         snes.setOptionsPrefix("archord_")
         snes.setType("newtonls")
-        border, A = self.equilibrium.border, self.equilibrium.tangent.A
+        tangent = self.equilibrium.tangent
+        system = self.equilibrium.border or tangent.condensed
         self._x = self.equilibrium.vector()
         snes.setFunction(self._guarded(self._residual), self._x.duplicate())
-        snes.setJacobian(self._guarded(self._jacobian), A if border is None else border.matrix)
+        snes.setJacobian(self._guarded(self._jacobian), tangent.A if system is None else system.matrix)
         snes.setTolerances(max_it=self.max_iterations)
         snes.setConvergenceTest(self._test)
         ksp = snes.getKSP()
-        if border is None:
-            direct_solver(ksp, A)
+        if system is None:
+            direct_solver(ksp, tangent.A)
         else:
             ksp.setType("preonly")
-            ksp.setOperators(border.matrix)
+            ksp.setOperators(system.matrix)
             ksp.getPC().setType("python")
-            ksp.getPC().setPythonContext(border)
+            ksp.getPC().setPythonContext(system)
         options = PETSc.Options("archord_")
         options["snes_linesearch_type"] = "bt"
         options["snes_linesearch_max_it"] = 8
@@ -121,14 +122,16 @@ class NewtonSolver:
             self._failure = str(error)
             f.set(np.nan)
             return
-        if renewed and self.equilibrium.border is None:
-            self._snes.setJacobian(self._guarded(self._jacobian), self.equilibrium.tangent.A)
+        tangent = self.equilibrium.tangent
+        if renewed and self.equilibrium.border is None and tangent.condensed is None:
+            self._snes.setJacobian(self._guarded(self._jacobian), tangent.A)
         self._renewed |= renewed
 
     def _jacobian(self, snes, x, A, P) -> None:
         if not self._close():
+            before = self.equilibrium.tangent.factorisations
             self.equilibrium.update_tangent()
-            self._factorisations += 1
+            self._factorisations += self.equilibrium.tangent.factorisations - before
             self._renewed = False
 
     def _close(self) -> bool:

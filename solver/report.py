@@ -112,7 +112,7 @@ class Report:
         return {
             "newton_iterations": sum(m.iterations for m in self.measures),
             "cutbacks": sum(m.cutbacks for m in self.measures),
-            "factorisations": counts.get("assemble bulk", 0) + before.get("factorisations", 0),
+            "factorisations": self.joint.tangent_factorisations + before.get("factorisations", 0),
             "residual_evaluations": counts.get("return mapping", 0) + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.measures),
         }

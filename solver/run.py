@@ -16,6 +16,7 @@ from archord.solver.coarse_start import coarse_start
 from archord.solver.contact_file import ContactWriter
 from archord.solver.contact_profile import ArcProfile
 from archord.solver.disk import WriteError, naming, on_root, replace_text
+from archord.solver.half_compiled import forget_half_compiled
 from archord.solver.history import History
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.joint import Joint
@@ -81,7 +82,7 @@ def solve_scene(
     begun = perf_counter() if begun is None else begun
     with ExitStack() as stack:
         on_root(comm, lambda: stack.enter_context(occupied(folder)) or True)
-        joint = Joint(scene, comm, timer=timer)
+        joint = _joint(scene, comm, timer)
         on_start(joint)
         output = _Output(folder, joint, begun)
         status, message, failed, received = "done", "", None, 0
@@ -117,6 +118,16 @@ def solve_scene(
         except WriteError as error:
             status, message, warnings = "stopped", message if status == "stopped" else str(error), []
         return Outcome(folder, status, message, output.steps, warnings, received)
+
+
+def _joint(scene: Scene, comm: MPI.Comm, timer: Timer | None) -> Joint:
+    """The joint of ``scene``, though a kill may have left its forms half compiled. Collective."""
+    try:
+        return Joint(scene, comm, timer=timer)
+    except (TimeoutError, RuntimeError) as error:
+        if not forget_half_compiled(str(error)):
+            raise
+    return Joint(scene, comm, timer=timer)
 
 
 class _Output:

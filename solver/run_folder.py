@@ -14,11 +14,13 @@ from archord.solver.scene import SceneError
 FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
 DEBUG = ("debug.xdmf", "debug.h5")
 CHECKPOINT = "checkpoint.h5"
+# drawn later, from a run's files
+PICTURES = ("picture.png", "force.png", "pressure.png", "field.png", "iterations.png")
 
 
 def clear(folder: Path) -> None:
     """Remove an old run's files, and what a kill left half done of them. Raises `OSError`."""
-    for name in (CHECKPOINT, *FILES, *DEBUG):
+    for name in (CHECKPOINT, *FILES, *DEBUG, *PICTURES):
         (folder / name).unlink(missing_ok=True)
         new_name(folder / name).unlink(missing_ok=True)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -235,6 +235,10 @@ class Analysis(_Section):
         le=1e6,
     )
     degree: Literal[2, 3] = _key("polynomial degree of displacements and of the curved geometry", default=2)
+    coarse_start: bool = _key(
+        "take the guess for every step from a coarser mesh, where the mesh is fine; false is for comparison",
+        default=True,
+    )
     tolerance: float = _key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
     max_iterations: int = _key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
 
@@ -327,8 +331,25 @@ class Output(_Section):
     fields: bool = _key("write the fields of every step to fields.xdmf and fields.h5", default=True)
 
 
-class Scene(_Section):
-    """A pin joint and how to load it."""
+class _Checked(type(BaseModel)):  # type: ignore[misc]
+    """Calls of the class are checked like a scene file, so that faults are the same sentences."""
+
+    def __call__(cls, **sections: Any) -> Any:
+        from archord.solver.scene_sections import scene_from
+
+        return scene_from(sections)
+
+
+class Scene(_Section, metaclass=_Checked):
+    """A pin joint and how to load it.
+
+    ``Scene(joint={"radius": 10.0, "clearance": 0.05}, ...)`` makes one from sections, tables or their classes. Raises
+    `SceneError`, a sentence for each fault.
+    """
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **sections: Any) -> None: ...
 
     format: Literal[1] = _key("version of the scene format; a scene of a newer version is refused", default=FORMAT)
     units: Units = Field(default_factory=Units, description="names of the units")

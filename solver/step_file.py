@@ -48,9 +48,12 @@ class StepFile:
     def create(cls, path: Path, steps: int, shapes: Shapes, fixed: dict[str, np.ndarray]) -> StepFile:
         """A new file with room for ``steps`` steps of arrays of ``shapes``, and the ``fixed`` arrays. Raises
         `OSError`."""
-        layout, _ = _layout(steps, shapes, fixed)
+        layout, offset = _layout(steps, shapes, fixed)
         replace_file(path, layout.pieces, layout.size)
-        return cls(path)
+        file = cls.__new__(cls)  # as it would read itself
+        file.path, file.steps, file.accepted, file.loads = path, steps, 0, []
+        file.shapes, file._offset, file._fixed = shapes, offset, list(fixed)
+        return file
 
     def grow(self, steps: int) -> None:
         """Make room for at least ``steps`` steps; what is there stays. Raises `OSError`."""
@@ -182,25 +185,21 @@ class _Layout(io.RawIOBase):
 def _layout(steps: int, shapes: Shapes, fixed: dict[str, np.ndarray]) -> tuple[_Layout, dict[str, int]]:
     """The file before its first step, and where the data of load, accepted and all steps go."""
     layout, offset = _Layout(), {}
+    # space without touching it: fields of many steps would take long to fill with zeros
+    reserved = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    reserved.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    reserved.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
     with h5py.File(layout, "w") as file:
         for name, values in fixed.items():
             file[name] = values
         file["accepted"] = np.int64(0)
         file["load"] = np.zeros(steps)
         for name, (shape, dtype) in shapes.items():
-            group = file.require_group(name)
+            place = file.require_group(name).id
+            kind, space = h5py.h5t.py_create(np.dtype(dtype)), h5py.h5s.create_simple(shape)
             for step in range(1, steps + 1):
-                offset[f"{name}/{step_name(step)}"] = _allocate(group, step_name(step), shape, dtype)
+                dataset = h5py.h5d.create(place, step_name(step).encode(), kind, space, dcpl=reserved)
+                offset[f"{name}/{step_name(step)}"] = dataset.get_offset()
         file.flush()  # gives the small ones their place
         offset |= {name: file[name].id.get_offset() for name in ("load", "accepted")}
     return layout, offset
-
-
-def _allocate(group: h5py.Group, name: str, shape: tuple[int, ...], dtype: str) -> int:
-    """Reserve space and tell where, without touching it (fields of many steps would take long to fill with zeros)."""
-    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-    space = h5py.h5s.create_simple(shape)
-    dataset = h5py.h5d.create(group.id, name.encode(), h5py.h5t.py_create(np.dtype(dtype)), space, dcpl=properties)
-    return dataset.get_offset()

@@ -11,6 +11,7 @@ from archord.geometry.basis import Array
 from archord.geometry.fenicsx import create_vector
 from archord.solver.bordered import Bordered
 from archord.solver.bulk import Bulk, assemble, matrix
+from archord.solver.condensed import Condensed
 from archord.solver.contact import Contact
 from archord.solver.timer import Timer
 
@@ -19,7 +20,8 @@ class TangentMatrix:
     """``A``, of the last evaluation of ``bulk`` and ``contact``, assembled by `update`. Collective.
 
     ``fixed`` ``(n_local, 2)`` are the prescribed displacements, ``rate`` what they are per unit of the level, and
-    ``rigid_rate`` ``(2,)`` that of a rigid pin.
+    ``rigid_rate`` ``(2,)`` that of a rigid pin. With ``condense``, for elastic bodies on one rank which their supports
+    hold, ``A`` is that of the bulk, and the contact is in ``condensed``.
     """
 
     def __init__(
@@ -31,19 +33,27 @@ class TangentMatrix:
         rate: Array,
         rigid_rate: Array | None,
         timer: Timer,
+        *,
+        condense: bool = False,
     ) -> None:
         self.V, self.bulk, self.contact, self.timer = V, bulk, contact, timer
         self.comm, self._index_map = V.mesh.comm, V.dofmap.index_map
         self._fixed, self._rate, self._rigid_rate = fixed, rate, rigid_rate
         self._bcs = _scalar_bcs(V, fixed)
         self._contact_blocks = np.zeros((0, 2, 2))
+        self.factorisations = 0  # of sparse matrices, asked for by `update`
+        self.condensed: Condensed | None = None
+        self._condense = condense
         self.renew()
 
     def renew(self) -> None:
         """Allocate the matrix with every slot that bulk and contact may fill, and assemble the constant part."""
+        if self.condensed is not None:
+            self._find_contact()
+            return
         n, start = self._index_map.size_local, self._index_map.local_range[0]
         slots = None
-        if self.contact is not None:
+        if self.contact is not None and not self._condense:
             rows, columns = self.contact.pattern()
             mine = (rows >= start) & (rows < start + n)
             slots = rows[mine], columns[mine]
@@ -61,13 +71,18 @@ class TangentMatrix:
         self.bulk.assemble_elastic(A, self._bcs)
         A.assemble()
         self.A = A
-        self._elastic = A.copy()
+        if self._condense:
+            assert self.contact is not None
+            self.condensed = Condensed(A, np.unique(np.concatenate([side.curve_dofs for side in self.contact.sides])))
+        else:
+            self._elastic = A.copy()
         self._find_contact()
 
     def destroy(self) -> None:
-        """Free the matrices, before `renew` or for good."""
-        self.A.destroy()
-        self._elastic.destroy()
+        """Free the matrices, before `renew`."""
+        if self.condensed is None:
+            self.A.destroy()
+            self._elastic.destroy()
 
     def _find_contact(self) -> None:
         """Which contact slots are free ``(n, 2, 2)``, and the rates of their rows and columns ``(n, 2)``; a rigid pin
@@ -94,6 +109,10 @@ class TangentMatrix:
 
     def update(self) -> None:
         """Assemble ``A``."""
+        if self.condensed is not None:
+            self._update_condensed(self.condensed)
+            return
+        self.factorisations += 1
         with self.timer("assemble bulk"):
             self._elastic.copy(self.A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             self.bulk.assemble_softening(self.A, self._bcs)
@@ -102,6 +121,16 @@ class TangentMatrix:
                 self._contact_blocks = self.contact.tangent.blocks()
                 self._add_contact(self.contact.tangent.rows, self.contact.tangent.columns)
             self.A.assemble()
+
+    def _update_condensed(self, condensed: Condensed) -> None:
+        assert self.contact is not None
+        self.factorisations = 1
+        with self.timer("assemble contact"):
+            tangent = self.contact.tangent
+            self._contact_blocks = tangent.blocks()
+            kept = np.flatnonzero(self._contact_blocks.any(axis=(1, 2)) & self._in_matrix)
+            blocks = self._contact_blocks[kept] * self._free[kept]
+        condensed.update(tangent.rows[kept], tangent.columns[kept], blocks)
 
     def _add_contact(self, rows: np.ndarray, columns: np.ndarray) -> None:
         """Add the contact's blocks to ``A``, nothing to those of prescribed displacements and of a rigid pin."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import gc
 import json
-import re
 import time
 import traceback
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from archord.solver.disk import replace_text
+from archord.solver.half_compiled import forget_half_compiled
 from archord.solver.interrupt import Interrupted
 from archord.solver.run_folder import claim_folder
 from archord.solver.scene import Scene, SceneError
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 FAILURE = "failure.txt"  # what raised in a case that failed: a sentence, and the traceback
 ENDED = ("done", "stopped", "failed")
-_JIT_WAIT = 9.0  # seconds; ffcx waits 10 for another process to compile a form before it gives up
 _PATIENCE = 20.0  # seconds that the ranks of a group wait for each other after an error
 
 
@@ -114,7 +113,7 @@ def _solve(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], in
                 return Result(folder.name, "busy", str(error))
             fault: Exception = error
         except (TimeoutError, RuntimeError) as error:
-            if not _forget_half_compiled(str(error)):
+            if not forget_half_compiled(str(error)):
                 return _failed(folder, comm, error)
             fault = error
         except Exception as error:
@@ -166,22 +165,3 @@ def _failed(folder: Path, comm: MPI.Comm, error: Exception) -> Result:
             print(f"archord: {folder.name}: {sentence}, on one rank of several.", flush=True)
             MPI.COMM_WORLD.Abort(1)
     return Result(folder.name, "failed", sentence)
-
-
-def _forget_half_compiled(said: str) -> bool:
-    """Whether ``said`` is ffcx's complaint about a form whose compilation never ended, as a kill leaves it; removes it.
-
-    Unless another process has just begun to compile it anew.
-    """
-    if "JIT compilation timed out" not in said:
-        return "just-in-time compilation" in said  # another rank of the group saw it, and removes it
-    named = re.search(r"remove (.*?)\)", said)
-    if named is None:
-        return False
-    path = Path(named[1])
-    try:
-        if time.time() - path.stat().st_mtime > _JIT_WAIT:
-            path.unlink()
-    except OSError:
-        pass
-    return True

@@ -146,7 +146,7 @@ def test_results_that_cannot_be_written(folder, monkeypatch, capsys, arguments, 
         ("history.csv", "step,delta\n1", "run/history.csv: cannot be read as the history of a run."),
         ("history.csv", "delta,P,p0,eps,peeq_max\n1,nan,1,1,0\n", "run/history.csv: holds numbers that are not "),
         ("scene.toml", "[joint", "run/scene.toml: is not valid TOML"),
-        ("fields.h5", "", "run: fields.h5 or contact.h5 cannot be read"),
+        ("fields.h5", "", "run/fields.h5: cannot be read as the fields of a run"),
         ("contact.h5", None, "run: is not a complete run folder: contact.h5 is missing."),
     ],
 )  # fmt: skip

@@ -61,7 +61,8 @@ def test_every_size_runs_on_every_number_of_ranks_and_doubled_ones_on_two():
     found = cases(1e6, [1, 2])
     assert {(c.dofs, c.ranks) for c in found if not c.plastic} >= {(n, r) for n in ELASTIC for r in (1, 2)}
     assert {(c.dofs, c.ranks) for c in found if c.weak} == {(60_000, 2), (200_000, 2), (600_000, 2)}
-    assert [c.dofs for c in found if c.plastic] == [5_000, 30_000, 100_000]
+    assert [c.dofs for c in found if c.plastic and c.guided] == [5_000, 30_000, 100_000]
+    assert {(c.dofs, c.plastic) for c in found if not c.guided} == {(30_000, False), (100_000, False), (30_000, True)}
     assert all(c.scene().joint.expected_cells <= 1e6 for c in found)
     assert max(c.dofs for c in cases(30_000, [1])) == 30_000
 
@@ -76,15 +77,15 @@ def test_what_cannot_be_compared_is_refused(largest, ranks, said):
 def test_goals_follow_the_numbers():
     """Too steep, too much contact, a run that failed and a force that depends on the ranks are told."""
     good = Costs([cost(5_000), cost(10**6, solve=200.0), cost(5_000, 2), cost(10**6, 2, solve=100.0)])
-    assert [met for _, _, met in goals(good)] == [True] * 5
+    assert [met for _, _, met in goals(good)] == [True] * 6
     assert not good.faults()
     bad = [
         cost(5_000),
-        cost(50_000, solve=1e3),
+        cost(50_000, solve=1e3, contact=500.0),
         cost(5_000, 2, contact=9.0),
         Cost(Case(50_000, 2), fault="exit code 3: no"),
     ]
-    assert [met for _, _, met in goals(Costs(bad))] == [False, True, False, False]
+    assert [met for _, _, met in goals(Costs(bad))] == [False, True, False, False, False]
     assert Costs(bad).faults() == ["elastic_50000_on_2: exit code 3: no"]
     shifted = Cost(**{**vars(cost(5_000, 2)), "force": 0.0129})
     assert "P differs" in Costs([cost(5_000), shifted]).faults()[0]

@@ -1,6 +1,8 @@
 """What a run leaves on disk."""
 
 import json
+import os
+import time
 
 import h5py
 import meshio
@@ -9,9 +11,10 @@ import pytest
 from mpi4py import MPI
 
 from archord.postprocess.picture import draw
+from archord.solver import run as run_module
 from archord.solver.history import read_history
 from archord.solver.run import solve_scene
-from archord.solver.run_folder import CHECKPOINT, FILES, claim_folder
+from archord.solver.run_folder import CHECKPOINT, FILES, PICTURES, claim_folder
 from archord.solver.scene import SceneError
 from archord.solver.scene_file import load_scene
 from tests.solver.solving import scene
@@ -262,3 +265,36 @@ def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):
     assert said == [True, True, False, False]
     assert error[0] > 0.1
     assert error[2] < 0.01
+
+
+def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(tmp_path, monkeypatch):
+    """ffcx waits for a file that nobody will write, and names it: it is removed, if it is nobody's work any more."""
+    half = tmp_path / "libffcx_forms_0.c"
+    half.touch()
+    true_joint, tried = run_module.Joint, []
+
+    def joint(*arguments, **named):
+        tried.append(half.exists())
+        if half.exists():
+            raise TimeoutError(f"JIT compilation timed out, probably ... (e.g. remove {half}) or increase timeout.")
+        return true_joint(*arguments, **named)
+
+    monkeypatch.setattr(run_module, "Joint", joint)
+    for age, found in ((0, [True, True]), (1000, [True, False])):
+        tried.clear()
+        os.utime(half, (time.time() - age,) * 2)
+        folder = tmp_path / str(age)
+        folder.mkdir()
+        if age:
+            assert run_module.solve_scene(scene(0.3, 1), folder, MPI.COMM_SELF).status == "done"
+        else:
+            with pytest.raises(TimeoutError):
+                run_module.solve_scene(scene(0.3, 1), folder, MPI.COMM_SELF)
+        assert tried == found
+
+
+def test_a_new_run_removes_the_pictures_of_the_old_one(tmp_path):
+    for name in (*PICTURES, "notes.txt"):
+        (tmp_path / name).touch()
+    run_module.solve_scene(scene(0.3, 1), tmp_path, MPI.COMM_SELF)
+    assert [name for name in (*PICTURES, "notes.txt") if (tmp_path / name).exists()] == ["notes.txt"]

@@ -1,0 +1,192 @@
+"""``archord show``, ``compare`` and ``export``: what runs and sweeps hold, in tables, pictures and other formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from archord.plain_typer import typer
+
+_WIDE = 10_000  # characters
+
+if TYPE_CHECKING:
+    from archord.postprocess.run_result import Run
+    from archord.postprocess.sweep_result import Sweep
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this file to ``app``."""
+    app.command()(show)
+    app.command()(compare)
+    app.command()(export)
+
+
+def show(
+    folder: Annotated[Path, typer.Argument(metavar="RUN|SWEEP", help="folder of a run or of a sweep")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for the pictures [the run's]")
+    ] = None,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="draw pictures, too")] = True,
+) -> int:
+    """Print a run's joint, state, history, peaks, cost and warnings, or a sweep's cases; and draw them.
+
+    The pictures of a run are force.png, pressure.png, field.png and iterations.png.
+    """
+    from archord.postprocess.sweep_result import Sweep, is_sweep
+
+    if is_sweep(folder):
+        return _show_sweep(Sweep(folder), output or folder, pictures)
+    from archord.postprocess.run_result import Run
+
+    return _show_run(Run(folder), output or folder, pictures)
+
+
+def _show_run(run: Run, target: Path, pictures: bool) -> int:
+    from archord.postprocess import run_tables
+
+    files, left_out = [], ["no picture: no step was accepted."]
+    if pictures and run.steps:
+        from archord.postprocess.export_files import make_folder
+        from archord.postprocess.run_pictures import draw_run
+
+        make_folder(target)
+        files, left_out = draw_run(run, target)
+    console = wide_console()
+    print(run_tables.state_line(run))
+    print()
+    print(run_tables.paragraph(run_tables.joint_lines(run)))
+    if run.steps:
+        print()
+        console.print(run_tables.history_table(run), markup=False)
+        if run.steps > run_tables.MOST_ROWS:
+            print(f"{run_tables.MOST_ROWS} of {run.steps} steps; {run.folder / 'history.csv'} has all of them")
+        print()
+        print(run_tables.paragraph(run_tables.peak_lines(run)))
+    print()
+    print(run_tables.paragraph(run_tables.cost_lines(run)))
+    if pictures:
+        print()
+        for sentence in left_out:
+            print(sentence)
+        for file in files:
+            print(file)
+    return 0
+
+
+def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
+    from archord.postprocess import sweep_tables
+
+    files, left_out = [], "no picture: no case has an accepted step."
+    if pictures and sweep.runs:
+        from archord.postprocess.export_files import make_folder
+        from archord.postprocess.sweep_picture import draw_sweep
+
+        make_folder(target)
+        file, left_out = draw_sweep(sweep, target / "sweep.png")
+        files = [file]
+    print(sweep_tables.state_line(sweep))
+    if constant := sweep_tables.constant_line(sweep):
+        print(constant)
+    print()
+    wide_console().print(sweep_tables.case_table(sweep, sweep_tables.winkler_coefficients(sweep)), markup=False)
+    if len(sweep) > sweep_tables.MOST_ROWS:
+        print(f"{sweep_tables.MOST_ROWS} of {len(sweep)} cases; {sweep.folder / 'cases.csv'} has all of them")
+    for message in sweep_tables.messages(sweep):
+        print(message)
+    if pictures:
+        print()
+        for line in (left_out, *files):
+            if line:
+                print(line)
+    return 0
+
+
+def wide_console() -> Any:
+    """A console that leaves rows whole: on a narrow terminal long ones wrap, rather than lose digits."""
+    from rich.console import Console
+
+    return Console(highlight=False, width=_WIDE)
+
+
+def compare(
+    folders: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="run folders; the first is the measure")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="picture to draw")] = Path(
+        "comparison.png"
+    ),
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="draw the picture, too")] = True,
+) -> int:
+    """Compare runs with the first: P, p0 and eps at common displacements, scenes, cost; and draw them.
+
+    Where R, dR or E* differ, they are compared in dimensionless form, too.
+    """
+    from archord.postprocess import comparison_tables as tables
+    from archord.postprocess.comparison import compare_runs
+    from archord.postprocess.run_result import Run
+
+    comparison = compare_runs([Run(folder) for folder in folders])
+    if pictures:
+        from archord.postprocess.comparison_picture import draw_comparison
+
+        draw_comparison(comparison.runs, comparison.names, output, absolute=bool(comparison.absolute),
+                        dimensionless=bool(comparison.dimensionless))  # fmt: skip
+    console = wide_console()
+    for compared in comparison.compared:
+        console.print(tables.quantity_table(compared, comparison.names), markup=False)
+        print()
+    for note in tables.notes(comparison):
+        print(note)
+    print()
+    scenes = tables.scene_table(comparison)
+    if scenes is None:
+        print("scenes: the same in every key")
+    else:
+        console.print(scenes, markup=False)
+    print()
+    console.print(tables.run_table(comparison), markup=False)
+    if pictures:
+        print(f"\n{output}")
+    return 0
+
+
+def export(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="run folder")],
+    vtk: Annotated[
+        Path | None, typer.Option("--vtk", metavar="DIR", help="write .vtu files for each step and run.pvd into DIR")
+    ] = None,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="DIR", help="write history, contact, nodes and cells into DIR")
+    ] = None,
+    step: Annotated[
+        int | None,
+        typer.Option("--step", metavar="N", help="of the .vtu files this step alone [all]; of nodes and cells [last]"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite files that are there")] = False,
+) -> int:
+    """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything else."""
+    from archord.postprocess.run_result import Run
+    from archord.solver.scene import SceneError
+
+    if vtk is None and csv is None:
+        raise SceneError("export: give --vtk DIR, --csv DIR or both.")
+    run = Run(folder)
+    files: list[Path] = []
+    left_out: list[str] = []
+    if vtk is not None:
+        from archord.postprocess.vtk_export import export_vtk
+
+        files += export_vtk(run, vtk, step, force=force)
+    if csv is not None:
+        from archord.postprocess.csv_export import export_csv
+
+        tables, left_out = export_csv(run, csv, step, force=force)
+        files += tables
+    for line in (*left_out, *_shortened(files)):
+        print(line)
+    return 0
+
+
+def _shortened(files: list[Path]) -> list[str]:
+    """The first files and how many there are, if they are many."""
+    few = [str(file) for file in files if file.suffix != ".vtu"]
+    vtu = [file for file in files if file.suffix == ".vtu"]
+    return few + ([f"{len(vtu)} .vtu files beside it, {vtu[0].name} to {vtu[-1].name}"] if vtu else [])

@@ -1,0 +1,123 @@
+"""archord from Python: scenes, runs, and an import that costs nothing."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import archord
+from archord.progress import Progress
+
+SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")
+COARSE = {"joint.relative_element_size": 0.2, "load.steps": 2}
+SECTIONS = {
+    "joint": {"radius": 1.0, "clearance": 0.005, "element_size": 0.2},
+    "pin": {"rigid": True},
+    "block": {"E": 1.82, "nu": 0.3},
+    "load": {"displacement": 2.0, "steps": 2},
+}
+
+
+def test_importing_archord_imports_nothing():
+    """Names are there, but what they need is loaded when they are used."""
+    code = (
+        "import sys, archord; print({'load', 'solve', 'Scene', 'SceneError', 'load_scene'} <= {*dir(archord)}, "
+        "{'numpy', 'pydantic', 'mpi4py', 'pandas', 'h5py'} & {*sys.modules}); "
+        "archord.load; print({'pandas', 'mpi4py', 'dolfinx', 'scipy', 'matplotlib'} & {*sys.modules})"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert result.stdout == "True set()\nset()\n", result.stderr
+    with pytest.raises(AttributeError, match="has no attribute 'slove'"):
+        archord.slove  # noqa: B018
+
+
+def test_a_scene_from_python_is_that_of_the_file():
+    """Tables, classes of other scenes, numbers and arrays of numpy."""
+    scene = archord.load_scene(SCENE, {"load.displacement": np.linspace(0.5, 2, 4), "load.steps": None})
+    made = archord.Scene(
+        units={"length": "R", "stress": "E*"},
+        joint={"radius": np.float64(1.0), "clearance": 0.005, "relative_element_size": 0.04},
+        pin=scene.pin,
+        block={"E": 1.82, "nu": 0.3},
+        load={"displacement": np.linspace(0.5, 2, 4)},
+        output=None,
+    )
+    assert made == scene
+    assert isinstance(made, archord.Scene)
+    assert archord.load_scene(SCENE, ["load.steps=3"]) == archord.load_scene(SCENE, {"load.steps": 3})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"joint": {"radius": -1.0, "clearance": 0.1}}, "scene: joint.radius = -1.0 must be greater than 0."),
+        ({"joint": 3}, "scene: joint = 3 must be a section, [joint]."),
+        ({"blok": {}}, "scene: blok is not a known key; did you mean block? Sections are "),
+        ({"block": None}, "scene: block is missing."),
+        ({"load": {"displacement": (1.0, "x")}}, 'scene: load.displacement = [1.0, "x"]: entry 2 must be a number.'),
+        ({"load": {"path": "cycle.csv"}}, 'scene: load.path = "cycle.csv" is for scene files alone; give the list '),
+    ],
+)
+def test_faults_are_the_sentences_of_scene_files(change, said):
+    """One each, as a SceneError."""
+    with pytest.raises(archord.SceneError) as caught:
+        archord.Scene(**(SECTIONS | change))
+    assert str(caught.value).startswith(said)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_without_results_is_a_sentence(tmp_path):
+    """None there, or nothing in it."""
+    with pytest.raises(archord.SceneError, match=r"x: is not a folder; give the folder of a run or of a sweep\."):
+        archord.load(tmp_path / "x")
+    with pytest.raises(archord.SceneError, match=r"is not a run folder: scene\.toml is missing\."):
+        archord.load(tmp_path)
+
+
+@pytest.mark.mpi
+def test_solve_gives_the_run_on_every_rank(tmp_path, comm):
+    """The same object as load gives; an occupied folder is refused on all ranks."""
+    folder = comm.bcast(tmp_path / "run")
+    run = archord.solve(archord.load_scene(SCENE, COARSE), folder)
+    assert (run.status, run.steps) == ("done", 2)
+    assert run.history.equals(archord.load(folder).history)
+    assert run.fields().delta == pytest.approx(2 * 0.005, rel=1e-12)
+    with pytest.raises(archord.SceneError, match=r"is not empty; choose another folder, or overwrite .* force=True\."):
+        archord.solve(SCENE, folder)
+    comm.barrier()
+
+
+@pytest.mark.mpi
+def test_temporary_results_are_there_as_long_as_they_are_needed(comm):
+    """On one rank they go with the run."""
+    run = archord.solve(archord.Scene(**SECTIONS))
+    folder = run.folder
+    assert run.pressure()["pressure"].max() > 0
+    comm.barrier()
+    del run
+    assert folder.exists() == (comm.size > 1)
+
+
+def test_a_run_that_stops_is_given_back_with_a_warning(caplog):
+    """And is kept as it is."""
+    scene = archord.Scene(**SECTIONS, analysis={"max_iterations": 2}, stepping={"minimum": 1.0})
+    run = archord.solve(scene)
+    assert (run.status, run.steps, len(run.history)) == ("stopped", 0, 0)
+    assert "no equilibrium at delta" in run.message
+    assert run.message in caplog.text
+    with pytest.raises(archord.SceneError, match="holds no accepted step"):
+        run.pressure()
+
+
+@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="mpirun takes the signal for itself")
+def test_ctrl_c_ends_the_program_too(tmp_path, monkeypatch):
+    """A loop over scenes stops, with the accepted steps on disk."""
+    monkeypatch.setattr(Progress, "step", lambda self, m: signal.raise_signal(signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt, match="interrupted by SIGINT after step 1"):
+        archord.solve(archord.Scene(**SECTIONS), tmp_path)
+    run = archord.load(tmp_path)
+    assert (run.status, run.steps) == ("interrupted", 1)
