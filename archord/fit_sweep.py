@@ -47,7 +47,7 @@ def fit_sweep(
     from archord.postprocess.calibrated_fit import TooFewError
     from archord.postprocess.calibrated_study import study, usable
     from archord.postprocess.fitted_cases import write_cases
-    from archord.postprocess.sweep_report import case_table
+    from archord.postprocess.calibrated_report import case_table
     from archord.solver.output_file import check_output, writing
     from archord.solver.scene import SceneError
 
@@ -82,7 +82,7 @@ def fit_sweep(
         with writing(law_file):
             law_file.write_text(model.to_json(), encoding="utf-8")
     if json_file:
-        from archord.postprocess.sweep_report import as_json
+        from archord.postprocess.calibrated_report import as_json
 
         with writing(json_file):
             json_file.write_text(as_json(found.cases, found.notes, found.left_out, model), encoding="utf-8")
@@ -106,7 +106,7 @@ def fit_sweep(
 
 
 def _print_model(result, total: int) -> None:
-    from archord.postprocess.sweep_report import error_lines, formulas, worst_line
+    from archord.postprocess.calibrated_report import error_lines, formulas, worst_line
 
     model, used, held = result.model, result.used, result.held
     print(
@@ -128,7 +128,7 @@ def _print_model(result, total: int) -> None:
 
 def _stored(path: Path) -> Found:
     from archord.postprocess.fitted_cases import read_cases
-    from archord.postprocess.sweep_report import numbers_of
+    from archord.postprocess.calibrated_report import numbers_of
     from archord.solver.scene import SceneError
 
     cases, notes = read_cases(path)
