@@ -35,11 +35,14 @@ def fresh():
 def test_the_rows_are_the_design():
     """At least 200 cases, elastic and plastic, of both planes, out of a sweep file that its command prints."""
     assert (SCENES / "calibration.sweep.toml").read_text() == as_sweep()
-    assert len(CASES) >= 200
-    kinds = {(plane, yielding) for plane in ("strain", "stress") for yielding in ("none", "both", "block")}
-    assert {case.kind for case in CASES} == kinds
-    design = {(j.plane, j.yielding, round(j.alpha, 3), float(f"{j.clearance:.4g}")) for j in joints()}
-    assert {(c.plane, c.yielding, round(c.alpha, 3), float(f"{c.clearance:.4g}")) for c in CASES} <= design
+    design = joints()
+    assert len(CASES) == len(design) >= 200
+    assert {case.kind for case in CASES} == {(p, y) for p in ("strain", "stress") for y in ("none", "both", "block")}
+    for case, joint in zip(CASES, design, strict=True):
+        assert case.kind == (joint.plane, joint.yielding)
+        pin_nu = math.nan if joint.alpha == 1 else joint.pin_nu
+        found, meant = (case.alpha, case.nu, case.pin_nu, case.s), (joint.alpha, joint.nu, pin_nu, joint.s)
+        assert found == pytest.approx(meant, rel=1e-4, abs=1e-5, nan_ok=True)
 
 
 def test_the_shipped_model_is_that_of_the_shipped_rows():
