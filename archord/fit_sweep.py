@@ -45,9 +45,9 @@ def fit_sweep(
     from rich.console import Console
 
     from archord.postprocess.calibrated_fit import TooFewError
+    from archord.postprocess.calibrated_report import case_table
     from archord.postprocess.calibrated_study import study, usable
     from archord.postprocess.fitted_cases import write_cases
-    from archord.postprocess.calibrated_report import case_table
     from archord.solver.output_file import check_output, writing
     from archord.solver.scene import SceneError
 
@@ -100,9 +100,26 @@ def fit_sweep(
         print(f"model: {too_few}; the table stands alone.")
     else:
         _print_model(result, len(found.cases))
+    _print_shipped(used, found.notes)
     for file in files:
         print(file)
     return 0
+
+
+def _print_shipped(cases: list[FittedCase], notes: dict[str, str]) -> None:
+    """How good the law that comes with archord is on the ``cases`` of another sweep than its own."""
+    from archord.postprocess.calibrated_law import shipped_model
+    from archord.postprocess.calibrated_report import error_lines
+    from archord.postprocess.calibrated_study import shipped_rows
+
+    if notes.get("sweep") == shipped_model().provenance.get("sweep"):
+        return
+    rows = shipped_rows(cases)
+    if rows:
+        print("\narchord law calibrated on these cases, as far as they are in its range:\n")
+        for line in error_lines(rows):
+            print(line)
+        print()
 
 
 def _print_model(result, total: int) -> None:
@@ -127,8 +144,8 @@ def _print_model(result, total: int) -> None:
 
 
 def _stored(path: Path) -> Found:
-    from archord.postprocess.fitted_cases import read_cases
     from archord.postprocess.calibrated_report import numbers_of
+    from archord.postprocess.fitted_cases import read_cases
     from archord.solver.scene import SceneError
 
     cases, notes = read_cases(path)

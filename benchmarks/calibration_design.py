@@ -91,6 +91,16 @@ def joints() -> list[Joint]:
     return [joint for plane in PLANES for joint in _of_plane(plane)]
 
 
+def fresh(number: int, seed: int = 100) -> list[Joint]:
+    """``number`` other joints of each plane and kind in the same ranges, to judge the law by."""
+    found: list[Joint] = []
+    for plane in PLANES:
+        for yielding, stiffest in (("none", 1.0), ("both", BOTH_STIFFEST), ("block", 1.0)):
+            seed += 1
+            found += _sampled(Joint(plane, yielding), number, seed, stiffest)
+    return found
+
+
 def _of_plane(plane: Plane) -> Iterator[Joint]:
     seed = PLANES.index(plane)
     elastic = Joint(plane)
@@ -130,15 +140,15 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS}g}")
 
 
-def as_sweep(every: int = 1, element_sizes: tuple[float, ...] = (0.05,)) -> str:
-    """The sweep file: ``every`` joint, every second and so on, on meshes with ``element_sizes`` on the arcs, over R."""
+def as_sweep(chosen: list[Joint] | None = None, element_sizes: tuple[float, ...] = (0.05,)) -> str:
+    """The sweep file of all joints, or of those ``chosen``, on meshes with ``element_sizes`` on the arcs, over R."""
     from archord.solver.scene_format import toml_value
 
     rows = [
         "    { " + ", ".join(f"{key} = {toml_value(value)}" for key, value in joint.overrides().items()) + " },"
-        for joint in joints()[every // 2 :: every]
+        for joint in (joints() if chosen is None else chosen)
     ]
-    head = "" if every > 1 else _HEAD
+    head = "" if chosen else _HEAD
     parts = [head, "list = [", *rows, "]", "", _BASE.format(R=R, size=element_sizes[0])]
     if len(element_sizes) > 1:
         parts += ["[grid]", f"joint.relative_element_size = {toml_value(list(element_sizes))}", ""]
@@ -149,9 +159,15 @@ def main() -> None:
     """Print the sweep file."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--every", type=int, default=1, help="print every so many joints only [1]")
+    parser.add_argument("--fresh", type=int, metavar="N", help="print N other joints of each plane and kind instead")
     parser.add_argument("--element-size", type=float, nargs="+", default=[0.05], help="on the arcs, over R [0.05]")
     arguments = parser.parse_args()
-    print(as_sweep(arguments.every, tuple(arguments.element_size)), end="")
+    chosen = None
+    if arguments.fresh:
+        chosen = fresh(arguments.fresh)
+    elif arguments.every > 1:
+        chosen = joints()[arguments.every // 2 :: arguments.every]
+    print(as_sweep(chosen, tuple(arguments.element_size)), end="")
 
 
 if __name__ == "__main__":

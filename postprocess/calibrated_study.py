@@ -21,6 +21,7 @@ from archord.postprocess.calibrated_fit import (
     own_errors,
     split,
 )
+from archord.postprocess.calibrated_law import joint_calibrated
 from archord.postprocess.calibrated_model import SOFT, SOFT_WORDS, CalibratedModel, Form, pin_softness
 from archord.postprocess.fitted_cases import FittedCase
 
@@ -72,11 +73,7 @@ def study(cases: list[FittedCase], share: float = HELD_OUT, form: Form = FORM) -
         parts["held out"] = model_errors(model, held)
     rows: list[Row] = []
     for what, found in parts.items():
-        for kind in (*ALL_KINDS, None):
-            part = found if kind is None else found.of(kind)
-            if part.cases:
-                own = own_errors(list(part.cases)).summary().get("P", {})
-                rows.append((what, *(kind or ("both", "all")), part.summary() | {"P own": own}))
+        rows += _rows(what, found)
     said = {
         what: {f"{plane} {yielding}": found for name, plane, yielding, found in rows if name == what} for what in parts
     }
@@ -85,6 +82,28 @@ def study(cases: list[FittedCase], share: float = HELD_OUT, form: Form = FORM) -
     simpler.append((form.name, "both", "all", validated.summary()))
     simpler.append(("own k and c", "both", "all", own_errors(used).summary()))
     return Study(replace(model, errors=said), used, held, rows, simpler)
+
+
+def shipped_rows(cases: list[FittedCase]) -> list[Row]:
+    """Errors of the law that comes with archord on ``cases``, by kind, of those that are inside its range."""
+    found = [joint_calibrated(case.joint(1.0, 1.0)) for case in cases]
+    inside = [(case, law) for case, law in zip(cases, found, strict=True) if not law.outside]
+    if not inside:
+        return []
+    chosen = [case for case, _ in inside]
+    k, c = (np.array([getattr(law, name) for _, law in inside]) for name in "kc")
+    return _rows("archord's law", errors(chosen, k, c))
+
+
+def _rows(what: str, found: Errors) -> list[Row]:
+    """Summaries by kind, and of all, with what the shape of the law misses beside it."""
+    rows: list[Row] = []
+    for kind in (*ALL_KINDS, None):
+        part = found if kind is None else found.of(kind)
+        if part.cases:
+            own = own_errors(list(part.cases)).summary().get("P", {})
+            rows.append((what, *(kind or ("both", "all")), part.summary() | {"P own": own}))
+    return rows
 
 
 def _paper(cases: list[FittedCase]) -> Errors:

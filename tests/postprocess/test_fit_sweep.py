@@ -63,6 +63,10 @@ def test_a_small_sweep_gets_its_table(solved, capsys):
     assert f"left out: {cases[2].run}: hardening" in printed
     assert "elastic cases are too few for a model" in printed
     assert notes["distinct cases"] == "4"
+    judged = next(line for line in printed.splitlines() if line.startswith("| archord's law | strain | none"))
+    cells = [cell.strip() for cell in judged.split("|")]
+    assert cells[4] == "2"
+    assert float(cells[5].rstrip("%")) < 1.0
 
 
 def test_too_few_cases_write_no_law(solved, tmp_path, capsys):
