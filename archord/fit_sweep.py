@@ -225,11 +225,13 @@ def _notes(folder: Path, distinct: list[Case], cases: list[FittedCase]) -> dict[
 
     reports = [report for case in distinct if (report := report_of(of_case(case, folder)))]
     days = sorted({str(report.get("started", ""))[:10] for report in reports} - {""})
+    command = [str(word) for word in (reports[0].get("command", []) if reports else [])]
     seconds = sum(report.get("seconds", {}).get("total", 0.0) for report in reports)
     meshes = sorted({f"{case.mesh:.3g}" for case in cases})
     return {
         "archord": __version__,
         "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
+        "command": " ".join([Path(command[0]).name, *command[1:]]) if command else "unknown",
         "solved": " to ".join(dict.fromkeys((days[0], days[-1]))) if days else "unknown",
         "distinct cases": str(len(distinct)),
         "mesh": f"elements of {' and '.join(meshes)} R on the arcs",

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -179,7 +180,8 @@ class CalibratedModel:
 
     def to_json(self) -> str:
         """The model as JSON; infinite bounds are null."""
-        return json.dumps(_plain(asdict(self)), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        text = json.dumps(_plain(asdict(self)), indent=1, ensure_ascii=False, allow_nan=False)
+        return re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> CalibratedModel:

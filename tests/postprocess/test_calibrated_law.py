@@ -142,6 +142,26 @@ def test_a_strong_joint_is_elastic():
         assert P[1] == pytest.approx(P[0], rel=1e-6)
 
 
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("yielding", ["both", "block"])
+def test_everywhere_in_the_range_k_and_c_are_sensible(plane, yielding):
+    """Between those of the cases fitted, give or take a tenth: polynomials do not run away between them."""
+    random = np.random.default_rng(5)
+    same = [case for case in CASES if case.kind == (plane, yielding)]
+    k, c = ([getattr(case, name) for case in same if math.isfinite(case.told_c)] for name in ("k", "told_c"))
+    least, most = min(case.s for case in same), 1.0
+    checked = 0
+    for nu, pin_nu, ratio, s in random.uniform([0, 0, 0.5, least], [0.49, 0.49, 9, most], (200, 4)):
+        try:
+            found = calibrated(plane, nu, ratio, s, yielding, pin_nu, outside="raise")
+        except LawRangeError:
+            continue
+        assert 0.9 * min(k) < found.k < 1.1 * max(k)
+        assert 0.9 * min(c) < found.c < 1.1 * max(c)
+        checked += 1
+    assert checked > 100
+
+
 def test_k_is_smooth_up_to_a_rigid_pin():
     for kind in ({}, {"s": 0.4, "yielding": "block"}):
         stiff, rigid = (calibrated("strain", 0.3, ratio, **kind) for ratio in (1e9, math.inf))
