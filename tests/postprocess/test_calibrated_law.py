@@ -148,7 +148,7 @@ def test_everywhere_in_the_range_k_and_c_are_sensible(plane, yielding):
     """Between those of the cases fitted, give or take a tenth: polynomials do not run away between them."""
     random = np.random.default_rng(5)
     same = [case for case in CASES if case.kind == (plane, yielding)]
-    k, c = ([getattr(case, name) for case in same if math.isfinite(case.told_c)] for name in ("k", "told_c"))
+    k, c = [case.k for case in same], [case.c for case in same if math.isfinite(case.told_c)]
     least, most = min(case.s for case in same), 1.0
     checked = 0
     for nu, pin_nu, ratio, s in random.uniform([0, 0, 0.5, least], [0.49, 0.49, 9, most], (200, 4)):
