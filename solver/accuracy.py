@@ -1,8 +1,8 @@
 """A scene solved to an accuracy: on ever finer meshes, in short enough steps, until the estimated error is below it.
 
-What is estimated is the error of P at the output steps, over the largest; of delta, if the load is a force. The mesh and
-the steps of a plastic joint err independently. The steps are chosen first, where that is cheap, on the coarsest mesh;
-then meshes follow until both errors together are small enough. Each mesh is an ordinary run, and the last one stays.
+What is estimated is the error of P at the output steps, over the largest; of delta, if the load is a force. Mesh and
+steps err independently. The steps of a plastic joint are chosen first, where that is cheap, on the coarsest mesh; then
+meshes follow until both errors together are small enough. Each mesh is an ordinary run, and the last one stays.
 """
 
 from __future__ import annotations
@@ -181,8 +181,9 @@ class _Search:
         steps = outcome.steps
         if outcome.status != "done" and not outcome.unseen:
             raise _End
-        by_force = scene.force_controlled
-        curve = self.comm.bcast([m.delta if by_force else m.P for m in steps])
+        by_force, touched = scene.force_controlled, any(m.contact_area for m in steps)
+        # P is round-off where nothing touches
+        curve = self.comm.bcast([m.delta if by_force else m.P if touched else 0.0 for m in steps])
         geometry = scene.joint
         level = Level(
             mesh=mesh + 1,
@@ -195,8 +196,8 @@ class _Search:
             iterations=sum(m.iterations for m in steps),
         )
         facets = max(m.contact_area for m in steps) / 2 / geometry.h / max(1.0, geometry.size_ratio)
-        apart = max(m.delta for m in steps) <= 0  # never pressed: there is no contact to be noticed
-        return curve if facets >= _FEWEST_FACETS or apart else None, level
+        pressed = max(m.delta for m in steps) > 0
+        return curve if facets >= _FEWEST_FACETS or not pressed else None, level
 
     def _tell(self, level: Level) -> None:
         self.levels.append(level)
