@@ -193,9 +193,8 @@ class _MeshProgress(_Progress):
                 f"{name} to {self.scene.analysis.accuracy:g} of its largest value"
             )
             last = "delta/dR" if self.scene.force_controlled else "P/(E* R)"
-            self._print(
-                f" mesh  elements/R  growth  substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
-            )
+            costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
+            self._print(f" mesh  elements/R  growth  {costs}")
             self._headed = True
         if self._task is not None:
             self._bar.reset(self._task, description=f"{joint.n_dofs} dofs")
