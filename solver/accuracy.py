@@ -19,7 +19,7 @@ from mpi4py import MPI
 
 from archord.solver.disk import WriteError, naming, on_root, replace_text
 from archord.solver.error_estimate import Curve, mesh_error, step_error
-from archord.solver.interrupt import Interrupt
+from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures
 from archord.solver.mesh_family import RATIO, MeshFamily
@@ -117,7 +117,6 @@ class _Search:
         self.mesh_error: float | None = None
         self.step_error: float | None = None if scene.plastic else 0.0
         self.curves: list[Curve] = []  # in steps of the final length, on the meshes that resolve the contact
-        self.warning = ""
 
     def run(self, first: dict[str, Any]) -> None:
         """Solve until the estimate is as small as asked, no finer mesh is allowed, or a run does not get to its end;
@@ -165,9 +164,10 @@ class _Search:
             raise SceneError("analysis.accuracy: no mesh within the limits of the section joint would do.")
         received = self.comm.allreduce(self.options["interrupt"].received, op=MPI.MAX)
         if received and self.outcome is not None:
-            message = f"interrupted after mesh {self.levels[-1].mesh}"
+            message = f"{Interrupted(received)} between two meshes"
             self.outcome = replace(self.outcome, status="interrupted", message=message, signal=received)
-        if scene is None or received:
+            raise _End
+        if scene is None:
             raise _End
         begun, dofs = perf_counter(), 0
 
@@ -219,7 +219,8 @@ class _Search:
             levels=tuple(self.levels),
         )
         warnings = [*outcome.warnings]
-        if outcome.status == "done" and (estimated is None or estimated > self.asked):
+        short = estimated is None or estimated > self.asked
+        if outcome.status == "done" and short and self.comm.rank == 0:
             warnings.append(self._shortfall(accuracy))
         outcome = replace(outcome, warnings=warnings, accuracy=accuracy)
         try:

@@ -18,9 +18,9 @@ _USUAL = 3.0  # order of P on meshes that are refined everywhere (docs/accuracy.
 
 
 def difference(one: Curve, other: Curve, largest: float) -> float:
-    """The largest difference of two curves over ``largest``; 0 where they agree, whatever that is."""
+    """The largest difference of two curves over ``largest``; where that is nothing, 0 if they agree and 1 if not."""
     apart = float(np.abs(np.subtract(one, other)).max())
-    return apart / largest if largest else math.inf if apart else 0.0
+    return apart / largest if largest else float(apart > 0)
 
 
 def mesh_error(curves: Sequence[Curve], ratio: float) -> float | None:

@@ -150,25 +150,29 @@ def test_too_much_accuracy_ends_with_a_warning(tmp_path, monkeypatch):
         solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
 
 
-@pytest.mark.parametrize("when", ["on_step", "on_level"])
-def test_ctrl_c_in_any_mesh_ends_the_run(tmp_path, when):
-    """In the second mesh after a step, and between meshes: what was accepted is there."""
+@pytest.mark.parametrize(
+    ("when", "number", "yield_stress", "steps", "meshes"),
+    [("on_step", 6, None, 2, 1), ("on_level", 1, None, 4, 1), ("on_step", 4, 0.002, 4, 0)],
+)
+def test_ctrl_c_in_any_mesh_ends_the_run(tmp_path, when, number, yield_stress, steps, meshes):
+    """In the second mesh after a step, between meshes, and while steps are chosen: what was accepted is there."""
     seen = []
 
     def interrupt(thing):
         seen.append(thing)
-        if len(seen) == {"on_step": 6, "on_level": 1}[when]:
+        if len(seen) == number:
             os.kill(os.getpid(), signal.SIGINT)
 
     before = signal.getsignal(signal.SIGINT)
-    outcome = solve_to_accuracy(open_scene(1e-3, 4), tmp_path, MPI.COMM_SELF, **{when: interrupt})
-    steps = {"on_step": 2, "on_level": 4}[when]
+    scene = open_scene(1e-3, 4, yield_stress)
+    outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF, **{when: interrupt})
     assert (outcome.status, outcome.signal, len(outcome.steps)) == ("interrupted", signal.SIGINT, steps)
+    assert "interrupted by SIGINT" in outcome.message
     assert accepted_steps(tmp_path) == steps
     report = json.loads((tmp_path / "run.json").read_text())
     assert report["status"] == "interrupted"
     assert report["accuracy"]["estimated"] is None
-    assert len(report["accuracy"]["levels"]) == 1
+    assert len(report["accuracy"]["levels"]) == meshes
     assert signal.getsignal(signal.SIGINT) is before
 
 
