@@ -17,6 +17,7 @@ from archord.solver import scene as scene_module
 from archord.solver.accuracy import solve_to_accuracy
 from archord.solver.error_estimate import mesh_error, step_error
 from archord.solver.mesh_family import MeshFamily
+from archord.solver.restart import plan_restart
 from archord.solver.run import solve_scene
 from archord.solver.scene import SceneError
 from archord.solver.scene_file import load_scene, parse_scene, resolved
@@ -101,10 +102,11 @@ def test_under_a_force_the_displacement_is_accurate(tmp_path):
 def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
     """A plastic joint in two output steps: more accuracy takes more substeps, and brings P closer to that of many."""
     plane = {"plane": "stress"}
-    many = paper_joint(0.2, 32, 0.002, joint={"growth": 1.25}, analysis=plane, output={"fields": False})
+    short = {"initial": 1 / 32, "maximum": 1 / 32}
+    many = paper_joint(0.2, 2, 0.002, joint={"growth": 1.25}, analysis=plane, stepping=short)
     known = solve_scene(many, _made(tmp_path / "many"), MPI.COMM_SELF).steps[-1].P
     taken, errors = [], []
-    for asked in (0.1, 0.02):
+    for asked in (0.1, 0.04):
         scene = open_scene(asked, 2, 0.002, analysis=plane, output={"fields": False})
         found = solve_to_accuracy(scene, _made(tmp_path / f"{asked}"), MPI.COMM_SELF).accuracy
         of_coarsest = {level.substeps: level.last for level in found.levels if level.mesh == 1}
@@ -174,6 +176,9 @@ def test_ctrl_c_in_any_mesh_ends_the_run(tmp_path, when, number, yield_stress, s
     assert report["accuracy"]["estimated"] is None
     assert len(report["accuracy"]["levels"]) == meshes
     assert signal.getsignal(signal.SIGINT) is before
+    plan = plan_restart(tmp_path)
+    assert solve_scene(plan.scene, tmp_path, MPI.COMM_SELF, start=plan.start).status == "done"
+    assert accepted_steps(tmp_path) == 4
 
 
 def test_more_accuracy_makes_finer_meshes():
