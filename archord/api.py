@@ -67,7 +67,7 @@ def solve(
     """
     from mpi4py import MPI
 
-    from archord.progress import Progress
+    from archord.progress import reporting
     from archord.solver.ranks import agreed
     from archord.solver.run_folder import claim_folder
 
@@ -84,13 +84,13 @@ def solve(
     checked, target = agreed(comm, claimed)
     if folder is None and comm.rank == 0 and comm.size > 1:
         atexit.register(shutil.rmtree, target, ignore_errors=True)
-    from archord.solver.run import solve_scene
+    from archord.solver.run import solve_as_asked
 
-    report = Progress(checked, silent=not progress or comm.rank != 0)
+    report, options = reporting(checked, silent=not progress or comm.rank != 0)
     try:
         with report:
-            outcome = solve_scene(checked, target, comm, on_start=report.start, on_step=report.step,
-                                  on_attempt=report.attempt)  # fmt: skip
+            outcome = solve_as_asked(checked, target, comm, **options)
+        report.finish(outcome)
         run = _read(target, outcome.message)
     except BaseException:
         if folder is None and comm.rank == 0:

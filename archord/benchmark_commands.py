@@ -133,6 +133,39 @@ def variants(
     return 1 if faults else 0
 
 
+@benchmark.command()
+def accuracy(
+    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs and table")] = Path("runs/accuracy"),
+    only: Annotated[str, typer.Option("--only", metavar="PATTERN", help="joints with such a name")] = "",
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what is wrong")] = False,
+) -> int:
+    """Solve several joints to several accuracies, and compare what was asked, estimated and true.
+
+    Writes accuracy.csv and accuracy.md. Exit code 0 only if all errors are below what was asked.
+    """
+    from archord.benchmarks import accuracy as table
+    from archord.benchmarks.work_precision_cases import matches
+    from archord.solver.scene import SceneError
+
+    def said(sentence: str) -> None:
+        if not quiet:
+            print(f"{perf_counter() - begun:7.1f} s  {sentence}", file=sys.stderr, flush=True)
+
+    begun, cases = perf_counter(), tuple(case for case in table.CASES if matches(only, case.name))
+    if not cases:
+        raise SceneError(f"--only {only}: must be part of {', '.join(case.name for case in table.CASES)}.")
+    lines = table.run(output / "runs", cases, said)
+    files = table.write_report(lines, output)
+    if not quiet:
+        print(table.markdown(lines))
+        for file in files:
+            print(file)
+    faults = [fault for line in lines if (fault := line.fault())]
+    for fault in faults:
+        print(f"archord: {fault}.", file=sys.stderr)
+    return 1 if faults else 0
+
+
 def _print_table(lines) -> None:
     from rich.console import Console
     from rich.table import Table

@@ -28,6 +28,11 @@ def continue_with_progress(
         if source.is_dir() and output is not None and output.resolve() != source.resolve():
             raise SceneError(f"-o {output}: does not go with a run folder, {source}.")
         scene = load_scene(source / "scene.toml" if source.is_dir() else source, overrides)
+        if scene.analysis.accuracy is not None:
+            raise SceneError(
+                f"{source}: analysis.accuracy = {scene.analysis.accuracy:g} does not go with --restart and --extend; "
+                f"the last mesh of the run goes on with archord solve {folder} --restart."
+            )
         return plan_extension(folder, scene) if extend else plan_restart(folder, scene)
 
     planned = agreed(MPI.COMM_WORLD, plan)

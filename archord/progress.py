@@ -14,7 +14,9 @@ from archord.ranks import on_terminal
 from archord.solver.scene import Scene
 
 if TYPE_CHECKING:
+    from archord.solver.accuracy import Level
     from archord.solver.restart import Start
+    from archord.solver.run import Outcome
 
 
 def solve_with_progress(
@@ -41,33 +43,43 @@ def solve_with_progress(
 
     comm = MPI.COMM_WORLD
     scene = agreed(comm, claimed)
-    from archord.solver.run import solve_scene
+    from archord.solver.run import solve_as_asked
     from archord.solver.timer import Timer
 
     timer = Timer()
     timer.seconds["start-up"] = perf_counter() - begun
-    report = Progress(scene, silent=quiet or comm.rank != 0, done=start.checkpoint.step if start else 0)
+    report, options = reporting(scene, silent=quiet or comm.rank != 0, done=start.checkpoint.step if start else 0)
     with report:
-        outcome = solve_scene(
-            scene,
-            folder,
-            comm,
-            start=start,
-            debug=debug,
-            timer=timer,
-            begun=begun,
-            on_start=report.start,
-            on_step=report.step,
-            on_attempt=report.attempt,
-        )
+        outcome = solve_as_asked(scene, folder, comm, start=start, debug=debug, timer=timer, begun=begun, **options)
+    report.finish(outcome)
     for warning in first_of_each_kind(outcome.warnings):
         print(f"archord: warning: {warning}.", file=sys.stderr)
     if comm.rank == 0 and outcome.status != "done":
         print(f"archord: {outcome.message}.", file=sys.stderr)
         print(f"archord: {outcome.status}; {len(outcome.steps)} accepted steps are in {folder}.", file=sys.stderr)
     elif comm.rank == 0 and not quiet:
-        print(f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s, results in {folder}")
+        took = f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s"
+        print(f"{took}{_estimate(scene, outcome)}, results in {folder}")
     return {"done": 0, "stopped": 3, "interrupted": 128 + outcome.signal}[outcome.status]
+
+
+def reporting(scene: Scene, *, silent: bool, done: int = 0) -> tuple[Progress, dict[str, Callable]]:
+    """Who reports a solve of ``scene``, of which ``done`` steps are there, and what the solve has to call."""
+    report = Progress(scene, silent, done) if scene.analysis.accuracy is None else _MeshProgress(scene, silent)
+    calls: dict[str, Callable] = {"on_start": report.start, "on_step": report.step, "on_attempt": report.attempt}
+    if isinstance(report, _MeshProgress):
+        calls["on_level"] = report.level
+    return report, calls
+
+
+def _estimate(scene: Scene, outcome: Outcome) -> str:
+    """What a run that was asked for an accuracy says of it."""
+    accuracy = outcome.accuracy
+    if accuracy is None or accuracy.estimated is None:
+        return ""
+    parts = f"mesh {accuracy.mesh_error:.1e}, steps {accuracy.step_error:.1e}; " if scene.plastic else ""
+    name = "delta" if scene.force_controlled else "P"
+    return f", estimated error of {name} {accuracy.estimated:.1e} ({parts}asked {accuracy.asked:g})"
 
 
 class Progress:
@@ -110,7 +122,10 @@ class Progress:
         )
         self._print(text)
         if self._task is None:
-            print(" step   delta/dR     P/(E* R)   eps/deg   p0/E*      PEEQ max  iterations  cutbacks", flush=True)
+            self._print_heading()
+
+    def _print_heading(self) -> None:
+        print(" step   delta/dR     P/(E* R)   eps/deg   p0/E*      PEEQ max  iterations  cutbacks", flush=True)
 
     def attempt(self, load: float, iterations: int) -> None:
         """Show a solve that ended."""
@@ -127,6 +142,13 @@ class Progress:
             text = f"delta/dR {m.delta / dR:.4g}, P/(E* R) {m.P / (E * R):.6g}, {m.iterations} iterations"
             self._bar.update(self._task, advance=1, description=text)
             return
+        self._print_step(m)
+
+    def finish(self, outcome: Outcome) -> None:
+        """Show what is known only now."""
+
+    def _print_step(self, m) -> None:
+        dR, E, R = self.scene.joint.dR, self.scene.E_star, self.scene.joint.radius
         P = round(m.P / (E * R), 7) + 0.0  # no minus before a zero
         print(
             f"{m.step:5d}  {m.delta / dR:9.5g}  {P:11.7f}  {m.eps * 57.29577951:8.3f}  {m.p0 / E:9.6f}  "
@@ -139,3 +161,53 @@ class Progress:
             self._bar.console.print(text, highlight=False)
         else:
             print(text, flush=True)
+
+
+class _MeshProgress(Progress):
+    """Reports mesh after mesh of a scene with an accuracy; off a terminal the steps of the last one at the end."""
+
+    def __init__(self, scene: Scene, silent: bool) -> None:
+        super().__init__(scene, silent)
+        self._headed = False
+
+    def start(self, joint) -> None:
+        """Begin a mesh."""
+        if self.silent:
+            return
+        if not self._headed:
+            geometry, kind = self.scene.joint, "elastic-plastic" if self.scene.plastic else "elastic"
+            name = "delta" if self.scene.force_controlled else "P"
+            self._print(
+                f"{kind} joint, plane {self.scene.analysis.plane}, dR/R = {geometry.dR / geometry.radius:g}: "
+                f"{name} to {self.scene.analysis.accuracy:g} of its largest value"
+            )
+            last = "delta/dR" if self.scene.force_controlled else "P/(E* R)"
+            costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
+            self._print(f" mesh  elements/R  growth  {costs}")
+            self._headed = True
+        if self._task is not None:
+            self._bar.reset(self._task, description=f"{joint.n_dofs} dofs")
+
+    def level(self, level: Level) -> None:
+        """Show a mesh that is solved."""
+        if self.silent:
+            return
+        joint = self.scene.joint
+        unit = joint.dR if self.scene.force_controlled else self.scene.E_star * joint.radius
+        mesh, steps = ("" if e is None else f"{e:.1e}" for e in (level.mesh_error, level.step_error))
+        self._print(
+            f"{level.mesh:5d}  {level.element_size:10.4g}  {level.growth:6.4g}  {level.substeps:8d}  {level.dofs:7d}  "
+            f"{level.last / unit:10.7f}  {mesh:>13s}  {steps:>14s}  {level.seconds:7.1f}"
+        )
+
+    def step(self, m) -> None:
+        """Show an accepted output step where a bar can."""
+        if self._task is not None:
+            super().step(m)
+
+    def finish(self, outcome: Outcome) -> None:
+        """Print the steps of the last mesh."""
+        if not self.silent and self._task is None:
+            self._print_heading()
+            for m in outcome.steps:
+                self._print_step(m)

@@ -57,7 +57,11 @@ class PlaneMesh:
 
 
 def deck_mesh(scene: Scene, elements: Elements) -> PlaneMesh:
-    """The mesh that archord solves ``scene`` on, with a pin even if it is rigid, on this rank alone."""
+    """The mesh that archord solves ``scene`` on, with a pin even if it is rigid, on this rank alone.
+
+    Raises `SceneError` if the scene leaves the mesh open.
+    """
+    scene.require_mesh()
     joint = scene.joint
     sizes = (joint.radius, joint.dR, joint.W, joint.h, joint.growth)
     mesh = quadratic_triangles(quarter_joint(MPI.COMM_SELF, *sizes, size_ratio=joint.size_ratio))

@@ -34,7 +34,8 @@ _VALUE = re.compile(r"(?<= = )[^#\n]+")
 
 def base_scenes() -> dict[str, str]:
     """The repository's scenes and the printed example, by name, on coarse meshes and in two steps."""
-    texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(SCENES.glob("*.toml"))}
+    files = (path for path in sorted(SCENES.glob("*.toml")) if not path.stem.endswith(".sweep"))
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in files}
     return {name: _coarse(text) for name, text in (texts | {"example": example()}).items()}
 
 

@@ -36,10 +36,12 @@ _LARGE_GAMMA = 5.0
 class Joint:
     """Half a joint, cut at its symmetry axis, ready to be loaded; forces and energies are reported for the whole.
 
-    ``sides`` holds the contact edges by name ("pin" unless it is rigid, and "hole"). Collective over ``comm``.
+    ``sides`` holds the contact edges by name ("pin" unless it is rigid, and "hole"). Collective over ``comm``. Raises
+    `SceneError` if the scene leaves the mesh open.
     """
 
     def __init__(self, scene: Scene, comm: MPI.Comm, *, timer: Timer | None = None, partitioner=None) -> None:
+        scene.require_mesh()
         self.scene, self.comm = scene, comm
         self.timer = timer or Timer()
         geometry, analysis = scene.joint, scene.analysis

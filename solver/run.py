@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
@@ -34,6 +34,7 @@ from archord.solver.timer import Timer
 from archord.solver.walk import Position
 
 if TYPE_CHECKING:
+    from archord.solver.accuracy import Accuracy
     from archord.solver.fields import FieldWriter
 
 _UNSEEN = (
@@ -46,7 +47,8 @@ _UNSEEN = (
 class Outcome:
     """How a run ended: ``status`` is "done", "stopped" or "interrupted" (``message`` says why), and its steps.
 
-    ``signal`` interrupted it. ``warnings`` are known on rank 0 only.
+    ``signal`` interrupted it. ``warnings`` are known on rank 0 only. ``unseen`` says that the mesh was too coarse to
+    notice the contact, ``accuracy`` how accurate a run is that was asked for it.
     """
 
     folder: Path
@@ -55,6 +57,8 @@ class Outcome:
     steps: list[Measures]
     warnings: list[str]
     signal: int = 0
+    unseen: bool = False
+    accuracy: Accuracy | None = None
 
 
 def solve_scene(
@@ -66,6 +70,7 @@ def solve_scene(
     debug: bool = False,
     timer: Timer | None = None,
     begun: float | None = None,
+    interrupt: Interrupt | None = None,
     on_start: Callable[[Joint], None] = lambda joint: None,
     on_step: Callable[[Measures], None] = lambda measures: None,
     on_attempt: Callable[[float, int], None] = lambda load, iterations: None,
@@ -76,8 +81,9 @@ def solve_scene(
     ``on_attempt(load, Newton iterations)`` report progress on every rank. ``begun`` is the ``perf_counter`` from which
     the seconds count. ``debug`` writes the fields of a step that cannot be solved to debug.xdmf. A step that cannot be
     solved, or a file that cannot be written, ends the run with status
-    "stopped", Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was accepted before stays. Raises `SceneError` if
-    another process solves into ``folder``, or what is there cannot be continued.
+    "stopped", Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was accepted before stays. ``interrupt``, if given,
+    is one that the caller heeds, too. Raises `SceneError` if another process solves into ``folder``, what is there
+    cannot be continued, or the scene leaves the mesh to `accuracy.solve_to_accuracy`.
     """
     begun = perf_counter() if begun is None else begun
     with ExitStack() as stack:
@@ -87,7 +93,7 @@ def solve_scene(
         output = _Output(folder, joint, begun)
         status, message, failed, received = "done", "", None, 0
         try:
-            with Interrupt() as joint.equilibrium.interrupt:
+            with nullcontext(interrupt) if interrupt else Interrupt() as joint.equilibrium.interrupt:
                 position, work = output.begin(start)
                 # what a coarse mesh went through before a halt is not kept
                 coarse = coarse_start(joint) if position is None else None
@@ -111,13 +117,25 @@ def solve_scene(
         except Interrupted as interrupted:
             status, message = "interrupted", f"{interrupted} after step {len(output.steps)}"
             received = interrupted.number
-        if status == "done" and output.unseen():
+        unseen = status == "done" and output.unseen()
+        if unseen:
             status, message = "stopped", _UNSEEN
         try:
             warnings = output.finish(status, message, failed)
         except WriteError as error:
             status, message, warnings = "stopped", message if status == "stopped" else str(error), []
-        return Outcome(folder, status, message, output.steps, warnings, received)
+        return Outcome(folder, status, message, output.steps, warnings, received, unseen)
+
+
+def solve_as_asked(
+    scene: Scene, folder: Path, comm: MPI.Comm, *, start: Start | None = None, **options: Any
+) -> Outcome:
+    """`solve_scene`, or `accuracy.solve_to_accuracy` where ``scene`` asks for an accuracy. Collective."""
+    if scene.analysis.accuracy is None or start is not None:
+        return solve_scene(scene, folder, comm, start=start, **options)
+    from archord.solver.accuracy import solve_to_accuracy
+
+    return solve_to_accuracy(scene, folder, comm, **options)
 
 
 def _joint(scene: Scene, comm: MPI.Comm, timer: Timer | None) -> Joint:

@@ -234,6 +234,13 @@ class Analysis(_Section):
         ge=1e-3,
         le=1e6,
     )
+    accuracy: float | None = _key(
+        "relative error of P (of delta under a force) to reach, 1e-5 to 0.1: element_size, growth and the length of "
+        "the steps are chosen accordingly, and the error is estimated",
+        default=None,
+        ge=1e-5,
+        le=0.1,
+    )
     degree: Literal[2, 3] = _key("polynomial degree of displacements and of the curved geometry", default=2)
     coarse_start: bool = _key(
         "take the guess for every step from a coarser mesh, where the mesh is fine; false is for comparison",
@@ -331,6 +338,16 @@ class Output(_Section):
     fields: bool = _key("write the fields of every step to fields.xdmf and fields.h5", default=True)
 
 
+# what an accuracy chooses
+CHOSEN = (
+    ("joint", "element_size"),
+    ("joint", "relative_element_size"),
+    ("joint", "growth"),
+    ("stepping", "initial"),
+    ("stepping", "maximum"),
+)
+
+
 class _Checked(type(BaseModel)):  # type: ignore[misc]
     """Calls of the class are checked like a scene file, so that faults are the same sentences."""
 
@@ -363,6 +380,10 @@ class Scene(_Section, metaclass=_Checked):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
+        for section, key in CHOSEN if self.analysis.accuracy is not None else ():
+            given: BaseModel = getattr(self, section)
+            if key in given.model_fields_set and getattr(given, key) is not None:
+                raise ValueError(f"{section}.{key}|must not be given together with analysis.accuracy, which chooses it")
         if self.pin.rigid and self.analysis.integration == "pin":
             raise ValueError(
                 'analysis.integration|must be "block" or "both": a rigid pin has no contact edge to integrate'
@@ -389,6 +410,14 @@ class Scene(_Section, metaclass=_Checked):
         if not self.force_controlled and not largest <= 0.5 * self.joint.radius:
             raise ValueError(f"{name}|must not exceed half the radius ({0.5 * self.joint.radius:g})")
         return self
+
+    def require_mesh(self) -> None:
+        """Raise `SceneError` if the scene leaves its mesh to `archord.solver.accuracy`."""
+        if self.analysis.accuracy is not None:
+            raise SceneError(
+                f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; give joint.element_size and "
+                "joint.growth instead, or solve to that accuracy (archord solve, solve_to_accuracy)."
+            )
 
     @property
     def force_controlled(self) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from archord.solver.scene import FORMAT, LOADS, Scene, SceneError
+from archord.solver.scene import CHOSEN, FORMAT, LOADS, Scene, SceneError
 from archord.solver.scene_format import key_names, limits_in_words, toml_value
 
 ALTERNATIVES = {
@@ -33,10 +33,21 @@ def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) ->
     """
     data = read_toml(path)
     origin = {}
+    _give_way(data, overrides)
     for override in overrides:
         origin[override_key(data, override)] = f"--set {override}"
     read_targets(data, Path(path))
     return parse_scene(data, str(path), origin)
+
+
+def _give_way(data: dict[str, Any], overrides: list[str] | tuple[str, ...]) -> None:
+    """Drop from the file's ``data`` a mesh and steps if an accuracy is given instead, and the other way round."""
+    given = {key.strip() for key, _, value in (o.partition("=") for o in overrides) if value.strip()}
+    chosen = {f"{section}.{name}" for section, name in CHOSEN}
+    dropped = chosen if "analysis.accuracy" in given else {"analysis.accuracy"} if given & chosen else set()
+    for section, name in (key.split(".") for key in dropped):
+        if isinstance(data.get(section), dict):
+            data[section].pop(name, None)
 
 
 def read_targets(data: dict[str, Any], scene: Path) -> None:
@@ -239,13 +250,16 @@ def _sentence(error: Any, data: dict[str, Any], source: str, origin: dict[str, s
 
 
 def resolved(scene: Scene) -> str:
-    """The scene as TOML, with every default filled in; it loads as the same scene."""
+    """The scene as TOML, with every default filled in but for what an accuracy chooses; it loads as the same scene."""
     import tomli_w
 
     data = scene.model_dump(exclude_none=True)
     joint = data["joint"]
     joint["block_size"] = scene.joint.W
-    if "element_size" not in joint:
+    if scene.analysis.accuracy is not None:
+        for section, key in CHOSEN:
+            data[section].pop(key, None)
+    elif "element_size" not in joint:
         joint.setdefault("relative_element_size", 0.04)
     if scene.pin.rigid:
         data["pin"] = {"rigid": True}

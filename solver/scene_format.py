@@ -58,6 +58,7 @@ _SHOWN = {
     "force": 1000.0,
     "relative_force": 0.01,
     "path": "cycle.csv",
+    "accuracy": 0.001,
 }
 
 

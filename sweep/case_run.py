@@ -124,17 +124,18 @@ def _solve(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], in
 def _attempt(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int], *, anew: bool) -> Result:
     """Solve, from the beginning if ``anew``. Raises whatever went wrong."""
     from archord.solver.ranks import agreed
-    from archord.solver.run import solve_scene
+    from archord.solver.run import solve_as_asked
 
     def check(_: Any) -> None:
         number = max(comm.allgather(received()))
         if number:
             raise Interrupted(number)
 
-    plan = agreed(comm, lambda: _plan(scene, folder, anew))
+    # what is there of a scene that asks for an accuracy is one of its meshes: it cannot be continued
+    plan = agreed(comm, lambda: _plan(scene, folder, anew or scene.analysis.accuracy is not None))
     if plan is not None and plan.finished:
         return Result(folder.name, "done")
-    outcome = solve_scene(scene, folder, comm, start=plan and plan.start, on_start=check, on_step=check)
+    outcome = solve_as_asked(scene, folder, comm, start=plan and plan.start, on_start=check, on_step=check)
     return Result(folder.name, outcome.status, outcome.message, signal=outcome.signal)
 
 

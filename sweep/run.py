@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from archord.solver.disk import replace_text
 from archord.solver.scene import SceneError
 from archord.sweep import tables
-from archord.sweep.case_run import Result, standing
+from archord.sweep.case_run import Result, report_of, standing
 from archord.sweep.cases import Case, Sweep
 from archord.sweep.cost import expected_seconds
 from archord.sweep.sweep_file import SweepFile
@@ -89,6 +89,8 @@ def open_jobs(sweep: Sweep, folder: Path, share: Share, *, retry: bool) -> tuple
     for case in share.of(sweep.distinct):
         run = of_case(case, folder)
         result = standing(run)
+        if case.scene.analysis.accuracy is not None and result.status == "done" and "accuracy" not in report_of(run):
+            result = replace(result, status="open", steps=0)  # killed between two meshes
         if result.status == "done" or (result.ended and not retry):
             ended.append(result)
         else:

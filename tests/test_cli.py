@@ -69,6 +69,36 @@ def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, ranks):
     assert os.listdir(tmp_path) == ["bad.toml"]
 
 
+def test_an_accuracy_is_reached_mesh_by_mesh(tmp_path):
+    """One line a mesh, then the steps of the last one and the estimate; the run goes on from its folder alone."""
+    asked = ["--set", "analysis.accuracy=0.02", "--set", "load.steps=4"]
+    result = archord("solve", SCENE, *asked, cwd=tmp_path)
+    assert (result.returncode, result.stderr) == (0, "")
+    levels = json.loads((tmp_path / "runs" / "steel_pin" / "run.json").read_text())["accuracy"]["levels"]
+    lines = result.stdout.splitlines()
+    assert "P to 0.02 of its largest value" in lines[0]
+    assert [line.split()[4] for line in lines[2 : 2 + len(levels)]] == [str(level["dofs"]) for level in levels]
+    assert [line.split()[0] for line in lines[-5:-1]] == ["1", "2", "3", "4"]
+    assert "estimated error of P" in lines[-1]
+    again = archord("solve", SCENE, *asked, "--restart", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "analysis.accuracy = 0.02 does not go with --restart" in again.stderr
+    assert archord("solve", "runs/steel_pin", "--restart", cwd=tmp_path).stdout.endswith(
+        "is finished: nothing to do.\n"
+    )
+
+
+def test_an_accuracy_and_a_mesh_are_one_sentence(tmp_path):
+    """Exit code 2, nothing written."""
+    both = ["--set", "analysis.accuracy=0.02", "--set", "joint.growth=0.5"]
+    result = archord("solve", SCENE, *both, cwd=tmp_path)
+    assert result.returncode == 2
+    assert result.stderr == (
+        "--set joint.growth=0.5: joint.growth must not be given together with analysis.accuracy, which chooses it.\n"
+    )
+    assert os.listdir(tmp_path) == []
+
+
 def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
     """The reason on stderr, accepted steps on disk."""
     limits = ["--set", "analysis.max_iterations=6", "--set", "stepping.minimum=1.0", "--set", "load.steps=10"]

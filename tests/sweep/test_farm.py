@@ -1,5 +1,6 @@
 """Cases on any number of ranks: each is solved once, all ranks take part, and the numbers are those of one rank."""
 
+import json
 import os
 import signal
 from pathlib import Path
@@ -15,6 +16,8 @@ from archord.sweep import case_run
 from archord.sweep.case_run import report_of, solve_case, standing
 from archord.sweep.cases import read_sweep
 from archord.sweep.farm import Farm, Job
+from archord.sweep.run import Share, open_jobs
+from archord.sweep.tables import of_case
 from tests.sweep.parts import SOFT, written
 
 CLOCK = {"seconds", "force_balance"}
@@ -162,3 +165,20 @@ def test_a_farm_keeps_meshes_only_while_it_works(comm, tmp_path):
     Farm(comm).run(jobs, results.append)
     assert (results[0].meshes, results[0].reused) == (1, 0)
     assert MESHES.capacity == 0
+
+
+@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")
+def test_a_case_with_an_accuracy_gets_its_meshes_again_after_a_kill_between_two(comm, tmp_path):
+    """Each of its meshes is a finished run: only one with an estimate is the case's."""
+    varied = '[grid]\nanalysis.accuracy = [0.05]\njoint.relative_element_size = ["none"]\njoint.growth = ["none"]\n'
+    sweep = read_sweep(written(tmp_path, varied))
+    case = sweep.cases[0]
+    folder = of_case(case, tmp_path)
+    folder.parent.mkdir()
+    assert solve_case(case.scene, folder, comm).status == "done"
+    report = report_of(folder)
+    assert report["accuracy"]["estimated"] <= 0.05
+    assert not open_jobs(sweep, tmp_path, Share(), retry=False)[1]
+    del report["accuracy"]
+    (folder / "run.json").write_text(json.dumps(report))
+    assert [job.folder for job in open_jobs(sweep, tmp_path, Share(), retry=False)[1]] == [folder]
