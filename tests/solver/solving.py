@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from mpi4py import MPI
 
 from archord.benchmarks.paper_joint import E, paper_joint
+from archord.solver.coarse_start import coarse_start
 from archord.solver.contact_profile import ArcProfile
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures, Work, arc_profiles, measure
@@ -37,7 +38,7 @@ def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Sol
         solution.steps.append(measure(joint, len(solution.steps) + 1, step, profiles, work, 0.0, largest))
 
     march(
-        joint.walk(),
+        joint.walk(coarse=coarse_start(joint)),
         scene.targets,
         rules=scene.stepping,
         substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
