@@ -52,6 +52,7 @@ class CoarseStart:
 
     def __init__(self, joint: Joint, coarse: Joint) -> None:
         self.joint, self.coarse = joint, coarse
+        coarse.equilibrium.interrupt = joint.equilibrium.interrupt
         self.walk: Walk = coarse.walk(coarse=coarse_start(coarse))
         self.iterations = 0  # of the last attempt, on all coarser meshes
         self._order = MeshOrder(coarse)
@@ -90,12 +91,7 @@ class CoarseStart:
 
 def _interpolations(joint: Joint, order: MeshOrder) -> list[tuple[np.ndarray, Interpolation]]:
     """Per body the nodes of ``joint`` on this rank, and how they get the values that ``order`` collects."""
-    coarse = order.joint
-    body = np.zeros(order.n_cells, dtype=np.int32)
-    own = coarse.model.cells.indices < order.n_cells
-    body[coarse.model.cells.indices[own]] = coarse.model.cells.values[own]
-    body = order.cells(body)
-    x, cells, body = coarse.comm.bcast((order.coordinates, order.nodes_of_cell, body))
+    x, cells, body = joint.comm.bcast((order.coordinates, order.nodes_of_cell, order.bodies()))
     places, degree = joint.V.tabulate_dof_coordinates()[:, :2], joint.scene.analysis.degree
     maps = []
     for tag in np.unique(body):

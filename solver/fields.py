@@ -35,10 +35,7 @@ class FieldWriter:
         self.path = folder / ("debug.xdmf" if debug else "fields.xdmf")
         self._data_path = self.path.with_suffix(".h5")
         self.nodal = ["displacement", "residual"] if debug else ["displacement"]
-        body = np.zeros(order.n_cells, dtype=np.int8)
-        own = joint.model.cells.indices < order.n_cells
-        body[joint.model.cells.indices[own]] = joint.model.cells.values[own]
-        body_of = order.cells(body)
+        body_of = order.bodies()
         self.names = ["von_mises", "mean_stress", "contact_state", "contact_pressure"]
         if joint.bulk.plastic:
             self.names[1:1] = ["peeq", "peeq_increment"] if debug else ["peeq"]

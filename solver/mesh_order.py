@@ -68,6 +68,13 @@ class MeshOrder:
         """SHA-256 of coordinates and cells, on rank 0."""
         return hashlib.sha256(self.coordinates.tobytes() + self.nodes_of_cell.astype("<i8").tobytes()).hexdigest()
 
+    def bodies(self) -> np.ndarray:
+        """Tag of the body of every cell ``(n,)`` on rank 0, nothing elsewhere. Collective."""
+        tags, body = self.joint.model.cells, np.zeros(self.n_cells, dtype=np.int8)
+        own = tags.indices < self.n_cells
+        body[tags.indices[own]] = tags.values[own]
+        return self.cells(body)
+
     def collect(self, u: Array) -> Array:
         """Nodal values ``(n_local, k)`` of all ranks on rank 0, nothing elsewhere. Collective."""
         return self._nodes(u[self._dof[: self._n_owned]])
