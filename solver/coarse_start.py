@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.geometry.curve import ProjectionError
 from archord.geometry.interpolation import Interpolation
 from archord.solver.joint import Joint
 from archord.solver.mesh_order import MeshOrder
@@ -29,7 +30,10 @@ def coarse_start(joint: Joint) -> CoarseStart | None:
     if joint.n_dofs < _FEWEST_DOFS or not joint.scene.analysis.coarse_start:
         return None
     with joint.timer("coarse start"):
-        coarse = Joint(_coarser(joint.scene), joint.comm)
+        try:
+            coarse = Joint(_coarser(joint.scene), joint.comm)
+        except ProjectionError:  # on all ranks: too coarse for the contact to be found
+            return None
         return CoarseStart(joint, coarse) if 2 * coarse.n_dofs < joint.n_dofs else None
 
 

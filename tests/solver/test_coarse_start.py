@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.paper_joint import paper_joint
+from archord.geometry.curve import ProjectionError
 from archord.solver import coarse_start
 from archord.solver.run import solve_scene
 from archord.solver.scene import Stepping
@@ -79,6 +80,19 @@ def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always)
     )
     outcome = solve_scene(scene, _made(tmp_path / "left"), MPI.COMM_SELF)
     assert [m.P for m in outcome.steps] == pytest.approx([m.P for m in plain.steps], rel=1e-8)
+
+
+def test_a_mesh_too_coarse_for_the_contact_is_gone_without(monkeypatch, always):
+    """The fine joint is solved as if there were none."""
+    true_joint, asked = coarse_start.Joint, []
+
+    def joint(scene, comm):
+        asked.append(scene.joint.h)
+        raise ProjectionError("no closest point")
+
+    monkeypatch.setattr(coarse_start, "Joint", joint)
+    assert coarse_start.coarse_start(true_joint(SCENES["elastic"], MPI.COMM_SELF)) is None
+    assert asked == [pytest.approx(0.18)]
 
 
 def test_cut_steps_take_the_coarse_joint_back_too(tmp_path, monkeypatch, always):
