@@ -6,15 +6,16 @@ from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
-from dolfinx.mesh import GhostMode, Mesh, MeshTags, create_cell_partitioner
+from dolfinx.mesh import Mesh, MeshTags
 from mpi4py import MPI
 
 from archord.geometry.mesh_cache import MESHES, Answers
+from archord.geometry.partition import sector_partitioner
 
 try:
-    from dolfinx.io.gmsh import model_to_mesh  # dolfinx >= 0.10
+    from dolfinx.io.gmsh import extract_geometry, model_to_mesh  # dolfinx >= 0.10
 except ImportError:
-    from dolfinx.io.gmshio import model_to_mesh
+    from dolfinx.io.gmshio import extract_geometry, model_to_mesh
 try:
     from dolfinx.la.petsc import create_vector  # dolfinx >= 0.10
 except ImportError:
@@ -39,6 +40,7 @@ def gmsh_to_mesh(
     The triangles are cut in four ``refinements`` times before they are curved.
     ``adjust(x, tag)`` may move the nodes ``x`` ``(n, 3)`` of the physical curve ``tag``; the mesh is scaled by
     ``scale`` at the end. An error on rank 0 is raised on every rank. Returns mesh, cell tags and facet tags.
+    ``partitioner`` replaces `sector_partitioner`.
     ``key`` says all that enters ``build`` and ``adjust``; a mesh that `MESHES` keeps by the same key is used again.
     """
     model, failure = None, None
@@ -68,10 +70,10 @@ def gmsh_to_mesh(
     failure = comm.bcast(failure)
     if failure:
         raise RuntimeError(failure)
-    if partitioner is None:
-        partitioner = create_cell_partitioner(GhostMode.none)
     asked = model if model is None or not (key and MESHES.capacity) else Answers(model)
     asked = known if known is not None else asked
+    if partitioner is None:
+        partitioner = sector_partitioner(lambda: extract_geometry(asked))
     result = model_to_mesh(asked, comm, 0, gdim=2, partitioner=partitioner)
     mesh, cells, facets = tuple(result)[:3]
     if model is not None:

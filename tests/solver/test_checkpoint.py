@@ -44,7 +44,7 @@ def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("cut", ["graph", "dealt round", "all on the last rank"])
+@pytest.mark.parametrize("cut", ["sectors", "dealt round", "all on the last rank"])
 def test_a_point_has_the_same_number_on_any_ranks(comm, cut):
     """Every number occurs once and belongs to the same place, also on facets that run against the curve."""
     problem = scene(0.15, 1, yield_stress=0.002)
@@ -61,7 +61,7 @@ def test_a_point_has_the_same_number_on_any_ranks(comm, cut):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("cut", ["graph", "dealt round", "all on the last rank"])
+@pytest.mark.parametrize("cut", ["sectors", "dealt round", "all on the last rank"])
 def test_the_state_comes_back_on_any_ranks(comm, pressed, tmp_path_factory, cut):
     """Written by one rank, read by all: the same mesh and forces, and collected again the very same bytes."""
     _, state = pressed

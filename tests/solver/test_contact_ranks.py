@@ -42,7 +42,7 @@ def body(_, vertices):
 
 
 CUTS = {
-    "graph": None,
+    "sectors": None,
     "dealt round": partition(lambda i, _: i),
     "pin here, block there": partition(body),
     "block here, pin there": partition(lambda i, v: 1 - body(i, v)),

@@ -196,10 +196,10 @@ def _deal(owner):
 @pytest.mark.parametrize(
     ("variant", "cut"),
     [
-        ("plastic", "graph"),
+        ("plastic", "sectors"),
         ("plastic", "dealt round"),
         ("plastic", "all on the first"),
-        ("rigid pin", "graph"),
+        ("rigid pin", "sectors"),
         ("rigid pin", "halved by number"),
         ("rigid pin", "all on the last"),
         ("plastic by force", "halved by number"),
@@ -212,7 +212,7 @@ def test_results_do_not_depend_on_the_ranks(cut, variant):
     Ranks may own no contact facet, no plastic cell or no cell at all.
     """
     partitioner = {
-        "graph": None,
+        "sectors": None,
         "dealt round": _deal(lambda i, n, size: i),
         "halved by number": _deal(lambda i, n, size: i * size // n),
         "all on the first": _deal(lambda i, n, size: 0 * i),

@@ -1,0 +1,62 @@
+"""The cut of a mesh over the ranks: even, in sectors, the same every time."""
+
+import numpy as np
+import pytest
+
+from archord.geometry.half_ring import half_ring
+from archord.geometry.joint_mesh import Facets
+from archord.geometry.partition import sectors
+from archord.geometry.quarter_joint import quarter_joint
+
+
+@pytest.mark.parametrize("n_parts", [1, 2, 3, 64])
+def test_parts_have_as_many_cells_each_and_lie_in_order_of_their_angle(n_parts):
+    rng = np.random.default_rng(1)
+    x, cells = rng.uniform(0, 1, (300, 2)), rng.integers(0, 300, (1001, 3))
+    part = sectors(x, cells, n_parts)
+    assert np.ptp(np.bincount(part, minlength=n_parts)) <= 1
+    middle = x[cells].mean(axis=1)
+    angle = np.arctan2(middle[:, 1], middle[:, 0])
+    assert (np.diff(part[np.argsort(angle)]) >= 0).all()
+
+
+def test_the_same_cells_in_another_order_go_to_the_same_parts():
+    rng = np.random.default_rng(2)
+    x, cells = rng.uniform(-1, 1, (300, 2)), rng.integers(0, 300, (999, 3))
+    order = rng.permutation(len(cells))
+    assert (sectors(x, cells[order], 5) == sectors(x, cells, 5)[order]).all()
+
+
+def test_no_cells_and_fewer_cells_than_parts():
+    x = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    assert sectors(x, np.zeros((0, 3), dtype=int), 4).shape == (0,)
+    assert sectors(x, np.array([[0, 1, 2]]), 4).tolist() == [0]
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("make", ["quarter", "ring"])
+def test_pin_and_hole_are_cut_at_the_same_angle(comm, make):
+    """Facets of both sides on a rank cover the same angles, but for about an element."""
+    size = 0.05
+    if make == "quarter":
+        joint = quarter_joint(comm, 1.0, 0.005, 6.0, size, 0.5)
+    else:
+        joint = half_ring(comm, 1.0, 0.005, 3.0, size, 0.5, 0.1)
+    mesh = joint.mesh
+    mesh.topology.create_connectivity(1, 0)
+    ends = []
+    for side in (Facets.PIN_ARC, Facets.HOLE_ARC):
+        facets = joint.facets.find(side)
+        nodes = mesh.topology.connectivity(1, 0)
+        vertices = np.array([nodes.links(f) for f in facets], dtype=np.int32).reshape(-1, 2)
+        geometry = np.asarray(mesh.geometry.dofmap)
+        mesh.topology.create_connectivity(0, 2)
+        cells = mesh.topology.connectivity(0, 2)
+        at = []
+        for v in vertices.ravel():
+            cell = cells.links(v)[0]
+            corner = np.flatnonzero(mesh.topology.connectivity(2, 0).links(cell) == v)[0]
+            at.append(mesh.geometry.x[geometry[cell, corner]])
+        angles = np.array([np.arctan2(y, x) for x, y, _ in at])
+        ends.append((angles.min(), angles.max()) if len(angles) else (np.nan, np.nan))
+    assert np.abs(np.subtract(*ends)).max() < 2 * size
