@@ -91,7 +91,7 @@ def _cost(series: list[Cost]) -> list[str]:
             ]
         )
     headings = ("dofs N", "iterations", "on coarser meshes", "factorisations", "seconds", "linear solve [s]",
-                "per factorisation [s]", "mesh and setup [s]", "contact",
+                "per factorisation and its solves [s]", "mesh and setup [s]", "contact",
                 "contact, assembly and return map in the solve", "peak memory [MB]",
                 "power of N since the line before")  # fmt: skip
     lines = _table(headings, rows)
@@ -132,7 +132,7 @@ def _strong(costs: Costs) -> list[str]:
 
 def _weak(costs: Costs) -> list[str]:
     """About one size per rank. A direct solver's work grows faster than its mesh, and finer meshes take more
-    iterations, so an efficiency of 1 is not to be had: beside the ratio of times stands that of one factorisation."""
+    iterations, so an efficiency of 1 is not to be had: that of one factorisation stands beside it."""
     rows = []
     for one, several in costs.weak():
         each = [c.seconds["linear solve"] / c.factorisations for c in (one, several)]
@@ -148,7 +148,7 @@ def _weak(costs: Costs) -> list[str]:
     if not rows:
         return []
     headings = ("dofs on 1 rank", "dofs", "ranks", "seconds on 1 rank", "seconds", "efficiency",
-                "of one factorisation", "peak memory on 1 rank [MB]", "per rank [MB]")  # fmt: skip
+                "of one factorisation and its solves", "peak memory on 1 rank [MB]", "per rank [MB]")  # fmt: skip
     return _table(headings, rows)
 
 

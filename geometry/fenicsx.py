@@ -72,7 +72,7 @@ def gmsh_to_mesh(
         raise RuntimeError(failure)
     asked = model if model is None or not (key and MESHES.capacity) else Answers(model)
     asked = known if known is not None else asked
-    if partitioner is None:
+    if partitioner is None and comm.size > 1:
         partitioner = sector_partitioner(lambda: extract_geometry(asked))
     result = model_to_mesh(asked, comm, 0, gdim=2, partitioner=partitioner)
     mesh, cells, facets = tuple(result)[:3]

@@ -27,7 +27,8 @@ def direct_solver(ksp: PETSc.KSP, A: PETSc.Mat) -> None:
 
 
 class Bordered:
-    """Python context of the bordered matrix and of its preconditioner, which solves with it exactly.
+    """Python context of the bordered matrix and of its preconditioner, which solves with the last one that was
+    factorised.
 
     The level is the last entry of rank 0. ``stiffness`` scales what counts as resistance. Collective.
     """
@@ -37,6 +38,7 @@ class Bordered:
         self._n = A.getLocalSize()[0]
         self._extra = int(comm.rank == 0)
         self.b, self.c, self.d = np.zeros(self._n), np.zeros(self._n), 0.0
+        self._factorised = self.c, self.d  # with the matrix that the preconditioner is of
         self._stale, self.came_free = True, False
         self._x, self._y = A.createVecs()
         self._along_b = np.zeros(self._n)
@@ -66,9 +68,14 @@ class Bordered:
         x.array[: self._n] = u
         x.array[self._n :] = level
 
-    def update(self, b: Array, c: Array, d: float) -> None:
-        """New border for a matrix with new values: ``b`` and ``c`` of this rank's dofs, ``d`` of all ranks."""
-        self.b, self.c, self.d, self._stale = b, c, d, True
+    def update(self, b: Array, c: Array, d: float, *, factorise: bool = True) -> None:
+        """New border for a matrix with new values: ``b`` and ``c`` of this rank's dofs, ``d`` of all ranks.
+
+        Without ``factorise`` the preconditioner stays that of the last matrix that was factorised.
+        """
+        self.b, self.c, self.d = b, c, d
+        self._stale |= factorise
+        self._ksp.getPC().setReusePreconditioner(not self._stale)
 
     def _solve(self, r: Array) -> Array:
         self._x.array[:] = r
@@ -88,10 +95,11 @@ class Bordered:
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x = [A b; c d]^-1 r``, called by PETSc; where nothing resists the level, it stays."""
         if self._stale:
-            self._along_b = self._solve(self.b)
+            self._along_b, self._factorised = self._solve(self.b), (self.c, self.d)
             self._stale = False
         rho, u = self.level(r), self._solve(r.array_r[: self._n])
-        pivot = self.d - self._dot(self.c, self._along_b)
+        c, d = self._factorised
+        pivot = d - self._dot(c, self._along_b)
         self.came_free = abs(pivot) < _FREE * self._stiffness
-        s = 0.0 if self.came_free else (rho - self._dot(self.c, u)) / pivot
+        s = 0.0 if self.came_free else (rho - self._dot(c, u)) / pivot
         self.join(x, u - s * self._along_b, s)

@@ -123,12 +123,12 @@ class Equilibrium:
 
     # ------------------------------------------------------------------ tangent
 
-    def update_tangent(self) -> None:
-        """Assemble the tangent of the last evaluation. Collective."""
-        self.tangent.update()
+    def update_tangent(self, *, factorise: bool = True) -> None:
+        """Assemble the tangent of the last evaluation, to be factorised or not. Collective."""
+        self.tangent.update(factorise=factorise)
         if self.border is not None:
             with self.timer("assemble border"):
-                self.tangent.update_border(self.border, self._direction)
+                self.tangent.update_border(self.border, self._direction, factorise=factorise)
 
     def _follow_pattern(self) -> bool:
         """Make the matrix anew where the pairs of the last evaluation slid out of its pattern; returns whether."""

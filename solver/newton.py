@@ -21,6 +21,10 @@ _GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 _CIRCLING = 4  # the same where no contact point opens or closes
 _ROUGH = 1e-3  # residual over reaction at which a solution is good enough for a guess
+_MANY_DOFS = 20_000  # of an elastic joint for which a factorisation takes longer than some solves with an old one
+_LINEAR_TOLERANCE = 1e-3  # residual of a linear system over its right-hand side, where it is solved so
+_NEVER = 1_000_000  # iterations
+_MANY_SOLVES = 12  # that cost what a factorisation does
 
 
 @dataclass
@@ -70,6 +74,8 @@ class NewtonSolver:
         self._raised: BaseException | None = None
         self._failure = ""
         self._renewed = True  # the last factorisation is of another matrix
+        many = 2 * equilibrium.V.dofmap.index_map.size_global >= _MANY_DOFS
+        self._iterative = many and self.elastic and equilibrium.tangent.condensed is None
         self._snes = self._make_snes()
 
     @property
@@ -96,6 +102,10 @@ class NewtonSolver:
             ksp.setOperators(system.matrix)
             ksp.getPC().setType("python")
             ksp.getPC().setPythonContext(system)
+        if self._iterative:
+            ksp.setType("gmres")
+            ksp.setPCSide(PETSc.PC.Side.RIGHT)
+            ksp.setTolerances(rtol=_LINEAR_TOLERANCE)
         options = PETSc.Options("archord_")
         options["snes_linesearch_type"] = "bt"
         options["snes_linesearch_max_it"] = 8
@@ -130,9 +140,23 @@ class NewtonSolver:
     def _jacobian(self, snes, x, A, P) -> None:
         if not self._close():
             before = self.equilibrium.tangent.factorisations
-            self.equilibrium.update_tangent()
+            factorise = self._factorise(snes)
+            self.equilibrium.update_tangent(factorise=factorise)
             self._factorisations += self.equilibrium.tangent.factorisations - before
             self._renewed = False
+
+    def _factorise(self, snes: PETSc.SNES) -> bool:
+        """Whether the next matrix is to be factorised, and not solved with by GMRES and the last factorisation.
+
+        From one iteration to the next but few contact points change in a large elastic joint: GMRES needs one to three
+        iterations. From step to step there are too many of them, and plastic joints change all over.
+        """
+        if not self._iterative:
+            return True
+        factorise = self._renewed or snes.getKSP().getIterationNumber() > _MANY_SOLVES
+        PETSc.Options("archord_")["snes_lag_preconditioner"] = 1 if factorise else _NEVER
+        snes.setFromOptions()
+        return factorise
 
     def _close(self) -> bool:
         """Whether one more step with the last factorisation will do: Newton's method converges, and the residual that

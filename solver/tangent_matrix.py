@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.geometry.fenicsx import create_vector
 from archord.solver.bordered import Bordered
-from archord.solver.bulk import Bulk, assemble, matrix
+from archord.solver.bulk import Bulk, matrix
 from archord.solver.condensed import Condensed
 from archord.solver.contact import Contact
 from archord.solver.timer import Timer
@@ -58,8 +58,8 @@ class TangentMatrix:
             mine = (rows >= start) & (rows < start + n)
             slots = rows[mine], columns[mine]
         A = matrix(self.V, self.bulk.pattern_forms(), slots)
-        # zeros into every slot first: what is not written before the first assembly is given back
-        assemble(A, self.bulk.pattern_forms(), self._bcs)
+        self.bulk.assemble_elastic(A, self._bcs)
+        # zeros into every other slot: what is not written before the first assembly is given back
         if slots is not None:
             offsets, columns = _csr(slots[0] - start, slots[1], n)
             rowmap = np.arange(start, start + n, dtype=PETSc.IntType)
@@ -67,9 +67,6 @@ class TangentMatrix:
             A.setValuesBlockedIJV(offsets, columns, zeros, PETSc.InsertMode.ADD, rowmap)
         A.assemble()
         A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
-        A.zeroEntries()
-        self.bulk.assemble_elastic(A, self._bcs)
-        A.assemble()
         self.A = A
         if self._condense:
             assert self.contact is not None
@@ -107,12 +104,12 @@ class TangentMatrix:
         self._in_matrix = (tangent.rows < size) & (tangent.columns < size)
         self._free = free[row, :, None] * free[column, None, :]
 
-    def update(self) -> None:
-        """Assemble ``A``."""
+    def update(self, *, factorise: bool = True) -> None:
+        """Assemble ``A``, to be factorised or not."""
         if self.condensed is not None:
             self._update_condensed(self.condensed)
             return
-        self.factorisations += 1
+        self.factorisations += factorise
         with self.timer("assemble bulk"):
             self._elastic.copy(self.A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             self.bulk.assemble_softening(self.A, self._bcs)
@@ -143,7 +140,7 @@ class TangentMatrix:
         values = self._contact_blocks[kept] * self._free[kept]
         self.A.setValuesBlockedIJV(offsets, column, values, PETSc.InsertMode.ADD, rowmap)
 
-    def update_border(self, border: Bordered, direction: fem.Function) -> None:
+    def update_border(self, border: Bordered, direction: fem.Function, *, factorise: bool = True) -> None:
         """Derivatives with respect to the level, which moves the joint along ``direction``, and of the force on it;
         the bulk's are the same, for its tangent is symmetric."""
         action = create_vector(self._index_map, 2)
@@ -164,7 +161,7 @@ class TangentMatrix:
             b[self._near[mine] - start] += near[0, mine]
             c[self._near[mine] - start] += near[1, mine]
         free = ~self._fixed[:n].ravel()
-        border.update(b.ravel() * free, c.ravel() * free, d)
+        border.update(b.ravel() * free, c.ravel() * free, d, factorise=factorise)
 
 
 def _scalar_bcs(V: fem.FunctionSpace, fixed: np.ndarray) -> list[fem.DirichletBC]:
