@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
+import os
 import sys
+import threading
+from contextlib import suppress
 from time import perf_counter
+from typing import NoReturn
 
 
 def main() -> None:
@@ -13,7 +18,21 @@ def main() -> None:
     gc.set_threshold(100_000, 1, 1)  # imports make many objects and no garbage: looking for it takes 0.04 s
     from archord.cli import run
 
-    sys.exit(run(sys.argv[1:], begun))
+    _leave(run(sys.argv[1:], begun))
+
+
+def _leave(code: int) -> NoReturn:
+    """End this process as Python would, but for taking it to pieces object by object, which takes 0.15 s."""
+    if threading.active_count() > 1:
+        sys.exit(code)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    atexit._run_exitfuncs()  # PETSc's end is among them
+    mpi = sys.modules.get("mpi4py.MPI")
+    if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized():
+        mpi.Finalize()
+    os._exit(code)
 
 
 if __name__ == "__main__":
