@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import ctypes
 import gc
 import os
 import sys
@@ -28,10 +29,13 @@ def _leave(code: int) -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
             stream.flush()
-    atexit._run_exitfuncs()  # PETSc's end is among them
-    mpi = sys.modules.get("mpi4py.MPI")
+    atexit._run_exitfuncs()
+    petsc, mpi = (sys.modules.get(name) for name in ("petsc4py.PETSc", "mpi4py.MPI"))
+    if petsc is not None:
+        petsc._finalize()
     if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized():
         mpi.Finalize()
+    ctypes.CDLL(None).fflush(None)  # what libraries like PETSc have printed
     os._exit(code)
 
 

@@ -28,6 +28,14 @@ def archord(*arguments: str, cwd: Path, ranks: int = 0) -> subprocess.CompletedP
     return subprocess.run(command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
 
 
+def test_what_petsc_prints_at_its_end_is_not_lost(tmp_path, monkeypatch):
+    """The process leaves without Python's own way out, which would flush it."""
+    monkeypatch.setitem(ENVIRONMENT, "PETSC_OPTIONS", "-log_view")
+    log = archord("solve", SCENE, *COARSE, "-q", cwd=tmp_path)
+    assert log.returncode == 0, log.stderr
+    assert "SNESSolve" in log.stdout
+
+
 def test_solve_prints_steps_and_writes_the_run(tmp_path):
     """Plain lines off a terminal, results in runs/<scene name>, refused the second time without --force."""
     first = archord("solve", SCENE, *COARSE, cwd=tmp_path)
