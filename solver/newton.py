@@ -154,8 +154,10 @@ class NewtonSolver:
         if not self._iterative:
             return True
         factorise = self._renewed or snes.getKSP().getIterationNumber() > _MANY_SOLVES
-        PETSc.Options("archord_")["snes_lag_preconditioner"] = 1 if factorise else _NEVER
+        options = PETSc.Options("archord_")
+        options["snes_lag_preconditioner"] = 1 if factorise else _NEVER
         snes.setFromOptions()
+        options.delValue("snes_lag_preconditioner")  # or every other solver of this process would take it for its own
         return factorise
 
     def _close(self) -> bool:
