@@ -13,7 +13,7 @@ from typing import Any
 import archord
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import parse_scene, put, read_targets, resolved
-from archord.sweep.design import ABSENT, combinations, factors, varied_keys
+from archord.sweep.design import ABSENT, combinations, factors, same_quantity, varied_keys
 from archord.sweep.sweep_file import Overrides, SweepFile, load_sweep
 
 _MOST_SENTENCES = 20
@@ -67,8 +67,11 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
         raise SceneError(f"{path}: {error}") from None
     keys = varied_keys(found)
     for override in overrides:
-        if override.partition("=")[0].strip() in keys:
-            raise SceneError(f"--set {override}: is varied by {path} already.")
+        name = override.partition("=")[0].strip()
+        varied = next((key for key in keys if key in same_quantity(name)), None)
+        if varied:
+            by = path if varied == name else f"{path} as {varied}"
+            raise SceneError(f"--set {override}: is varied by {by} already.")
     cases: list[Case] = []
     faults: dict[str, list[int]] = {}
     for number, row in enumerate(rows, 1):

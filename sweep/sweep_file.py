@@ -107,6 +107,8 @@ def load_sweep(path: str | Path, overrides: Sequence[str] = ()) -> SweepFile:
     """
     path = Path(path)
     data = read_toml(path)
+    if "base" not in data and "joint" in data:
+        raise SceneError(f"{path}: is a scene, not a sweep; solve it by archord solve, or name it as a base.")
     base, folder, base_file = data.get("base"), path.parent, None
     if isinstance(base, str):
         base_file = Path(os.path.normpath(path.parent / base))

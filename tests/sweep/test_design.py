@@ -286,6 +286,19 @@ def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
     assert [case.scene.load.steps for case in sweep.cases] == [3, 3]
     said = faults(tmp_path, text, overrides=["joint.clearance=0.1"])
     assert said == [f"--set joint.clearance=0.1: is varied by {tmp_path}/some.sweep.toml already."]
+    said = faults(tmp_path, text, overrides=["joint.relative_clearance=0.1"])
+    by = f"{tmp_path}/some.sweep.toml as joint.clearance"
+    assert said == [f"--set joint.relative_clearance=0.1: is varied by {by} already."]
+
+
+def test_scenes_and_sweeps_are_told_apart(tmp_path):
+    with pytest.raises(SceneError, match="is a scene, not a sweep; solve it by archord solve") as told:
+        read_sweep(ELASTIC)
+    assert len(str(told.value).splitlines()) == 1
+    sweep = written(tmp_path, "[grid]\npin.E = [1.0]")
+    with pytest.raises(SceneError) as told:
+        load_scene(sweep)
+    assert str(told.value) == f"{sweep}: is a sweep, not a scene; archord sweep solves it."
 
 
 @pytest.mark.parametrize("name", ["clearance", "stiffness"])
