@@ -89,7 +89,7 @@ class SweepProgress:
     def _counts(self) -> str:
         """Done, running, failed, and the time left."""
         told = f"{self._done} of {self._total} done"
-        if self._task is not None:
+        if self._task is not None and len(self.results) < len(self._cost):
             told += f", {self._running} running"
         if self._failed:
             told += f", {self._failed} failed"

@@ -201,6 +201,7 @@ def _again(solved: Path) -> Path:
         (["FILE", "-o", "full"], "full: is not empty and holds no sweep; choose another folder with -o.\n"),
         (["FILE", "-o", "full/file"], "full/file: is a file, not the folder of a sweep.\n"),
         (["WRONG"], "WRONG: case 2: pin.E = -1.0 must be greater than 0.\n"),
+        (["full"], "full: is not the folder of a sweep: sweep.toml is missing.\n"),
         (["nowhere.toml"], "nowhere.toml: cannot be read: No such file or directory.\n"),
     ],
 )
