@@ -39,8 +39,8 @@ def fit(
         Path | None, typer.Option("--law", metavar="FILE", help="sweep: write the model of k and c as JSON")
     ] = None,
     held_out: Annotated[
-        float, typer.Option("--held-out", metavar="SHARE", help="sweep: cases kept to judge the model by")
-    ] = 0.15,
+        float | None, typer.Option("--held-out", metavar="SHARE", help="sweep: cases kept to judge the model by [0.15]")
+    ] = None,
 ) -> int:
     """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields.
 
@@ -62,10 +62,17 @@ def fit(
         if hold_k is not None or residuals or python:
             raise SceneError(f"{folders[0]}: --hold-k, --residuals and --python are for runs, this is a sweep.")
         return fit_sweep(
-            folders[0], load_range or (0.0, math.inf), confidence, held_out, csv_file, law_file, json_file, picture
+            folders[0],
+            load_range or (0.0, math.inf),
+            confidence,
+            0.15 if held_out is None else held_out,
+            csv_file,
+            law_file,
+            json_file,
+            picture,
         )
-    if csv_file or law_file:
-        raise SceneError(f"{folders[0]}: --csv and --law are for a sweep, and this is none.")
+    if csv_file or law_file or held_out is not None:
+        raise SceneError(f"{folders[0]}: --csv, --law and --held-out are for a sweep, and this is none.")
     runs = [read_run(folder).loading() for folder in folders]
     calibration = calibrate(runs, load_range or (0.0, math.inf), confidence, hold_k)
     law = calibration.law()

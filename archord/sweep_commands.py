@@ -49,6 +49,8 @@ def sweep(
     share = Share.parse(array)
     check_ranks(comm.size, ranks_per_case)
     source = file / FILE if file.is_dir() else file
+    if file.is_dir() and not source.is_file():
+        raise SceneError(f"{file}: is not the folder of a sweep: {FILE} is missing.")
     folder = output or (file if file.is_dir() else default_folder(file))
     show = comm.rank == 0 and not quiet
 

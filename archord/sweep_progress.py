@@ -75,7 +75,7 @@ class SweepProgress:
         self._made += result.meshes
         self._reused += result.reused
         cost = self._cost.get(result.run, 0.0)
-        self._left = max(0.0, self._left - cost)
+        self._left = max(0.0, self._left - cost) if len(self.results) < len(self._cost) else 0.0
         self._spent += result.seconds
         self._cost_spent += cost
         if self.silent:
@@ -89,7 +89,7 @@ class SweepProgress:
     def _counts(self) -> str:
         """Done, running, failed, and the time left."""
         told = f"{self._done} of {self._total} done"
-        if self._task is not None:
+        if self._task is not None and len(self.results) < len(self._cost):
             told += f", {self._running} running"
         if self._failed:
             told += f", {self._failed} failed"

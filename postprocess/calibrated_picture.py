@@ -63,6 +63,8 @@ def draw_calibrated(cases: list[FittedCase], model: CalibratedModel | None, targ
         _c_over(axes[1, 1], cases, model, "clearance", "ΔR / R", "strength", "sigY/E*", (0.0005, 0.001, 0.002, 0.004))
         _parity(axes[1, 2], cases, model)
         for axis in axes.flat:
+            if not axis.lines:  # a sweep need not have what belongs here
+                axis.text(0.5, 0.5, "no such case", transform=axis.transAxes, ha="center", color="0.4")
             axis.grid(alpha=0.3)
             if axis.get_legend_handles_labels()[0]:
                 axis.legend(frameon=False, fontsize="x-small")
@@ -163,11 +165,14 @@ def _c_over(
                 drawn = [j for j, yes in zip(joints, shown, strict=True) if yes]
                 said = f"{name} = {value:.2%}" if plane == "strain" else None
                 _line(axis, x[shown], drawn, model, 1, color=f"C{i}", lw=1, label=said)
-    axis.axhline(1, color="black", lw=0.8, label="c = 1")
+    if axis.lines:
+        axis.axhline(1, color="black", lw=0.8, label="c = 1")
     axis.set(xlabel=label, ylabel="c, like bodies, ν = 0.3", xscale="log")
 
 
 def _parity(axis, cases: list[FittedCase], model: CalibratedModel | None) -> None:
+    from matplotlib.ticker import FixedLocator, NullFormatter
+
     if model is None:
         return
     kinds = {*_KINDS, ("strain", "none"), ("stress", "none")} & {(b.plane, b.yielding) for b in model.bounds}
@@ -179,3 +184,7 @@ def _parity(axis, cases: list[FittedCase], model: CalibratedModel | None) -> Non
     axis.plot(ends, ends, color="black", lw=0.8)
     axis.fill_between(ends, 0.95 * ends, 1.05 * ends, color="0.85", label="5 %")
     axis.set(xlabel="of the case itself", ylabel="of the model", xscale="log", yscale="log", xlim=ends, ylim=ends)
+    for side in (axis.xaxis, axis.yaxis):  # over less than a decade matplotlib's own labels overlap
+        side.set_major_locator(FixedLocator([0.3, 0.5, 1.0, 2.0]))
+        side.set_major_formatter("{x:g}")
+        side.set_minor_formatter(NullFormatter())

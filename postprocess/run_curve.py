@@ -10,6 +10,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.postprocess.law_joint import LawJoint
+from archord.postprocess.run_result import no_run
 from archord.solver.history import read_history
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import load_scene
@@ -71,7 +72,7 @@ def read_run(folder: str | Path) -> RunCurve:
     folder = Path(folder)
     for name in ("scene.toml", "history.csv"):
         if not (folder / name).is_file():
-            raise SceneError(f"{folder}: is not a run folder: {name} is missing.")
+            raise no_run(folder, name)
     scene = load_scene(folder / "scene.toml")
     try:
         history = read_history(folder / "history.csv")

@@ -26,6 +26,18 @@ if TYPE_CHECKING:
     from archord.postprocess.run_fields import Fields
 
 
+def is_sweep(folder: str | Path) -> bool:
+    """Whether ``folder`` is that of a sweep."""
+    return (Path(folder) / "sweep.toml").is_file()
+
+
+def no_run(folder: Path, missing: str) -> SceneError:
+    """What to say of a ``folder`` that is no run folder, as a file is ``missing``."""
+    if is_sweep(folder):
+        return SceneError(f"{folder}: is a sweep, not a run; its runs are the folders in {folder / 'cases'}.")
+    return SceneError(f"{folder}: is not a run folder: {missing} is missing.")
+
+
 class Run:
     """The run in ``folder``, as it was when this was made; a run that still goes on is loaded again to see more.
 
@@ -36,7 +48,7 @@ class Run:
         self.folder = Path(folder)
         for name in ("scene.toml", "history.csv", "run.json"):
             if not (self.folder / name).is_file():
-                raise SceneError(f"{self.folder}: is not a run folder: {name} is missing.")
+                raise no_run(self.folder, name)
         self._columns = read_columns(self.folder / "history.csv")
         self.scene: Scene = load_scene(self.folder / "scene.toml")
         self.summary: dict[str, Any] = _read_report(self.folder / "run.json")

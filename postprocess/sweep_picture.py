@@ -8,7 +8,7 @@ import numpy as np
 
 from archord.postprocess.comparison import same_size, same_units
 from archord.postprocess.comparison_picture import FEW, Shades, draw_comparison
-from archord.postprocess.sweep_result import Sweep
+from archord.postprocess.sweep_result import Sweep, short
 from archord.solver.scene import SceneError
 
 _MOST = 200  # runs in a picture
@@ -31,20 +31,16 @@ def draw_sweep(sweep: Sweep, target: Path) -> tuple[Path, str]:
     if len(chosen) > FEW:
         heading = next((h for h in moving if all(_is_number(rows[c][h]) for c in chosen)), None)
         values = [float(rows[c][heading]) if heading else float(c) for c in chosen]
-        shades = Shades(_short(heading) if heading else "case", values)
+        shades = Shades(short(heading) if heading else "case", values)
     scenes = [runs[c].scene for c in chosen]
     draw_comparison([runs[c] for c in chosen], names, target, absolute=same_units(scenes),
                     dimensionless=not same_size(scenes), shades=shades, dashed=False)  # fmt: skip
     return target, f"{len(chosen)} of {len(runs)} runs are drawn." if len(chosen) < len(runs) else ""
 
 
-def _short(heading: str) -> str:
-    return heading.partition(".")[2] or heading
-
-
 def _value(heading: str, text: str) -> str:
     """A varied key and its value: "clearance = 0.05 mm"."""
-    name, _, unit = _short(heading).partition(" [")
+    name, _, unit = short(heading).partition(" [")
     return f"{name} = {text} {unit.removesuffix(']')}".rstrip() if text else f"no {name}"
 
 

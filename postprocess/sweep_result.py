@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from archord.postprocess.run_result import Run
+from archord.postprocess.run_result import Run, is_sweep
 from archord.solver.scene import SceneError
 
 if TYPE_CHECKING:
@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 _FIRST = ["case", "run", "status"]  # columns before the varied keys
 
 
-def is_sweep(folder: str | Path) -> bool:
-    """Whether ``folder`` is that of a sweep."""
-    return (Path(folder) / "sweep.toml").is_file()
+def short(heading: str) -> str:
+    """The ``heading`` of a varied key without its section, but for the bodies, which have the same keys."""
+    section, dot, name = heading.partition(".")
+    return name if dot and section not in ("pin", "block") else heading
 
 
 class Sweep:
@@ -32,7 +33,8 @@ class Sweep:
         self.folder = Path(folder)
         for name in ("sweep.toml", "cases.csv"):
             if not (self.folder / name).is_file():
-                raise SceneError(f"{self.folder}: is not the folder of a sweep: {name} is missing.")
+                cure = f"; archord sweep {self.folder} --gather writes it" if is_sweep(self.folder) else ""
+                raise SceneError(f"{self.folder}: is not the folder of a sweep: {name} is missing{cure}.")
         path = self.folder / "cases.csv"
         try:
             with path.open(newline="", encoding="utf-8") as file:

@@ -7,7 +7,7 @@ import math
 from rich.table import Table
 
 from archord.postprocess.run_tables import plain_table, shown_rows
-from archord.postprocess.sweep_result import Sweep
+from archord.postprocess.sweep_result import Sweep, short
 from archord.solver.scene import SceneError
 
 MOST_ROWS = 60
@@ -40,7 +40,7 @@ def case_table(sweep: Sweep, k: dict[str, float] | None = None) -> Table:
     wanted = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max")
     values = [h for name in wanted for h in sweep.headings if h.partition(" [")[0] == name]
     moving = sweep.moving
-    varied = [heading.partition(".")[2] or heading for heading in moving]
+    varied = [short(heading) for heading in moving]
     titles = [{"eps [rad]": "eps [°]", "peeq_max": "PEEQ max"}.get(h, h) for h in values]
     cost = [name for name in _COST if name in sweep.headings]
     fit = ["k"] if k else []

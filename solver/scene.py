@@ -203,8 +203,8 @@ class Pin(_Strength):
 
     @model_validator(mode="after")
     def _rigid_or_solid(self) -> Pin:
-        for key in self.model_fields_set - {"rigid"}:
-            if self.rigid and getattr(self, key):
+        for key in type(self).model_fields:  # in their order, which that of a set is not
+            if self.rigid and key != "rigid" and key in self.model_fields_set and getattr(self, key):
                 raise ValueError(f"{key}|is not for a rigid pin")
         for key in ("E", "nu"):
             if not self.rigid and getattr(self, key) is None:

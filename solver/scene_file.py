@@ -32,6 +32,8 @@ def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) ->
     Raises `SceneError` with one sentence per fault: file, key, value, and what is allowed.
     """
     data = read_toml(path)
+    if "base" in data and "joint" not in data:
+        raise SceneError(f"{path}: is a sweep, not a scene; archord sweep solves it.")
     origin = {}
     _give_way(data, overrides)
     for override in overrides:

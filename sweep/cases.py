@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +13,11 @@ from typing import Any
 import archord
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import parse_scene, put, read_targets, resolved
-from archord.sweep.design import ABSENT, combinations, factors, varied_keys
+from archord.sweep.design import ABSENT, combinations, factors, same_quantity, varied_keys
 from archord.sweep.sweep_file import Overrides, SweepFile, load_sweep
 
 _MOST_SENTENCES = 20
+_VALUE = re.compile(r"""^(\S+) = (?:"(?:[^"\\]|\\.)*"|\[.*?\]|\{.*?\}|\S+)""")
 _MARK = "\0"  # the source of a scene, which is told apart later
 
 
@@ -65,20 +67,24 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
         raise SceneError(f"{path}: {error}") from None
     keys = varied_keys(found)
     for override in overrides:
-        if override.partition("=")[0].strip() in keys:
-            raise SceneError(f"--set {override}: is varied by {path} already.")
+        name = override.partition("=")[0].strip()
+        varied = next((key for key in keys if key in same_quantity(name)), None)
+        if varied:
+            by = path if varied == name else f"{path} as {varied}"
+            raise SceneError(f"--set {override}: is varied by {by} already.")
     cases: list[Case] = []
     faults: dict[str, list[int]] = {}
-    for number, overrides in enumerate(rows, 1):
+    for number, row in enumerate(rows, 1):
         try:
-            scene = _scene(file.base, overrides, path)
+            scene = _scene(file.base, row, path)
         except SceneError as error:
             for sentence in str(error).splitlines():
                 faults.setdefault(sentence, []).append(number)
         else:
-            cases.append(Case(number, overrides, scene, run_name(scene)))
+            cases.append(Case(number, row, scene, run_name(scene)))
     if faults:
-        raise SceneError("\n".join(_told(faults, path, len(rows))))
+        given = [*keys, *(override.partition("=")[0].strip() for override in overrides)]
+        raise SceneError("\n".join(_told(faults, path, len(rows), file.base_file, given)))
     return Sweep(path, file, keys, cases)
 
 
@@ -102,13 +108,24 @@ def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:
         raise SceneError(str(error).replace(f"{_MARK}: ", "")) from None
 
 
-def _told(faults: dict[str, list[int]], path: Path, total: int) -> list[str]:
-    """Each fault once, with the cases that have it."""
+def _told(faults: dict[str, list[int]], path: Path, total: int, base: Path | None, given: list[str]) -> list[str]:
+    """Each fault once, with the cases that have it, whatever their values; those of keys that are not ``given`` by the
+    sweep are the ``base`` file's."""
+    alike: dict[str, tuple[str, list[int]]] = {}
+    for sentence, numbers in faults.items():
+        alike.setdefault(_VALUE.sub(r"\1", sentence, 1), (sentence, []))[1].extend(numbers)
     sentences = []
-    for sentence, numbers in list(faults.items())[:_MOST_SENTENCES]:
-        more = f" and {len(numbers) - 1} more" if len(numbers) > 1 else ""
-        which = f"case {numbers[0]}{more}" if len(numbers) < total else "every case"
+    for sentence, numbers in list(alike.values())[:_MOST_SENTENCES]:
+        key = sentence.split()[0].rstrip(":")
+        every = len(set(numbers)) == total
+        # a CSV file's sentence begins with its path
+        own = "/" not in key and not any(f"{name}.".startswith(f"{key}.") for name in given)
+        if every and own and base is not None:
+            which = f"every case, by its base {base}"
+        else:
+            more = f" and {len(numbers) - 1} more" if len(numbers) > 1 else ""
+            which = "every case" if every else f"case {min(numbers)}{more}"
         sentences.append(f"{path}: {which}: {sentence}")
-    if len(faults) > _MOST_SENTENCES:
-        sentences.append(f"{path}: has {len(faults) - _MOST_SENTENCES} more faults like these.")
+    if len(alike) > _MOST_SENTENCES:
+        sentences.append(f"{path}: has {len(alike) - _MOST_SENTENCES} more faults like these.")
     return sentences

@@ -108,7 +108,7 @@ def _check_keys(found: list[Factor]) -> None:
                 )
             if section == "units":
                 raise SceneError(f"{factor.source} {key}: cannot vary; all cases of a table have the same units.")
-        taken = {other: key for key in factor.keys for other in _same_quantity(key)}
+        taken = {other: key for key in factor.keys for other in same_quantity(key)}
         for other, key in taken.items():
             if other in source:
                 by, given = source[other]
@@ -116,7 +116,7 @@ def _check_keys(found: list[Factor]) -> None:
         source |= {other: (factor.source, key) for other, key in taken.items()}
 
 
-def _same_quantity(key: str) -> list[str]:
+def same_quantity(key: str) -> list[str]:
     """The key and its alternatives, of which a scene holds one."""
     section, _, name = key.partition(".")
     group = next((names for names in ALTERNATIVES.get(section, []) if name in names), (name,))

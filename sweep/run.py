@@ -12,7 +12,7 @@ from archord.solver.disk import replace_text
 from archord.solver.scene import SceneError
 from archord.sweep import tables
 from archord.sweep.case_run import Result, report_of, standing
-from archord.sweep.cases import Case, Sweep
+from archord.sweep.cases import Case, Sweep, read_sweep
 from archord.sweep.cost import expected_seconds
 from archord.sweep.sweep_file import SweepFile
 from archord.sweep.tables import CASES, Tables, of_case
@@ -58,7 +58,8 @@ def default_folder(path: Path) -> Path:
 def claim(sweep: Sweep, folder: Path) -> None:
     """Make ``folder`` ready for the sweep, or go on in it, and write the resolved sweep file.
 
-    Raises `SceneError` if it cannot be, or holds something else.
+    A folder of another sweep must share a case with this one: then it is taken for an earlier state of the same. Raises
+    `SceneError` if the folder cannot be used, or holds something else.
     """
     try:
         if folder.exists() and not folder.is_dir():
@@ -68,10 +69,27 @@ def claim(sweep: Sweep, folder: Path) -> None:
         (folder / CASES).mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):
             raise SceneError(f"{folder}: cannot be used for a sweep: Permission denied.")
+        text = resolved(sweep.file)
         with tables.alone(folder):
-            replace_text(folder / FILE, resolved(sweep.file))
+            if _holds_another(folder, sweep, text):
+                raise SceneError(
+                    f"{folder}: holds another sweep, which has no case in common with {sweep.path}; choose another "
+                    "folder with -o, or remove this one."
+                )
+            replace_text(folder / FILE, text)
     except OSError as error:
         raise SceneError(f"{folder}: cannot be used for a sweep: {error.strerror}.") from None
+
+
+def _holds_another(folder: Path, sweep: Sweep, text: str) -> bool:
+    """Whether the sweep in ``folder`` has no case of ``sweep``, whose resolved file is ``text``."""
+    try:
+        if (folder / FILE).read_text(encoding="utf-8") == text:
+            return False
+        held = read_sweep(folder / FILE)
+    except (OSError, SceneError):  # none yet, or none that this version reads: nothing tells that it is another
+        return False
+    return not {case.run for case in held.cases} & {case.run for case in sweep.cases}
 
 
 def resolved(file: SweepFile) -> str:

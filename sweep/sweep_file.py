@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from archord.solver.scene import SceneError
 from archord.solver.scene_file import override_key, read_toml
@@ -67,7 +68,9 @@ class LatinHypercube(_Section):
     ]
 
 
-_Lists = Annotated[dict[str, Annotated[list[Any], Field(min_length=1)]], BeforeValidator(flattened)]
+_Lists = Annotated[
+    dict[str, Annotated[list[Any], Field(min_length=1)]], BeforeValidator(flattened), Field(min_length=1)
+]
 
 
 class SweepFile(_Section):
@@ -75,10 +78,16 @@ class SweepFile(_Section):
     all combinations."""
 
     base: dict[str, Any]
-    list_: list[Annotated[Overrides, BeforeValidator(flattened)]] = Field(default=[], alias="list")
+    list_: list[Annotated[Overrides, BeforeValidator(flattened)]] = Field(default=[], alias="list", min_length=1)
     zip: _Lists = {}
     grid: _Lists = {}
     latin_hypercube: LatinHypercube | None = None
+    _base_file: Path | None = PrivateAttr(default=None)
+
+    @property
+    def base_file(self) -> Path | None:
+        """The file that ``base`` was read from; None if it is a table of the sweep file."""
+        return self._base_file
 
     @model_validator(mode="after")
     def _equal_lengths(self) -> SweepFile:
@@ -98,14 +107,18 @@ def load_sweep(path: str | Path, overrides: Sequence[str] = ()) -> SweepFile:
     """
     path = Path(path)
     data = read_toml(path)
-    base, folder = data.get("base"), path.parent
+    if "base" not in data and "joint" in data:
+        raise SceneError(f"{path}: is a scene, not a sweep; solve it by archord solve, or name it as a base.")
+    base, folder, base_file = data.get("base"), path.parent, None
     if isinstance(base, str):
-        data["base"] = read_toml(path.parent / base)
-        folder = (path.parent / base).parent
+        base_file = Path(os.path.normpath(path.parent / base))
+        data["base"] = _read_base(path, base, base_file)
+        folder = base_file.parent
     try:
         sweep = SweepFile.model_validate(data)
     except ValidationError as error:
         raise SceneError("\n".join(dict.fromkeys(_sentence(e, data, path) for e in error.errors()))) from None
+    sweep._base_file = base_file
     _anchor(sweep.base.get("load"), folder)
     for override in overrides:
         override_key(sweep.base, override)
@@ -115,6 +128,17 @@ def load_sweep(path: str | Path, overrides: Sequence[str] = ()) -> SweepFile:
         if "load.path" in lists:
             lists["load.path"][:] = [_absolute(value, path.parent) for value in lists["load.path"]]
     return sweep
+
+
+def _read_base(path: Path, base: str, file: Path) -> dict[str, Any]:
+    """The table of the base scene ``file``, which the sweep file ``path`` calls ``base``. Raises `SceneError`."""
+    fault = f"{path}: base = {toml_value(base)} must be a scene file, beside the sweep file; {file}"
+    if not file.is_file():
+        raise SceneError(f"{fault} {'is not one' if file.exists() else 'does not exist'}.")
+    data = read_toml(file)
+    if "base" in data:
+        raise SceneError(f"{fault} is a sweep.")
+    return data
 
 
 def _anchor(table: Any, folder: Path, key: str = "path") -> None:
@@ -137,6 +161,9 @@ def _sentence(error: Any, data: dict[str, Any], path: Path) -> str:
     given: Any = data
     key = ""
     for part in where:
+        if part in ("from", "to") and isinstance(given, list):
+            said = "must be two finite numbers, [low, high]"
+            break
         if isinstance(given, dict):
             given = given.get(part, flattened(given).get(part))
         else:

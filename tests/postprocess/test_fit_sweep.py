@@ -103,7 +103,7 @@ def test_stored_rows_give_the_law_that_is_shipped(tmp_path, capsys):
         (["{out}", "{out}"], "a sweep is fitted alone"),
         (["{out}", "--hold-k", "0.8"], "--hold-k, --residuals and --python are for runs"),
         (["{out}", "--held-out", "0.9"], "--held-out 0.9: must be a share from 0 to 0.5"),
-        (["{run}", "--csv", "x.csv"], "--csv and --law are for a sweep"),
+        (["{run}", "--csv", "x.csv"], "--csv, --law and --held-out are for a sweep"),
         (["nothing.csv"], "nothing.csv: cannot be read"),
         (["{out}", "--csv", "no/where.csv"], "no is not a folder"),
     ],

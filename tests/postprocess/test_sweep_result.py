@@ -10,6 +10,7 @@ import pytest
 
 import archord
 from archord.cli import run as command
+from archord.postprocess.sweep_result import short
 
 NAMES = {"elastic": "48976689e411", "coarse": "000123456789"}  # as hashes may be: they look like numbers
 
@@ -85,6 +86,15 @@ def test_show_prints_the_cases_and_draws_them(sweep, tmp_path, capsys):
     assert matplotlib.image.imread(tmp_path / "sweep.png").std() > 0.05
 
 
+@pytest.mark.parametrize(
+    ("heading", "said"),
+    [("joint.clearance [mm]", "clearance [mm]"), ("pin.E [MPa]", "pin.E [MPa]"), ("block.nu", "block.nu")],
+)
+def test_headings_leave_out_what_is_clear(heading, said):
+    """Pin and block have keys of the same names."""
+    assert short(heading) == said
+
+
 def test_a_run_that_cannot_be_read_does_not_hide_the_others(sweep, tmp_path, capsys):
     """Its case says why; the others are shown."""
     copy = shutil.copytree(sweep, tmp_path / "sweep")
@@ -105,4 +115,14 @@ def test_broken_tables_are_one_sentence(sweep, tmp_path, capsys, text):
     assert capsys.readouterr().err == f"{tmp_path}/cases.csv: cannot be read as the cases of a sweep.\n"
     (tmp_path / "cases.csv").unlink()
     assert command(["show", str(tmp_path)]) == 2
-    assert "is not the folder of a sweep: cases.csv is missing." in capsys.readouterr().err
+    said = f"is not the folder of a sweep: cases.csv is missing; archord sweep {tmp_path} --gather writes it."
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [["compare", "{0}", "{0}"], ["export", "{0}", "--csv", "x"], ["picture", "{0}"]])
+def test_a_sweep_is_no_run(sweep, tmp_path, monkeypatch, capsys, arguments):
+    monkeypatch.chdir(tmp_path)
+    assert command([argument.format(sweep) for argument in arguments]) == 2
+    said = f"{sweep}: is a sweep, not a run; its runs are the folders in {sweep}/cases.\n"
+    assert capsys.readouterr().err == said
+    assert not list(tmp_path.iterdir())

@@ -1,6 +1,7 @@
 """What a sweep file expands to: laws of counting, sampling and naming, before anything is solved."""
 
 import math
+import re
 import tomllib
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from archord.sweep.run import Share
 from archord.sweep.sweep_file import LatinHypercube, SweepFile
 
 SCENES = Path(__file__).parents[2] / "scenes"
+DOCS = SCENES.parent / "docs"
 ELASTIC = str(SCENES / "elastic_pin.toml")
 
 
@@ -45,15 +47,13 @@ def faults(folder: Path, text: str, base: str = ELASTIC, overrides=()) -> list[s
 def test_everything_is_multiplied(grid, zipped, listed, sampled):
     """As many cases as the product of all lengths, all different, the last factor varying fastest."""
     names = ["joint.radius", "joint.growth", "load.steps"]
-    file = SweepFile.model_validate(
-        {
-            "base": {},
-            "grid": {name: list(range(n)) for name, n in zip(names, grid, strict=False)},
-            "zip": {"pin.E": list(range(zipped)), "pin.nu": list(range(zipped))} if zipped else {},
-            "list": [{"block.E": i} for i in range(listed)],
-            "latin_hypercube": {"number": sampled, "ranges": {"block.nu": [0.0, 0.5]}} if sampled else None,
-        }
-    )
+    varied = {
+        "grid": {name: list(range(n)) for name, n in zip(names, grid, strict=False)},
+        "zip": {"pin.E": list(range(zipped)), "pin.nu": list(range(zipped))} if zipped else {},
+        "list": [{"block.E": i} for i in range(listed)],
+        "latin_hypercube": {"number": sampled, "ranges": {"block.nu": [0.0, 0.5]}} if sampled else None,
+    }
+    file = SweepFile.model_validate({"base": {}} | {name: some for name, some in varied.items() if some})
     rows = combinations(factors(file))
     lengths = [n for n in (listed, zipped, *grid, sampled) if n]
     assert len(rows) == math.prod(lengths)
@@ -175,6 +175,9 @@ def _toml(data) -> str:
             '[grid]\nunits.length = ["m"]',
             ["FILE: [grid] units.length: cannot vary; all cases of a table have the same units."],
         ),
+        ("[grid]", ["FILE: grid must not be empty."]),
+        ("zip = {}", ["FILE: zip must not be empty."]),
+        ("list = []", ["FILE: list = [] must not be empty."]),
         ("list = 3", ["FILE: list = 3 must be a list of values; write [[list]]."]),
         (
             "[zip]\npin.E = [1.0, 2.0]\npin.nu = [0.3]",
@@ -195,6 +198,13 @@ def _toml(data) -> str:
         (
             '[latin_hypercube]\nnumber = 2\nranges = { "pin.nu" = { from = 0, to = 1, scale = "log" } }',
             ['FILE: latin_hypercube.ranges.pin.nu must have a positive from where scale = "log".'],
+        ),
+        (
+            'latin_hypercube = { number = 2, ranges = { pin.E = ["a", 1.0], pin.nu = [0.1, nan] } }',
+            [
+                'FILE: latin_hypercube.ranges.pin.E = ["a", 1.0] must be two finite numbers, [low, high].',
+                "FILE: latin_hypercube.ranges.pin.nu = [0.1, NaN] must be two finite numbers, [low, high].",
+            ],
         ),
         (
             "[grid]\njoint.clearence = [1]",
@@ -229,12 +239,45 @@ def test_faults_are_told_in_a_sentence(tmp_path, text, said):
     assert sorted(faults(tmp_path, text)) == sorted(said)
 
 
+def test_one_fault_of_many_values_is_told_once(tmp_path):
+    sampled = "[latin_hypercube]\nnumber = 30\nranges = { load.steps = [5, 6] }"
+    (told,) = faults(tmp_path, f"[grid]\njoint.clearance = [0.004, 0.005]\n{sampled}")
+    assert re.fullmatch(r"FILE: every case: load\.steps = 5\.\d+ must be a whole number or a list of them\.", told)
+    (told,) = faults(tmp_path, '[grid]\nload.steps = [3, "a = b c", 4, "d", 2.5]')
+    assert told == 'FILE: case 2 and 2 more: load.steps = "a = b c" must be a whole number or a list of them.'
+
+
 def test_a_base_is_needed(tmp_path):
     assert faults(tmp_path, "", "") == ['FILE: base is missing; give base = "scene.toml" or a [base] table.']
     assert faults(tmp_path, "base = 3", "") == ['FILE: base must be a scene file, base = "scene.toml", or a table.']
-    assert faults(tmp_path, "", "nowhere.toml") == [
-        f"{tmp_path}/nowhere.toml: cannot be read: No such file or directory."
+    nowhere = f'FILE: base = "nowhere.toml" must be a scene file, beside the sweep file; {tmp_path}/nowhere.toml'
+    assert faults(tmp_path, "", "nowhere.toml") == [f"{nowhere} does not exist."]
+    assert faults(tmp_path, "", ".") == [
+        f'FILE: base = "." must be a scene file, beside the sweep file; {tmp_path} is not one.'
     ]
+    sweep = f'FILE: base = "some.sweep.toml" must be a scene file, beside the sweep file; {tmp_path}/some.sweep.toml'
+    assert faults(tmp_path, "", "some.sweep.toml") == [f"{sweep} is a sweep."]
+
+
+def test_a_fault_of_the_base_names_its_file(tmp_path):
+    """Unless the sweep or --set gives the key."""
+    scene = tomllib.loads(Path(ELASTIC).read_text())
+    scene["block"]["nu"] = 0.7
+    (tmp_path / "base.toml").write_text(_toml(scene))
+    fault = "block.nu = 0.7 must be at least -0.999 and at most 0.499999."
+    by_base = f"FILE: every case, by its base {tmp_path}/base.toml: {fault}"
+    assert faults(tmp_path, "[grid]\npin.nu = [0.1, 0.2]", "base.toml") == [by_base]
+    assert faults(tmp_path, "[grid]\nblock.nu = [0.7]", "base.toml") == [f"FILE: every case: {fault}"]
+    assert faults(tmp_path, "", "base.toml", ["block.nu=0.7"]) == [f"FILE: every case: {fault}"]
+    assert faults(tmp_path, "[grid]\nblock.nu = [0.7, 0.3]", "base.toml") == [f"FILE: case 1: {fault}"]
+
+
+def test_the_example_of_the_documentation_is_sound(tmp_path):
+    text = re.search(r"```toml\n(base = .*?)```", (DOCS / "sweeps.md").read_text(), re.DOTALL)[1]
+    path = tmp_path / "all.sweep.toml"
+    path.write_text(text.replace("steel_pin.toml", str(SCENES / "steel_pin.toml")))
+    sweep = read_sweep(path)
+    assert len(sweep.cases) == len(sweep.distinct) == 2 * 2 * 3 * 20
 
 
 def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
@@ -243,6 +286,19 @@ def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
     assert [case.scene.load.steps for case in sweep.cases] == [3, 3]
     said = faults(tmp_path, text, overrides=["joint.clearance=0.1"])
     assert said == [f"--set joint.clearance=0.1: is varied by {tmp_path}/some.sweep.toml already."]
+    said = faults(tmp_path, text, overrides=["joint.relative_clearance=0.1"])
+    by = f"{tmp_path}/some.sweep.toml as joint.clearance"
+    assert said == [f"--set joint.relative_clearance=0.1: is varied by {by} already."]
+
+
+def test_scenes_and_sweeps_are_told_apart(tmp_path):
+    with pytest.raises(SceneError, match="is a scene, not a sweep; solve it by archord solve") as told:
+        read_sweep(ELASTIC)
+    assert len(str(told.value).splitlines()) == 1
+    sweep = written(tmp_path, "[grid]\npin.E = [1.0]")
+    with pytest.raises(SceneError) as told:
+        load_scene(sweep)
+    assert str(told.value) == f"{sweep}: is a sweep, not a scene; archord sweep solves it."
 
 
 @pytest.mark.parametrize("name", ["clearance", "stiffness"])

@@ -95,6 +95,18 @@ def test_what_is_solved_is_not_solved_again(solved, tmp_path, capsys):
     assert times(solved / "out") == after
 
 
+def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, capsys):
+    out = _again(solved)
+    before = {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
+    other = written(tmp_path, SOFT.replace("[2, 3]", "[4]"), "other")
+    assert sweep(other, "-o", out) == 2
+    assert capsys.readouterr().err == (
+        f"{out}: holds another sweep, which has no case in common with {other}; choose another folder with -o, or "
+        "remove this one.\n"
+    )
+    assert {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()} == before
+
+
 def test_identical_cases_are_solved_once(tmp_path, capsys):
     file = written(tmp_path, "[grid]\njoint.clearance = [0.005, 0.0050]\nload.steps = [1, 1]\n")
     assert sweep(file, "-o", tmp_path / "out") == 0
@@ -189,6 +201,7 @@ def _again(solved: Path) -> Path:
         (["FILE", "-o", "full"], "full: is not empty and holds no sweep; choose another folder with -o.\n"),
         (["FILE", "-o", "full/file"], "full/file: is a file, not the folder of a sweep.\n"),
         (["WRONG"], "WRONG: case 2: pin.E = -1.0 must be greater than 0.\n"),
+        (["full"], "full: is not the folder of a sweep: sweep.toml is missing.\n"),
         (["nowhere.toml"], "nowhere.toml: cannot be read: No such file or directory.\n"),
     ],
 )

@@ -90,7 +90,9 @@ def test_a_signal_ends_a_sweep_in_order(whole, tmp_path, ranks):
     process.send_signal(signal.SIGTERM)
     said, _ = process.communicate(timeout=60)
     assert process.returncode == (1 if ranks else 143)
-    if not ranks:
+    if ranks:  # mpirun kills its ranks after a quarter of a second: the tables may not be there
+        assert sweep(file, "-o", out, "--gather", "-q") == 0
+    else:
         assert " open in " in said
     status = [row["status"] for row in table(out / "cases.csv")]
     assert set(status) <= {"done", "interrupted", "open"}
