@@ -1,7 +1,7 @@
 """Which rank gets which cells of a joint: sectors around the pin's centre.
 
-Points in contact face each other along rays from there, so most pairs stay on one rank; and unlike a graph partitioner's,
-whose input arrives in any order, the cut is the same in every run.
+Points in contact face each other along rays from there, so most pairs stay on one rank; and unlike a graph
+partitioner's, whose input arrives in any order, the cut is the same in every run.
 """
 
 from __future__ import annotations
