@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from archord.postprocess.arc_pressure import ArcContact
     from archord.postprocess.run_curve import RunCurve
-    from archord.postprocess.run_fields import Fields
+    from archord.results.run_fields import Fields
 
 
 class Run:
@@ -77,7 +77,7 @@ class Run:
     @cached_property
     def history(self) -> pd.DataFrame:
         """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of every column."""
-        from archord.postprocess.frames import history_frame
+        from archord.results.frames import history_frame
 
         return history_frame(self.folder / "history.csv")
 
@@ -102,7 +102,7 @@ class Run:
 
         Raises `SceneError` without such a step or side.
         """
-        from archord.postprocess.frames import contact_frame
+        from archord.results.frames import contact_frame
 
         arcs = self.contact(step)
         if side is not None and side not in arcs:
@@ -114,7 +114,7 @@ class Run:
 
         Raises `SceneError` without such a step, and if the run wrote no fields.
         """
-        from archord.postprocess.run_fields import read_fields
+        from archord.results.run_fields import read_fields
 
         return read_fields(self.folder, self.scene, self.number(step))
 
