@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -44,3 +46,15 @@ def test_every_package_is_listed_wherever_packages_are():
     loop = re.search(r"for p in ([\w ]+);", (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8"))
     typed = re.search(r"check mypy ([\w ]+)", (ROOT / ".ci" / "run").read_text(encoding="utf-8"))
     assert set(loop[1].split()) == set(typed[1].split()) == folders
+
+
+def test_an_installation_has_all_data_and_tells_type_checkers_that_archord_is_typed(tmp_path):
+    """Kernels, tables, scenes and the marker py.typed (PEP 561) of the checkout, each in its package."""
+    build = ["build", "--build-base", f"{tmp_path}/build", "--build-lib", f"{tmp_path}/lib"]
+    command = [sys.executable, "-c", "import setuptools; setuptools.setup()", "-q", "egg_info", "--egg-base", tmp_path]
+    subprocess.run([*command, *build], cwd=ROOT, check=True, capture_output=True)
+    for package, folder in FOLDERS.items():
+        wanted = {path.relative_to(folder) for path in folder.rglob("*.*") if path.suffix not in (".pyc", ".so")}
+        installed = tmp_path / "lib" / package.replace(".", "/")
+        assert not {path for path in wanted if not (installed / path).is_file()}
+    assert (tmp_path / "lib" / "archord" / "py.typed").is_file()
