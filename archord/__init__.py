@@ -16,17 +16,17 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from archord.api import load, load_scene, solve
-    from archord.postprocess.run_result import Run
-    from archord.postprocess.sweep_result import Sweep
+    from archord.results.run_result import Run
+    from archord.results.sweep_result import Sweep
     from archord.solver.scene import Scene, SceneError
 
 __all__ = ["Run", "Scene", "SceneError", "Sweep", "load", "load_scene", "solve"]
 
 _HOME = {
-    "Run": "archord.postprocess.run_result",
+    "Run": "archord.results.run_result",
     "Scene": "archord.solver.scene",
     "SceneError": "archord.solver.scene",
-    "Sweep": "archord.postprocess.sweep_result",
+    "Sweep": "archord.results.sweep_result",
     "load": "archord.api",
     "load_scene": "archord.api",
     "solve": "archord.api",

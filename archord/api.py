@@ -12,8 +12,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from archord.postprocess.run_result import Run
-from archord.postprocess.sweep_result import Sweep, is_sweep
+from archord.results.run_result import Run
+from archord.results.sweep_result import Sweep
+from archord.solver.run_folder import is_sweep
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import load_scene as load_scene_file
 from archord.solver.scene_format import toml_value

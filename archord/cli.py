@@ -8,6 +8,7 @@ Heavy packages are imported by the commands that need them. Bad input ends with 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from pathlib import Path
 from time import perf_counter
@@ -20,7 +21,7 @@ from archord.benchmark_commands import benchmark
 from archord.deck_commands import export_deck
 from archord.fit_commands import fit
 from archord.plain_typer import typer
-from archord.ranks import launcher_rank, run_on_ranks
+from archord.ranks import COLLECTIVE, launcher_rank, run_on_ranks
 from archord.reproduce_commands import reproduce
 from archord.sweep_commands import sweep
 
@@ -53,9 +54,12 @@ def _run(arguments: list[str]) -> int:
         return error.exit_code
     except click.exceptions.Abort:
         return 130
-    except BrokenPipeError:  # the reader, like head, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except BrokenPipeError:
+        return _unread(arguments)
+    except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):  # click makes exit code 1 of it
+            return _unread(arguments)
+        raise
     except KeyboardInterrupt:
         say("archord: interrupted.")
         return 130
@@ -67,6 +71,12 @@ def _run(arguments: list[str]) -> int:
                 say(sentence)
             return 2
         return _fail(error)
+
+
+def _unread(arguments: list[str]) -> int:
+    """The exit code where the reader of the output, like head, has seen enough: only what solves is not done then."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 128 + signal.SIGPIPE if arguments and arguments[0] in COLLECTIVE else 0
 
 
 def say(text: str) -> None:
@@ -150,7 +160,7 @@ def picture(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="file to draw [RUN/picture.png]")] = None,
 ) -> int:
     """Draw a run: plastic zone, contact pressure, P(delta)."""
-    from archord.postprocess.picture import draw
+    from archord.results.picture import draw
 
     print(draw(folder, output))
     return 0

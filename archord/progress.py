@@ -9,8 +9,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from archord.postprocess.run_warnings import first_of_each_kind
 from archord.ranks import on_terminal
+from archord.results.run_warnings import first_of_each_kind
 from archord.solver.scene import Scene
 
 if TYPE_CHECKING:

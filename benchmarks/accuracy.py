@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import nan
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from archord.benchmarks.paper_joint import E, paper_joint
+from archord.benchmarks.report_files import rows_table, write_files
 from archord.solver.accuracy import Accuracy, solve_to_accuracy
 from archord.solver.error_estimate import difference
 from archord.solver.mesh_family import RATIO, MeshFamily
@@ -155,19 +155,9 @@ def row(line: Line) -> dict[str, Any]:
 
 def markdown(lines: list[Line]) -> str:
     """The lines as a table."""
-    rows = [row(line) for line in lines]
-    out = ["| " + " | ".join(rows[0]) + " |", "|---" * len(rows[0]) + "|"]
-    return "\n".join([*out, *("| " + " | ".join(map(str, r.values())) + " |" for r in rows), ""])
+    return "\n".join([*rows_table([row(line) for line in lines]), ""])
 
 
 def write_report(lines: list[Line], folder: Path) -> list[Path]:
     """Write accuracy.csv and accuracy.md into ``folder``; returns the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / "accuracy.csv", folder / "accuracy.md"]
-    rows = [row(line) for line in lines]
-    with files[0].open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    files[1].write_text(markdown(lines), encoding="utf-8")
-    return files
+    return write_files(folder, "accuracy", [row(line) for line in lines], markdown(lines))

@@ -17,6 +17,7 @@ from mpi4py import MPI
 
 from archord.benchmarks.finding_variants import CROSSED, ELASTIC, VARIANTS, Variant
 from archord.benchmarks.paper_runs import PLANES, Plane
+from archord.benchmarks.report_files import markdown_table
 from archord.postprocess.calibrated_law import joint_calibrated
 from archord.postprocess.calibration import calibrate
 from archord.postprocess.chord_laws import plastic_force
@@ -90,10 +91,9 @@ def judged(rows: list[FindingRow]) -> list[tuple[str, str, int, float, float, fl
 
 
 def _print_judged(rows: list[FindingRow]) -> None:
-    print("\n| plane | yields | joints | P off by, rms | at most | rms with own k and c |")
-    print("|" + "---|" * 6)
-    for plane, kind, number, rms, largest, own in judged(rows):
-        print(f"| {plane} | {kind} | {number} | {rms:.1%} | {largest:.1%} | {own:.1%} |")
+    headings = ("plane", "yields", "joints", "P off by, rms", "at most", "rms with own k and c")
+    cells = [(*found[:3], *(f"{error:.1%}" for error in found[3:])) for found in judged(rows)]
+    print("", *markdown_table(headings, cells), sep="\n")
 
 
 def main() -> None:
@@ -109,11 +109,7 @@ def main() -> None:
     if arguments.csv:
         write_rows(rows, arguments.csv)
     shown = {variant.name for variant in (*VARIANTS, *ELASTIC)}
-    print("| " + " | ".join(HEADINGS) + " |")
-    print("|" + "---|" * len(HEADINGS))
-    for row in rows:
-        if row.joint in shown:
-            print("| " + " | ".join(_entries(row)) + " |")
+    print(*markdown_table(HEADINGS, [_entries(row) for row in rows if row.joint in shown]), sep="\n")
     _print_judged(rows)
 
 

@@ -13,7 +13,7 @@ from archord.benchmarks.paper_runs import PLANES, Plane, plastic
 from archord.postprocess.law_joint import LawJoint
 from archord.postprocess.laws import find_law
 from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.run_fields import SUBTRIANGLES, read_fields
+from archord.results.run_fields import SUBTRIANGLES, read_fields
 from archord.solver.step_file import step_name
 
 STAGES = (1.25, 1.6, 2.0)  # A, B and C in clearances: just after the paper's first yield, and on to its end

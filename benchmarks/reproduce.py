@@ -12,6 +12,7 @@ from archord.benchmarks.claims import CLAIMS
 from archord.benchmarks.figures import Runs, Table, fig2, fig3, fig4, fig5, fig7, fig9
 from archord.benchmarks.first_yield import fig8
 from archord.benchmarks.paper_runs import PAIRS, Case, cases, plastic, solve_missing
+from archord.benchmarks.report_files import markdown_table
 from archord.solver.output_file import check_output
 from archord.solver.ranks import agreed
 from archord.solver.run_folder import claim_folder
@@ -109,14 +110,10 @@ def _report(runs: Runs, folder: Path) -> list[Path]:
         f"Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {errors[worst]:.2%} from 0.2 dR on "
         f"({worst}): the discretisation error of the finer one, which all numbers come from, is below that.",
         "",
-        "| claim | figure | the paper | ours, plane strain | ours, plane stress | verdict |",
-        "|---|---|---|---|---|---|",
     ]
-    lines += [
-        f"| {c.name} | {c.figure} | {c.text} | {c.strain} | {c.stress} | {c.verdict} |"
-        for c in (f(runs) for f in CLAIMS)
-    ]
-    lines += ["", *(f"![figure {name[3:]}]({name}.png)\n" for name in FIGURES)]
+    headings = ("claim", "figure", "the paper", "ours, plane strain", "ours, plane stress", "verdict")
+    judged = [(c.name, c.figure, c.text, c.strain, c.stress, c.verdict) for c in (f(runs) for f in CLAIMS)]
+    lines += [*markdown_table(headings, judged), "", *(f"![figure {name[3:]}]({name}.png)\n" for name in FIGURES)]
     text = "\n".join(lines) + "\n"
     (folder / "report.md").write_text(text, encoding="utf-8")
     body = MarkdownIt("commonmark").enable("table").render(text)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Sequence
 from pathlib import Path
 
+from archord.benchmarks.report_files import markdown_table, write_files
 from archord.benchmarks.scaling import SERIAL, TOLD, Costs, exponent, extrapolated, goals, serial_fraction
 from archord.benchmarks.scaling_run import PARTS, REST, Cost
 
@@ -15,16 +14,8 @@ _ALL_PARTS = (*PARTS, REST)
 
 def write_report(costs: Costs, folder: Path) -> list[Path]:
     """Write scaling.csv, scaling.md and scaling.png into ``folder``; returns the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / f"scaling.{kind}" for kind in ("csv", "md", "png")]
     rows = [row(cost) for cost in costs.all]
-    with files[0].open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    files[1].write_text(markdown(costs), encoding="utf-8")
-    draw(costs, files[2])
-    return files
+    return write_files(folder, "scaling", rows, markdown(costs), lambda file: draw(costs, file))
 
 
 def row(cost: Cost) -> dict[str, str]:
@@ -50,8 +41,8 @@ def row(cost: Cost) -> dict[str, str]:
 
 def markdown(costs: Costs) -> str:
     """What is asked for and what was measured, then the tables behind it."""
-    out = ["| asked for | measured | met |", "|---|---|---|"]
-    out += [f"| {asked} | {measured} | {'yes' if met else 'no'} |" for asked, measured, met in goals(costs)]
+    judged = [(asked, measured, "yes" if met else "no") for asked, measured, met in goals(costs)]
+    out = markdown_table(("asked for", "measured", "met"), judged)
     for title, lines in (
         ("Cost over size, 1 rank", _cost(costs.series(1))),
         ("Strong scaling", _strong(costs)),
@@ -64,10 +55,6 @@ def markdown(costs: Costs) -> str:
             out += ["", f"**{title}**", "", *lines]
     faults = costs.faults()
     return "\n".join([*out, *(["", "Faults:", "", *(f"- {fault}" for fault in faults)] if faults else []), ""])
-
-
-def _table(headings: Sequence[str], rows: list[list[str]]) -> list[str]:
-    return ["| " + " | ".join(headings) + " |", "|---" * len(headings) + "|"] + [f"| {' | '.join(r)} |" for r in rows]
 
 
 def _cost(series: list[Cost]) -> list[str]:
@@ -94,7 +81,7 @@ def _cost(series: list[Cost]) -> list[str]:
                 "per factorisation and its solves [s]", "mesh and setup [s]", "contact",
                 "contact, assembly and return map in the solve", "peak memory [MB]",
                 "power of N since the line before")  # fmt: skip
-    lines = _table(headings, rows)
+    lines = markdown_table(headings, rows)
     if len(series) > 1:
         n = [c.dofs for c in series]
         powers = {
@@ -127,7 +114,7 @@ def _strong(costs: Costs) -> list[str]:
             )
     headings = ("dofs", "ranks", *(f"{part} [s]" for part in _ALL_PARTS), "total [s]", "times faster", "contact",
                 "peak memory per rank [MB]")  # fmt: skip
-    return _table(headings, rows)
+    return markdown_table(headings, rows)
 
 
 def _weak(costs: Costs) -> list[str]:
@@ -149,7 +136,7 @@ def _weak(costs: Costs) -> list[str]:
         return []
     headings = ("dofs on 1 rank", "dofs", "ranks", "seconds on 1 rank", "seconds", "efficiency",
                 "of one factorisation and its solves", "peak memory on 1 rank [MB]", "per rank [MB]")  # fmt: skip
-    return _table(headings, rows)
+    return markdown_table(headings, rows)
 
 
 def _guided(costs: Costs) -> list[str]:
@@ -166,7 +153,7 @@ def _guided(costs: Costs) -> list[str]:
     ]
     headings = ("material", "dofs", "iterations without", "with", "on coarser meshes", "seconds without", "with",
                 "times faster", "difference of P")  # fmt: skip
-    return _table(headings, rows) if rows else []
+    return markdown_table(headings, rows) if rows else []
 
 
 def _extrapolation(costs: Costs) -> list[str]:
@@ -200,7 +187,7 @@ def _extrapolation(costs: Costs) -> list[str]:
         "knows no network, no shared memory bandwidth and no elimination tree that is too narrow for many ranks, all "
         "of which would make it slower.",
         "",
-        *_table(headings, rows),
+        *markdown_table(headings, rows),
     ]
 
 

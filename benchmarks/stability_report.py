@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 from pathlib import Path
 
 import numpy as np
 
+from archord.benchmarks.report_files import markdown_table, write_files
 from archord.benchmarks.stability import Comparison, Line
 
 _PANELS = 3
@@ -50,16 +50,8 @@ def row(line: Line) -> dict[str, str]:
 
 def write_report(lines: list[Line], folder: Path) -> list[Path]:
     """Write stability.csv, stability.md and stability.png into ``folder``; returns the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / f"stability.{kind}" for kind in ("csv", "md", "png")]
     rows = [row(line) for line in lines]
-    with files[0].open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    files[1].write_text(markdown(lines), encoding="utf-8")
-    draw(lines, files[2])
-    return files
+    return write_files(folder, "stability", rows, markdown(lines), lambda file: draw(lines, file))
 
 
 def summary(lines: list[Line]) -> str:
@@ -81,11 +73,9 @@ def markdown(lines: list[Line]) -> str:
                 "value", "expected", "by", "deviation", "seconds", "verdict")  # fmt: skip
     out = [summary(lines)]
     for group in dict.fromkeys(line.case.group for line in lines):
-        out += ["", f"**{group}**", "", "| " + " | ".join(headings) + " |", "|---" * len(headings) + "|"]
-        for line in lines:
-            if line.case.group == group:
-                entries = row(line)
-                out.append("| " + " | ".join(entries[name].replace("|", "\\|") for name in headings) + " |")
+        entries = [row(line) for line in lines if line.case.group == group]
+        cells = [[entry[name] for name in headings] for entry in entries]
+        out += ["", f"**{group}**", "", *markdown_table(headings, cells)]
     said = [f"- {line.case.name}: {line.result.message}." for line in lines if line.result.message]
     return "\n".join([*out, *(["", "What the runs that stopped said:", "", *said] if said else []), ""])
 

@@ -120,7 +120,7 @@ def _look(result: Result, scene: Scene, outcome: Outcome) -> None:
     if outcome.steps:
         result.balance = float(report["error_estimates"]["force_balance"])
         result.balance_limit = max(_BALANCE, _SPREAD * report["error_estimates"]["newton_residual"])
-        result.energy = float(report["error_estimates"]["energy_balance"])
+        result.energy = report["error_estimates"]["energy_balance"] or 0.0
         result.energy_limit = _energy_limit(scene, outcome.steps)
         result.quantities = quantities(scene, outcome.steps[-1])
     held = re.search(r"last load that held is P = (\S+?)(;|$)", outcome.message)
@@ -130,10 +130,12 @@ def _look(result: Result, scene: Scene, outcome: Outcome) -> None:
 
 def _energy_limit(scene: Scene, steps: list[Measures]) -> float:
     """How far the trapezoidal rule can be from the work, over the work, where P is monotonic between two steps: half
-    the sum of |dP d delta|. An interference fit stores energy before there is a load."""
-    if scene.joint.dR < 0:
+    the sum of |dP d delta|. That of an interference fit counts from its first step on, alone it knows none."""
+    press_fit = scene.joint.dR < 0
+    if press_fit and len(steps) == 1:
         return math.inf
-    P, delta = np.array([0.0] + [m.P for m in steps]), np.array([0.0] + [m.delta for m in steps])
+    begin = [] if press_fit else [0.0]
+    P, delta = np.array(begin + [m.P for m in steps]), np.array(begin + [m.delta for m in steps])
     largest = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
     return float(np.abs(np.diff(P) * np.diff(delta)).sum() / 2 / largest) if largest else 0.0
 

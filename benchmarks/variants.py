@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import subprocess
 import sys
@@ -14,6 +13,7 @@ from time import perf_counter
 from typing import Any
 
 from archord.benchmarks.paper_joint import paper_joint
+from archord.benchmarks.report_files import rows_table, write_files
 from archord.solver.run_folder import claim_folder
 from archord.solver.scene_file import resolved
 
@@ -161,19 +161,9 @@ def row(used: Use) -> dict[str, str]:
 
 def markdown(uses: list[Use]) -> str:
     """The variants as a table."""
-    rows = [row(used) for used in uses]
-    out = ["| " + " | ".join(rows[0]) + " |", "|---" * len(rows[0]) + "|"]
-    return "\n".join([*out, *("| " + " | ".join(r.values()) + " |" for r in rows), ""])
+    return "\n".join([*rows_table([row(used) for used in uses]), ""])
 
 
 def write_report(uses: list[Use], folder: Path) -> list[Path]:
     """Write variants.csv and variants.md into ``folder``; returns the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / "variants.csv", folder / "variants.md"]
-    rows = [row(used) for used in uses]
-    with files[0].open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    files[1].write_text(markdown(uses), encoding="utf-8")
-    return files
+    return write_files(folder, "variants", [row(used) for used in uses], markdown(uses))

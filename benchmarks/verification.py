@@ -14,6 +14,7 @@ from pathlib import Path
 from time import perf_counter
 
 from archord.benchmarks.paper_joint import paper_joint
+from archord.benchmarks.report_files import markdown_table
 from archord.solver.measures import Measures
 from archord.solver.run import Outcome, solve_scene
 
@@ -26,10 +27,11 @@ class _Row:
     ours: float
     detail: str
 
-    def __str__(self) -> str:
+    @property
+    def cells(self) -> list[str]:
         difference = abs(self.ours / self.reference - 1)
-        numbers = f"{self.reference:.7g} | {self.source} | {self.ours:.7g} | {difference:.1e}"
-        return f"| {self.what} | {numbers} | {self.detail} |"
+        numbers = [f"{self.reference:.7g}", self.source, f"{self.ours:.7g}", f"{difference:.1e}"]
+        return [self.what, *numbers, self.detail]
 
 
 def _solve(element_size: float, steps: int, yield_stress: float | None = None, **sections: dict) -> tuple[Outcome, str]:
@@ -78,8 +80,8 @@ def main() -> None:
     rows.append(
         _Row("small contact: half-width/R", math.sqrt(4 * m.P * radius / math.pi), "Hertz", m.contact_area / 2, "")
     )
-    print("| what | reference | by | archord | relative difference | cost |\n|---|---|---|---|---|---|")
-    print("\n".join(map(str, rows)))
+    headings = ("what", "reference", "by", "archord", "relative difference", "cost")
+    print(*markdown_table(headings, [row.cells for row in rows]), sep="\n")
     force, energy = _imbalances(outcomes)
     print(f"\nForces at pin, contact and block differ by at most {force:.0e} of P in any step; work differs from")
     print(f"stored and dissipated energy by at most {energy:.1e} of the work.")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from archord.benchmarks.envelope import Pairs, seconds_at
+from archord.benchmarks.report_files import markdown_table, write_rows
 from archord.benchmarks.work_precision import Line, envelopes, own_limit
 from archord.benchmarks.work_precision_cases import CASES, QUANTITIES, Case, Kinematics
 from archord.benchmarks.work_precision_codes import CALCULIX, OURS
@@ -55,11 +55,7 @@ def row(line: Line) -> dict[str, str]:
 
 def write_csv(lines: list[Line], path: Path) -> None:
     """Write a row for every point, failed ones too."""
-    rows = [row(line) for line in lines]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    write_rows([row(line) for line in lines], path)
 
 
 def markdown(lines: list[Line], warm: Mapping[str, Sequence[float]] | None = None) -> str:
@@ -89,7 +85,8 @@ def processor() -> str:
 
 def reference_table(cases: Sequence[Case], kinematics: Sequence[Kinematics] = ("current", "reference")) -> list[str]:
     """The reference values, what they are known to, and the two extrapolations that they come from."""
-    out = ["| case | kinematics | quantity | value | relative error | first family | second family |", "|---" * 7 + "|"]
+    headings = ("case", "kinematics", "quantity", "value", "relative error", "first family", "second family")
+    rows = []
     for case in cases:
         for way in kinematics:
             entry = stored(case.name, way)
@@ -108,8 +105,8 @@ def reference_table(cases: Sequence[Case], kinematics: Sequence[Kinematics] = ("
                     cells.append(
                         f"{limit['value']:.9g} (order {limit['order']:.1f})" if limit else f"{family['name']}: {listed}"
                     )
-                out.append("| " + " | ".join(cells) + " |")
-    return out
+                rows.append(cells)
+    return markdown_table(headings, rows)
 
 
 def ratio_table(kept: Mapping[str, Pairs]) -> list[str]:
@@ -118,15 +115,16 @@ def ratio_table(kept: Mapping[str, Pairs]) -> list[str]:
     if OURS not in kept or not others:
         return []
     ours = kept[OURS]
-    out = ["| error of P | " + " | ".join([f"{OURS} [s]", *others]) + " |", "|---" * (2 + len(others)) + "|"]
+    rows = []
     for level in LEVELS:
         mine = seconds_at(level, ours)
         times = [seconds_at(level, kept[code]) for code in others]
         if mine is not None or any(time is not None for time in times):
             cells = [_times(time, mine) for time in times]
-            out.append(f"| {level:g} | " + " | ".join([f"{mine:.2f}" if mine else "never", *cells]) + " |")
+            rows.append([f"{level:g}", f"{mine:.2f}" if mine else "never", *cells])
     reached = [f"{code} {kept[code][-1][1]:.1e}" for code in (OURS, *others)]
-    return [*out, "", f"Smallest errors of P reached: {', '.join(reached)}."]
+    table = markdown_table(("error of P", f"{OURS} [s]", *others), rows)
+    return [*table, "", f"Smallest errors of P reached: {', '.join(reached)}."]
 
 
 def _times(theirs: float | None, ours: float | None) -> str:
@@ -138,19 +136,19 @@ def _times(theirs: float | None, ours: float | None) -> str:
 def _table(case: Case, lines: list[Line]) -> list[str]:
     shown = case.quantities
     headings = [*_HEADINGS, *(f"error of {name}" for name in shown)]
-    out = ["| " + " | ".join(headings) + " |", "|---" * len(headings) + "|"]
+    rows = []
     for line in lines:
         e = row(line)
         cells = [e["code"], e["series"], e["label"]]
         if line.point.failure:
-            cells += [f"failed: {line.point.failure}".replace("|", "\\|")] + [""] * (len(headings) - 4)
+            cells += [f"failed: {line.point.failure}"] + [""] * (len(headings) - 4)
         else:
             spread = f"{e['seconds min']} - {e['seconds max']}"
             cells += [e["dofs"], e["steps"], e["iterations"], e["factorisations"], e["seconds median"], spread]
             cells += [e["memory [MB]"], f"{line.point.values.quantities['P']:.8f}" if line.point.values else ""]
             cells += [f"{line.errors[name]:.1e}" if name in line.errors else "" for name in shown]
-        out.append("| " + " | ".join(cells) + " |")
-    return out
+        rows.append(cells)
+    return markdown_table(headings, rows)
 
 
 def _notes(case: Case, lines: list[Line]) -> list[str]:
@@ -181,12 +179,12 @@ def _notes(case: Case, lines: list[Line]) -> list[str]:
 def _warm_table(warm: Mapping[str, Sequence[float]]) -> list[str]:
     from statistics import median
 
-    out = ["**within one process, after a first solve**", "", "| curve | seconds, median | from - to | solves |"]
-    out.append("|---|---|---|---|")
-    for name, seconds in warm.items():
-        spread = f"{min(seconds):.3g} - {max(seconds):.3g}"
-        out.append(f"| {name} | {median(seconds):.3g} | {spread} | {len(seconds)} |")
-    return out
+    rows = [
+        (name, f"{median(seconds):.3g}", f"{min(seconds):.3g} - {max(seconds):.3g}", len(seconds))
+        for name, seconds in warm.items()
+    ]
+    table = markdown_table(("curve", "seconds, median", "from - to", "solves"), rows)
+    return ["**within one process, after a first solve**", "", *table]
 
 
 def _whole(value: int | None) -> str:

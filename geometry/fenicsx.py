@@ -1,7 +1,10 @@
-"""From a gmsh model to a dolfinx mesh: the one place that knows what dolfinx renamed between releases."""
+"""From a gmsh model to a dolfinx mesh: the one place that knows what dolfinx renamed between releases, and what it does
+to the process."""
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -22,6 +25,17 @@ except ImportError:
     from dolfinx.la import create_petsc_vector as create_vector
 
 __all__ = ["create_vector", "gmsh_to_mesh"]
+
+
+def _leave_broken_pipes_to_python() -> None:
+    """Give SIGPIPE back to Python, which ignores it and raises `BrokenPipeError`: importing dolfinx starts PETSc, whose
+    handler ends the process with a page of text where the reader of its output, like head, has seen enough."""
+    before = signal.getsignal(signal.SIGPIPE)  # as Python knows it, which PETSc has not asked
+    if before is not None and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, before)
+
+
+_leave_broken_pipes_to_python()
 
 
 def gmsh_to_mesh(

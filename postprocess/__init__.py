@@ -1,1 +1,1 @@
-"""Reads results and turns them into quantities of the field; never solves."""
+"""Laws of the joint, and quantities of the field from what runs wrote (chord pressure, fits); never solves."""

@@ -10,10 +10,12 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.postprocess.law_joint import LawJoint
-from archord.postprocess.run_result import no_run
 from archord.solver.history import read_history
+from archord.solver.run_folder import no_run
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import load_scene
+
+_SAME = 1e-6  # relative difference of two forces that are the same but for what Newton leaves
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,16 @@ class RunCurve:
         return min(given, default=None)
 
     def loading(self) -> RunCurve:
-        """The steps at which the pin is deeper in the hole than ever before; unloading and what it repeats left out."""
-        deepest = np.maximum.accumulate([0.0, *self.delta])[:-1]
-        first = self.delta > deepest * (1 + 1e-9)
+        """The steps at which the pin is deeper in the hole than ever before; unloading and what it repeats left out.
+
+        A joint that yields comes back from unloading a little deeper and softer, to the first loading's curve only
+        beyond: the first step that counts again is one whose P is larger than ever before, too.
+        """
+        deepest, largest = (np.maximum.accumulate([0.0, *values])[:-1] for values in (self.delta, self.P))
+        deeper, stronger = self.delta > deepest * (1 + 1e-9), largest * (1 + _SAME) < self.P
+        first, going_on = np.zeros(len(self.delta), dtype=bool), True
+        for i in range(len(first)):
+            first[i] = going_on = deeper[i] and (going_on or stronger[i])
         curves = {name: getattr(self, name)[first] for name in ("delta", "P", "p0", "eps", "peeq_max")}
         return replace(self, **curves)
 

@@ -126,16 +126,27 @@ class Report:
             s[name] = s.get(name, 0.0) + value
         return {name: round(value, 4) for name, value in s.items()}
 
-    def _errors(self) -> dict[str, float]:
+    def _errors(self) -> dict[str, float | None]:
         if not self.measures:
             return {}
-        m = self.measures[-1]
-        work = max((abs(m.work) for m in self.measures if m.contact_area), default=0.0)
         return {
             "force_balance": max(m.force_balance for m in self.measures),
-            "energy_balance": abs(m.work - m.elastic_energy - m.plastic_dissipation) / work if work else 0.0,
+            "energy_balance": energy_balance(self.measures, press_fit=self.joint.scene.joint.dR < 0),
             "newton_residual": self._residual,
         }
+
+
+def energy_balance(steps: Sequence[Measures], *, press_fit: bool = False) -> float | None:
+    """How far work and stored and dissipated energy of the last of the ``steps`` are apart, over the largest work.
+
+    The pin of a ``press_fit``, too large for its hole, stores energy before there is a load, by work that nobody
+    counted: there both count from the first step on, and the result is None where that is the only one.
+    """
+    if press_fit and len(steps) == 1:
+        return None
+    missing = [m.work - m.elastic_energy - m.plastic_dissipation for m in (steps[0], steps[-1])]
+    work = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
+    return abs(missing[1] - (missing[0] if press_fit else 0.0)) / work if work else 0.0
 
 
 def _step_of(warning: str) -> int:

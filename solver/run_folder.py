@@ -56,3 +56,15 @@ def claim_folder(folder: Path, force: bool) -> None:
             raise SceneError(f"{folder}: cannot be used as run folder: Permission denied.")
     except OSError as error:
         raise SceneError(f"{folder}: cannot be used as run folder: {error.strerror}.") from None
+
+
+def is_sweep(folder: str | Path) -> bool:
+    """Whether ``folder`` is that of a sweep."""
+    return (Path(folder) / "sweep.toml").is_file()
+
+
+def no_run(folder: Path, missing: str) -> SceneError:
+    """What to say of a ``folder`` that is no run folder, as a file is ``missing``."""
+    if is_sweep(folder):
+        return SceneError(f"{folder}: is a sweep, not a run; its runs are the folders in {folder / 'cases'}.")
+    return SceneError(f"{folder}: is not a run folder: {missing} is missing.")

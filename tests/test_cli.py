@@ -152,6 +152,19 @@ def test_a_killed_run_leaves_its_steps_readable(tmp_path, kill, code):
         assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "interrupted"
 
 
+@pytest.mark.parametrize(("command", "code"), [(SOLVE, 141), ([*SOLVE[:3], "scene", "--reference"], 0)])
+def test_a_reader_that_has_seen_enough_ends_the_command_without_a_word(tmp_path, command, code):
+    """As ``archord solve SCENE | head -1`` does: no trace of PETSc or Python; a solve says that it is not done."""
+    with subprocess.Popen(
+        command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        if command is SOLVE:
+            assert b"elastic-plastic joint" in process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait(120) == code
+
+
 def test_ranks_stop_together(tmp_path):
     """mpirun hands Ctrl-C on as SIGTERM: the run notes it before all ranks end."""
     command = ["mpirun", "-n", "2", *SOLVE, "--set", "load.steps=500", "-o", "run"]

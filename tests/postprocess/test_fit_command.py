@@ -11,6 +11,7 @@ import pytest
 from archord.cli import run
 from archord.postprocess.fitted_law import FittedLaw
 from archord.postprocess.run_curve import read_run
+from tests.postprocess.synthetic import curve
 
 
 def test_fit_prints_a_table_and_writes_what_is_asked_for(runs, tmp_path, capsys):
@@ -96,6 +97,11 @@ def test_no_picture_loads_no_plotting_library(runs, tmp_path):
     assert result.stdout.splitlines()[-1] == "False"
 
 
+def _through(delta, P):
+    """The curve of a run through these points."""
+    return replace(curve(0.85), delta=np.array(delta), **dict.fromkeys(("P", "p0", "eps", "peeq_max"), np.array(P)))
+
+
 def test_unloading_is_left_out(runs):
     """Of a way there, back and further, the steps on new ground remain."""
     curve = read_run(runs["elastic"])
@@ -104,3 +110,16 @@ def test_unloading_is_left_out(runs):
     loop = replace(curve, **{name: getattr(curve, name)[path] for name in ("delta", "P", "p0", "eps", "peeq_max")})
     np.testing.assert_array_equal(loop.loading().delta, curve.delta)
     np.testing.assert_array_equal(loop.loading().P, curve.P)
+
+
+def test_a_step_on_the_way_back_to_the_first_loading_is_left_out():
+    """The same force again, a little deeper by what yielded on the way, or a smaller one, is not on new ground."""
+    cycles = _through([1, 2, 1.5, 2.002, 1.5, 2.003, 2.5, 3], [1, 2, 0, 2, 0, 2 + 1e-9, 2.5, 3])
+    assert list(cycles.loading().delta) == [1, 2, 2.5, 3]
+    softer = _through([1, 2, 1, 2.001, 2.1, 3], [1, 2, 0, 1.999, 2.1, 3])
+    assert list(softer.loading().delta) == [1, 2, 2.1, 3]
+
+
+def test_the_first_loading_may_soften():
+    """Without an unloading every deeper step counts, also where P falls."""
+    assert list(_through([1, 2, 3, 4], [1, 2, 1.9, 2]).loading().P) == [1, 2, 1.9, 2]

@@ -12,8 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.paper_joint import paper_joint
-from archord.solver import mesh_family
-from archord.solver import scene as scene_module
+from archord.solver import mesh_family, scene_geometry
 from archord.solver.accuracy import solve_to_accuracy
 from archord.solver.error_estimate import mesh_error, step_error
 from archord.solver.mesh_family import MeshFamily
@@ -139,7 +138,7 @@ def test_a_pin_that_never_touches_has_no_error(tmp_path):
 def test_too_much_accuracy_ends_with_a_warning(tmp_path, monkeypatch):
     """The finest mesh allowed stays; the warning has the estimate and what to do."""
     scene = open_scene(1e-4)
-    monkeypatch.setattr(scene_module, "_MOST_CELLS", 1000)
+    monkeypatch.setattr(scene_geometry, "_MOST_CELLS", 1000)
     outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
     assert outcome.status == "done"
     assert outcome.accuracy.estimated > 1e-4
@@ -147,7 +146,7 @@ def test_too_much_accuracy_ends_with_a_warning(tmp_path, monkeypatch):
     assert "not below analysis.accuracy = 0.0001" in warning
     assert f"{outcome.accuracy.estimated:.1e}" in warning
     assert json.loads((tmp_path / "run.json").read_text())["warnings"] == outcome.warnings
-    monkeypatch.setattr(scene_module, "_MOST_CELLS", 5)
+    monkeypatch.setattr(scene_geometry, "_MOST_CELLS", 5)
     with pytest.raises(SceneError, match="no mesh within the limits"):
         solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
 

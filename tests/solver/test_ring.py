@@ -7,6 +7,7 @@ from mpi4py import MPI
 from archord.benchmarks.persson import DR, UNLIKE, persson_joint, theory, unlike
 from archord.postprocess.law_joint import LawJoint
 from archord.postprocess.persson_law import persson_pressure
+from archord.solver.report import energy_balance
 from tests.solver.solving import solve
 
 LIKE = LawJoint(1.0, DR, 1.0)
@@ -89,3 +90,14 @@ def test_the_force_does_the_work_that_is_stored():
         m = solve(persson_joint(0.5, 0.08, steps)).steps[-1]
         errors.append(abs(m.work / m.elastic_energy - 1))
     assert errors[1] < 0.6 * errors[0] < 0.05
+
+
+def test_the_work_of_an_interference_fit_counts_from_its_first_step_on():
+    """The fit stores energy before there is a force: without it the balance is that of the steps, alone it is none."""
+    balances = []
+    for steps in (8, 16):
+        done = solve(persson_joint(-0.2, 0.08, steps)).steps
+        balances.append(energy_balance(done, press_fit=True))
+        assert energy_balance(done) > 0.2
+    assert balances[1] < 0.6 * balances[0] < 0.05
+    assert energy_balance(done[:1], press_fit=True) is None

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.postprocess.picture import draw
+from archord.results.picture import draw
 from archord.solver import run as run_module
 from archord.solver.history import read_history
 from archord.solver.run import solve_scene

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from archord.postprocess.export_files import check_new
-from archord.postprocess.frames import cell_frame, contact_frame, node_frame, with_headings, with_units
-from archord.postprocess.run_result import Run
+from archord.results.export_files import check_new
+from archord.results.frames import cell_frame, contact_frame, node_frame, with_headings, with_units
+from archord.results.run_result import Run
 from archord.solver.output_file import writing
 from archord.solver.step_file import step_name
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from archord.solver.history import read_history
+from archord.solver.run_folder import no_run
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import load_scene
 
@@ -23,19 +24,7 @@ if TYPE_CHECKING:
 
     from archord.postprocess.arc_pressure import ArcContact
     from archord.postprocess.run_curve import RunCurve
-    from archord.postprocess.run_fields import Fields
-
-
-def is_sweep(folder: str | Path) -> bool:
-    """Whether ``folder`` is that of a sweep."""
-    return (Path(folder) / "sweep.toml").is_file()
-
-
-def no_run(folder: Path, missing: str) -> SceneError:
-    """What to say of a ``folder`` that is no run folder, as a file is ``missing``."""
-    if is_sweep(folder):
-        return SceneError(f"{folder}: is a sweep, not a run; its runs are the folders in {folder / 'cases'}.")
-    return SceneError(f"{folder}: is not a run folder: {missing} is missing.")
+    from archord.results.run_fields import Fields
 
 
 class Run:
@@ -89,7 +78,7 @@ class Run:
     @cached_property
     def history(self) -> pd.DataFrame:
         """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of every column."""
-        from archord.postprocess.frames import history_frame
+        from archord.results.frames import history_frame
 
         return history_frame(self.folder / "history.csv")
 
@@ -114,7 +103,7 @@ class Run:
 
         Raises `SceneError` without such a step or side.
         """
-        from archord.postprocess.frames import contact_frame
+        from archord.results.frames import contact_frame
 
         arcs = self.contact(step)
         if side is not None and side not in arcs:
@@ -126,7 +115,7 @@ class Run:
 
         Raises `SceneError` without such a step, and if the run wrote no fields.
         """
-        from archord.postprocess.run_fields import read_fields
+        from archord.results.run_fields import read_fields
 
         return read_fields(self.folder, self.scene, self.number(step))
 

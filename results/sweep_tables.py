@@ -6,8 +6,8 @@ import math
 
 from rich.table import Table
 
-from archord.postprocess.run_tables import plain_table, shown_rows
-from archord.postprocess.sweep_result import Sweep, short
+from archord.results.run_tables import plain_table, shown_rows
+from archord.results.sweep_result import Sweep, short
 from archord.solver.scene import SceneError
 
 MOST_ROWS = 60

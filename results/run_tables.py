@@ -6,8 +6,8 @@ import math
 
 from rich.table import Table
 
-from archord.postprocess.run_result import Run
-from archord.postprocess.run_warnings import first_of_each_kind
+from archord.results.run_result import Run
+from archord.results.run_warnings import first_of_each_kind
 from archord.solver.scene import Pin, Scene, Solid
 
 MOST_ROWS = 40  # of a history

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from archord.postprocess import panels
-from archord.postprocess.run_result import Run
+from archord.results import panels
+from archord.results.run_result import Run
 from archord.solver.output_file import check_output, writing
 
 DOTS = 110  # per inch

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from archord.benchmarks.paper_joint import paper_joint
 from archord.cli import run as command
-from archord.postprocess.run_result import Run
+from archord.results.run_result import Run
 from archord.solver.run import solve_scene
 
 PICTURES = ["force.png", "pressure.png", "field.png", "iterations.png"]

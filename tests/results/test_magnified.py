@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from archord.benchmarks.paper_joint import paper_joint
-from archord.postprocess.magnified import magnification, magnified, nominal, rigid_arc
-from archord.postprocess.run_fields import BODIES
-from archord.postprocess.run_result import Run
+from archord.results.magnified import magnification, magnified, nominal, rigid_arc
+from archord.results.run_fields import BODIES
+from archord.results.run_result import Run
 
 
 def test_without_magnification_nothing_is_moved(runs):

@@ -6,9 +6,9 @@ from mpi4py import MPI
 
 from archord.benchmarks.paper_joint import E, paper_joint
 from archord.cli import run as command
-from archord.postprocess.comparison import compare_runs, differing_keys, first_loading, short_names
 from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.run_result import Run
+from archord.results.comparison import compare_runs, differing_keys, first_loading, short_names
+from archord.results.run_result import Run
 from archord.solver.run import solve_scene
 from archord.solver.scene import SceneError
 

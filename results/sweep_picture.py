@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.postprocess.comparison import same_size, same_units
-from archord.postprocess.comparison_picture import FEW, Shades, draw_comparison
-from archord.postprocess.sweep_result import Sweep, short
+from archord.results.comparison import same_size, same_units
+from archord.results.comparison_picture import FEW, Shades, draw_comparison
+from archord.results.sweep_result import Sweep, short
 from archord.solver.scene import SceneError
 
 _MOST = 200  # runs in a picture

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.postprocess.comparison import first_loading
-from archord.postprocess.panels import gap_name
 from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.run_pictures import new_figure, save
-from archord.postprocess.run_result import Run
+from archord.results.comparison import first_loading
+from archord.results.panels import gap_name
+from archord.results.run_pictures import new_figure, save
+from archord.results.run_result import Run
 from archord.solver.output_file import check_output
 from archord.solver.scene import SceneError
 

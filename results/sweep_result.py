@@ -7,7 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from archord.postprocess.run_result import Run, is_sweep
+from archord.results.run_result import Run
+from archord.solver.run_folder import is_sweep
 from archord.solver.scene import SceneError
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ class Sweep:
         return self._frame("sweep.csv")
 
     def _frame(self, name: str) -> pd.DataFrame:
-        from archord.postprocess.frames import sweep_frame
+        from archord.results.frames import sweep_frame
 
         return sweep_frame(self.folder / name)
 

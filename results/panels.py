@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.chord import chord_projection
-from archord.postprocess.magnified import magnification, magnified, rigid_arc
-from archord.postprocess.run_fields import SUBTRIANGLES, Fields
-from archord.postprocess.run_result import Run
+from archord.results.magnified import magnification, magnified, rigid_arc
+from archord.results.run_fields import SUBTRIANGLES, Fields
+from archord.results.run_result import Run
 from archord.solver.scene import Scene
 
 _EDGE_POINTS = 5  # along a curved edge

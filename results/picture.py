@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from archord.postprocess.panels import arc_panel, field_panel, force_panel
-from archord.postprocess.run_pictures import new_figure, save
-from archord.postprocess.run_result import Run
+from archord.results.panels import arc_panel, field_panel, force_panel
+from archord.results.run_pictures import new_figure, save
+from archord.results.run_result import Run
 from archord.solver.output_file import check_output
 from archord.solver.run_folder import FILES
 from archord.solver.scene import SceneError

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.postprocess.run_fields import BODIES, Fields
+from archord.results.run_fields import BODIES, Fields
 from archord.solver.scene import Scene
 
 _VISIBLE = 0.1  # clearance over R, as drawn

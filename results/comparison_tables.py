@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from rich.table import Table
 
-from archord.postprocess.comparison import Compared, Comparison, differing_keys, first_loading
-from archord.postprocess.run_result import Run
-from archord.postprocess.run_tables import number, plain_table, shown_rows
+from archord.results.comparison import Compared, Comparison, differing_keys, first_loading
+from archord.results.run_result import Run
+from archord.results.run_tables import number, plain_table, shown_rows
 
 _ROWS = 20  # of a table
 _LONGEST = 40  # characters of a value

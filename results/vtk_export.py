@@ -15,9 +15,9 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from archord.postprocess.arc_pressure import ArcContact, undeformed
-from archord.postprocess.export_files import check_new
-from archord.postprocess.run_fields import Fields
-from archord.postprocess.run_result import Run
+from archord.results.export_files import check_new
+from archord.results.run_fields import Fields
+from archord.results.run_result import Run
 from archord.solver.output_file import writing
 from archord.solver.scene import Scene
 from archord.solver.step_file import step_name

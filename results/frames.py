@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from archord.postprocess.arc_pressure import ArcContact, undeformed
-from archord.postprocess.run_fields import BODIES, Fields
-from archord.postprocess.run_result import read_columns
+from archord.results.run_fields import BODIES, Fields
+from archord.results.run_result import read_columns
 from archord.solver.scene import Scene, SceneError
 
 _WHOLE = ("step", "iterations", "cutbacks")

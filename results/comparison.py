@@ -18,7 +18,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.run_result import Run
+from archord.results.run_result import Run
 from archord.solver.scene import Scene, SceneError
 from archord.solver.scene_file import resolved
 
