@@ -20,7 +20,7 @@ def folder(tmp_path_factory):
     """Two figures on meshes too coarse for the paper."""
     target = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_runs, "MESHES", {"coarse": 0.2, "fine": 0.1})
+        patch.setattr(paper_runs, "MESHES", {"coarse": 0.3, "fine": 0.2})
         solved: list[str] = []
         reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda case, P: solved.append(case.name))
         assert sorted(solved) == sorted(c.name for c in cases(["elastic", plastic((0.5, 0.2))]))
