@@ -1,6 +1,6 @@
 """``archord`` in processes of its own that start in no time: forked from one that has the solver loaded.
 
-Exit code, signals, open files and what is printed are those of a process; the start-up alone, a second, is not repeated.
+Exit code, signals, open files and what is printed are those of a process; the start-up, a second, is not repeated.
 """
 
 from __future__ import annotations

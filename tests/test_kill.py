@@ -42,8 +42,9 @@ class Run:
 
     @property
     def printed(self) -> int:
-        lines = [line.split() for line in self.out.read_text().splitlines(keepends=True) if line.endswith("\n")]
-        return max((int(words[0]) for words in lines if words and words[0].isdigit() and "steps" not in words), default=0)
+        lines = self.out.read_text().rpartition("\n")[0].splitlines()
+        first = [line.split()[0] for line in lines if line.strip() and "steps in" not in line]
+        return max((int(word) for word in first if word.isdigit()), default=0)
 
 
 def test_a_run_survives_any_number_of_kills(tmp_path, request):

@@ -110,6 +110,7 @@ def test_the_command_writes_its_table(tmp_path, capsys, monkeypatch):
     """Of the smallest meshes, here smaller than the benchmark's own."""
     for name in ("ELASTIC", "PLASTIC"):
         monkeypatch.setattr(scaling_cases, name, (3_000,))
+    monkeypatch.setattr(scaling_cases, "PLASTIC_STEPS", 2)
     assert run(["benchmark", "scaling", "--largest", "5000", "--ranks", "1", "-o", str(tmp_path), "-q"]) == 0
     assert {"scaling.csv", "scaling.md", "scaling.png"} <= {p.name for p in tmp_path.iterdir()}
     with (tmp_path / "scaling.csv").open() as file:

@@ -187,19 +187,18 @@ def test_the_expected_number_of_triangles_is_about_what_the_mesh_has(size, growt
     assert 0.5 < expected / made < 1.5
 
 
-@pytest.mark.parametrize("ring", [False, True], ids=["quarter joint", "half ring"])
-@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize(("ring", "degree"), [(False, 3), (True, 2)], ids=["quarter joint", "half ring"])
 def test_a_mesh_made_by_cutting_is_like_one_made_at_once(ring, degree):
     """The same edges on the arcs, nodes on their circles to the last digits, few more triangles, the same areas."""
     at_once, cut = (
-        half_ring(MPI.COMM_SELF, R, DR, W, 0.04, 0.1, 0.5, degree=degree, refinements=k)
+        half_ring(MPI.COMM_SELF, R, DR, W, 0.02, 0.05, 0.5, degree=degree, refinements=k)
         if ring
-        else quarter_joint(MPI.COMM_SELF, R, DR, W, 0.04, 0.1, degree=degree, refinements=k)
+        else quarter_joint(MPI.COMM_SELF, R, DR, W, 0.02, 0.05, degree=degree, refinements=k)
         for k in (0, 2)
     )
     for tag, radius, centre in ((Facets.HOLE_ARC, R + DR, 0.0), (Facets.PIN_ARC, R, 0.0 if ring else -DR)):
         assert len(cut.facets.find(tag)) == pytest.approx(len(at_once.facets.find(tag)), abs=6)
-        assert edge_lengths(cut, tag).max() <= 0.04 * (1 + DR)
+        assert edge_lengths(cut, tag).max() <= 0.02 * (1 + DR)
         x = facet_nodes(cut, tag).reshape(-1, 2) - [0, centre]
         np.testing.assert_allclose(np.linalg.norm(x, axis=1), radius, rtol=1e-14)
     for body in Cells:
