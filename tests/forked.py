@@ -20,13 +20,13 @@ _FORKS.set_forkserver_preload(
 
 def start(arguments: list[str], folder: Path, out: Path, err: Path) -> multiprocessing.process.BaseProcess:
     """``archord`` with these ``arguments`` in ``folder``, told to write to the files ``out`` and ``err``."""
-    process = _FORKS.Process(target=_run, args=(arguments, str(folder), str(out), str(err)))
+    process = _FORKS.Process(target=_run, args=(arguments, str(folder), str(out), str(err)), daemon=True)
     process.start()
     return process
 
 
 def archord(*arguments: str, cwd: Path) -> subprocess.CompletedProcess:
-    """Run ``archord`` to its end."""
+    """Run ``archord`` to its end, which must come within five minutes."""
     with tempfile.TemporaryDirectory() as place:
         out, err = Path(place, "out"), Path(place, "err")
         process = start(list(arguments), cwd, out, err)
