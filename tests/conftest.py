@@ -22,8 +22,9 @@ def pytest_collection_finish():
 def _destroy_together():
     """Destructors of PETSc and dolfinx objects are collective: run them on all ranks at the same place."""
     yield
-    gc.collect()
-    MPI.COMM_WORLD.barrier()
+    if MPI.COMM_WORLD.size > 1:
+        gc.collect()
+        MPI.COMM_WORLD.barrier()
 
 
 @pytest.fixture

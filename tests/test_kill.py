@@ -5,16 +5,14 @@
 
 import os
 import random
-import subprocess
-import sys
-import threading
 import time
 from pathlib import Path
 
 import pytest
 
+from tests import forked
 from tests.solver.run_files import accepted_steps, same_run
-from tests.test_cli import ENVIRONMENT, SCENE
+from tests.test_cli import SCENE
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
 OPTIONS = ["--set", "joint.relative_element_size=0.3", "--set", "load.steps=15"]
@@ -24,35 +22,29 @@ class Run:
     """An ``archord solve`` in a process of its own; ``printed`` is the last step that it reported."""
 
     def __init__(self, folder: Path, *arguments: str) -> None:
-        command = [sys.executable, "-m", "archord", "solve", *arguments]
-        self.process = subprocess.Popen(
-            command, cwd=folder, env=ENVIRONMENT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        )
-        assert self.process.stdout is not None
-        self.first = self.process.stdout.readline()
+        self.out, self.err = folder / "out", folder / "err"
+        for file in (self.out, self.err):
+            file.write_text("")
+        self.process = forked.start(["solve", *arguments], folder, self.out, self.err)
+        while self.process.is_alive() and not self.out.stat().st_size:
+            time.sleep(0.002)
         self.begun = time.monotonic()
-        self.printed = 0
-        self._reader = threading.Thread(target=self._read)
-        self._reader.start()
-
-    def _read(self) -> None:
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            if line.strip() and line.split()[0].isdigit() and "steps in" not in line:
-                self.printed = int(line.split()[0])
 
     def end(self, after: float | None = None) -> int:
         """Wait until it ends, or for ``after`` seconds and kill it; the exit code."""
-        try:
-            self.process.wait(after)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-        code = self.process.wait()
-        self._reader.join()
-        assert self.process.stderr is not None
+        self.process.join(after)
+        self.process.kill()
+        self.process.join()
+        code = self.process.exitcode
         if code not in (0, -9):
-            raise AssertionError(self.process.stderr.read())
+            raise AssertionError(self.err.read_text())
         return code
+
+    @property
+    def printed(self) -> int:
+        lines = self.out.read_text().rpartition("\n")[0].splitlines()
+        first = [line.split()[0] for line in lines if line.strip() and "steps in" not in line]
+        return max((int(word) for word in first if word.isdigit()), default=0)
 
 
 def test_a_run_survives_any_number_of_kills(tmp_path, request):

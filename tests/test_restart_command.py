@@ -82,28 +82,47 @@ def test_two_ranks_are_continued_by_three(tmp_path, whole):
     assert [(r["after_step"], r["ranks"]) for r in report["restarts"]] == [(steps, 3)]
 
 
-@pytest.mark.parametrize("ranks", [0, 2])
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["run", "--restart", "--set", "pin.nu=0.31"], "run: was solved with pin.nu = 0.3, the scene says 0.31;"),
-        (["run", "--restart", "-o", "other"], "-o other: does not go with a run folder, run."),
-        (["run", "--restart", "--extend"], "choose one of --force, --restart and --extend"),
-        (["run", "--extend", "--set", "load.displacement=1"], "run: ends at 0.1 already;"),
-        (["nothing", "--restart"], "nothing: cannot be read: No such file or directory."),
-        ([SCENE, "-o", "nothing", "--extend"], "nothing: is not a run folder: scene.toml is missing."),
-    ],
-)
-def test_what_cannot_be_continued_is_refused(tmp_path, whole, ranks, arguments, said):
-    """Exit code 2, one sentence, nothing changed."""
+REFUSED = [
+    (["run", "--restart", "--set", "pin.nu=0.31"], "run: was solved with pin.nu = 0.3, the scene says 0.31;"),
+    (["run", "--restart", "-o", "other"], "-o other: does not go with a run folder, run."),
+    (["run", "--restart", "--extend"], "choose one of --force, --restart and --extend"),
+    (["run", "--extend", "--set", "load.displacement=1"], "run: ends at 0.1 already;"),
+    (["nothing", "--restart"], "nothing: cannot be read: No such file or directory."),
+    ([SCENE, "-o", "nothing", "--extend"], "nothing: is not a run folder: scene.toml is missing."),
+]
+
+
+@pytest.fixture
+def untouched(tmp_path, whole):
+    """The run seen from the test's folder; in the end nothing of either has changed."""
     (tmp_path / "run").symlink_to(whole)
     before = {path.name: path.stat().st_mtime_ns for path in whole.iterdir()}
-    result = archord("solve", *arguments, cwd=tmp_path, ranks=ranks)
+    yield tmp_path
+    assert {path.name: path.stat().st_mtime_ns for path in whole.iterdir()} == before
+    assert os.listdir(tmp_path) == ["run"]
+
+
+@pytest.mark.parametrize(("arguments", "said"), REFUSED)
+def test_what_cannot_be_continued_is_refused(untouched, arguments, said):
+    """Exit code 2, one sentence, nothing changed."""
+    result = archord("solve", *arguments, cwd=untouched)
     assert result.returncode == 2
     assert result.stderr.count(said) == 1
     assert "Traceback" not in result.stderr
-    assert {path.name: path.stat().st_mtime_ns for path in whole.iterdir()} == before
-    assert os.listdir(tmp_path) == ["run"]
+
+
+def test_two_ranks_refuse_once(untouched):
+    """All of these under one launcher: exit code 2 of each on every rank, each sentence told by one of them."""
+    code = (
+        "import sys; from archord.cli import run\n"
+        f"codes = {{run(['solve', *arguments]) for arguments in {[arguments for arguments, _ in REFUSED]}}}\n"
+        "sys.exit(2 if codes == {2} else 1)"
+    )
+    command = ["mpirun", "-n", "2", sys.executable, "-c", code]
+    result = subprocess.run(command, cwd=untouched, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    assert result.returncode == 2
+    assert [result.stderr.count(said) for _, said in REFUSED] == [1] * len(REFUSED)
+    assert "Traceback" not in result.stderr
 
 
 def test_a_finished_run_is_extended(tmp_path):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,6 +12,7 @@ from archord.benchmarks.deck import contact_stiffness, deck
 from archord.benchmarks.deck_mesh import deck_mesh
 from archord.benchmarks.paper_joint import paper_joint
 from archord.geometry.joint_mesh import Cells, Facets
+from tests.forked import archord
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="decks are written by one rank")
 
@@ -215,8 +214,7 @@ def test_the_command_writes_a_deck_and_bad_input_is_one_sentence(tmp_path):
     )
 
     def export(*arguments):
-        command = [sys.executable, "-m", "archord", "export-deck", *arguments]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        return archord("export-deck", *arguments, cwd=tmp_path)
 
     first = export("joint.toml", "--elements", "linear", "--set", "load.steps=2")
     assert (first.returncode, first.stdout, first.stderr) == (0, "joint.inp\n", "")

@@ -13,14 +13,18 @@ from archord.benchmarks.first_yield import first_yield
 from archord.benchmarks.paper_runs import PAIRS, Case, cases, plastic
 from archord.benchmarks.reproduce import FIGURES, chosen, reproduce
 from archord.solver.scene import SceneError
+from archord.solver.scene_file import load_scene
+
+STEPS = 8
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Two figures on meshes too coarse for the paper."""
+    """Two figures on meshes and in steps too coarse for the paper."""
     target = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(paper_runs, "MESHES", {"coarse": 0.2, "fine": 0.1})
+        patch.setattr(paper_runs, "load_scene", lambda file, keys: load_scene(file, [*keys, f"load.steps={STEPS}"]))
         solved: list[str] = []
         reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda case, P: solved.append(case.name))
         assert sorted(solved) == sorted(c.name for c in cases(["elastic", plastic((0.5, 0.2))]))
@@ -39,9 +43,9 @@ def rows(path) -> list[dict[str, str]]:
 def test_a_figure_s_table_holds_the_runs(folder):
     """Both planes, all steps, and the numbers of history.csv."""
     table = rows(folder / "fig3.csv")
-    assert [r["plane"] for r in table] == ["strain"] * 20 + ["stress"] * 20
+    assert [r["plane"] for r in table] == ["strain"] * STEPS + ["stress"] * STEPS
     run = Runs(folder / "runs").curve("elastic", "strain")
-    ours = [float(r["p0 R/(E* delta)"]) for r in table[:20]]
+    ours = [float(r["p0 R/(E* delta)"]) for r in table[:STEPS]]
     np.testing.assert_allclose(ours, run.p0 * run.R / (run.E_star * run.delta), rtol=1e-8)
     winkler = [float(r["Winkler, k = 0.85"]) / float(r["delta/dR"]) for r in table]
     np.testing.assert_allclose(winkler, 0.85, rtol=1e-9)

@@ -15,7 +15,7 @@ from archord.postprocess.run_curve import read_run
 from archord.solver.scene import SceneError
 from tests.postprocess.synthetic import LOADS, curve
 
-DRAWS = 150
+DRAWS = 80
 
 
 @pytest.mark.parametrize("quantity", ["P", "p0"])

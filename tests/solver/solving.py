@@ -14,7 +14,9 @@ from archord.solver.measures import Measures, Work, arc_profiles, measure
 from archord.solver.scene import Scene
 from archord.solver.stepping import march
 
-__all__ = ["E", "Solution", "scene", "solve"]
+__all__ = ["SEVERAL", "E", "Solution", "scene", "solve"]
+
+SEVERAL = MPI.COMM_WORLD.size > 1  # on one rank all cuts of a mesh are the same, and one of them is enough
 
 scene = paper_joint
 

@@ -80,12 +80,12 @@ def test_the_scene_that_is_left_gives_the_same_numbers(elastic, tmp_path):
 
 def test_a_plastic_joint_is_as_accurate_as_asked(tmp_path):
     """In 20 output steps, as the reference has them; its own error of the steps at 2 dR is below 5e-4."""
-    outcome = solve_to_accuracy(open_scene(3e-3, 20, 0.002, output={"fields": False}), tmp_path, MPI.COMM_SELF)
+    outcome = solve_to_accuracy(open_scene(6e-3, 20, 0.002, output={"fields": False}), tmp_path, MPI.COMM_SELF)
     found = outcome.accuracy
     assert outcome.status == "done"
-    assert found.estimated == found.mesh_error + found.step_error <= 3e-3
-    assert 0 < found.step_error <= 1.5e-3
-    assert abs(outcome.steps[-1].P / known_force("plastic") - 1) < 3e-3
+    assert found.estimated == found.mesh_error + found.step_error <= 6e-3
+    assert 0 < found.step_error <= 3e-3
+    assert abs(outcome.steps[-1].P / known_force("plastic") - 1) < 6e-3
     tried = {level.substeps for level in found.levels if level.mesh == 1}
     assert {found.substeps, 2 * found.substeps} <= tried or {found.substeps, found.substeps // 2} <= tried
 
@@ -101,7 +101,7 @@ def test_under_a_force_the_displacement_is_accurate(tmp_path):
 def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
     """A plastic joint in two output steps: more accuracy takes more substeps, and brings P closer to that of many."""
     plane = {"plane": "stress"}
-    short = {"initial": 1 / 32, "maximum": 1 / 32}
+    short = {"initial": 1 / 16, "maximum": 1 / 16}
     many = paper_joint(0.2, 2, 0.002, joint={"growth": 1.25}, analysis=plane, stepping=short)
     known = solve_scene(many, _made(tmp_path / "many"), MPI.COMM_SELF).steps[-1].P
     taken, errors = [], []
@@ -284,7 +284,7 @@ def test_the_accuracy_and_the_mesh_exclude_each_other(tmp_path):
 @pytest.mark.mpi
 def test_ranks_choose_the_same_meshes(tmp_path, comm):
     """As one rank does, with the same estimates and forces."""
-    scene = open_scene(0.01, 4, 0.002)
+    scene = open_scene(0.03, 4, 0.002)
     folder = Path(comm.bcast(str(tmp_path)))
     together = solve_to_accuracy(scene, _shared(folder / "together", comm), comm)
     alone = None

@@ -16,7 +16,7 @@ from tests.sweep.parts import numbers, sweep, table, times, written
 from tests.test_cli import ENVIRONMENT, archord
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
-TEXT = "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\nload.steps = [8, 9, 10]\n"  # twelve cases, some two seconds
+TEXT = "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\nload.steps = [5, 6, 7]\n"  # twelve cases, some two seconds
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,46 @@
+"""``archord`` in processes of its own that start in no time: forked from one that has the solver loaded.
+
+Exit code, signals, open files and what is printed are those of a process; the start-up, a second, is not repeated.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+_FORKS = multiprocessing.get_context("forkserver")
+_FORKS.set_forkserver_preload(
+    ["gmsh", "archord.cli", "archord.continuing", "archord.materials.j2", "archord.progress", "archord.solver.run"]
+)
+
+
+def start(arguments: list[str], folder: Path, out: Path, err: Path) -> multiprocessing.process.BaseProcess:
+    """``archord`` with these ``arguments`` in ``folder``, told to write to the files ``out`` and ``err``."""
+    process = _FORKS.Process(target=_run, args=(arguments, str(folder), str(out), str(err)), daemon=True)
+    process.start()
+    return process
+
+
+def archord(*arguments: str, cwd: Path) -> subprocess.CompletedProcess:
+    """Run ``archord`` to its end, which must come within five minutes."""
+    with tempfile.TemporaryDirectory() as place:
+        out, err = Path(place, "out"), Path(place, "err")
+        process = start(list(arguments), cwd, out, err)
+        process.join(300)
+        assert process.exitcode is not None
+        return subprocess.CompletedProcess(arguments, process.exitcode, out.read_text(), err.read_text())
+
+
+def _run(arguments: list[str], folder: str, out: str, err: str) -> None:
+    for stream, name in ((1, out), (2, err)):
+        os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_APPEND), stream)
+    os.chdir(folder)
+    from archord.cli import run
+
+    code = run(arguments)
+    sys.stdout.flush()
+    sys.exit(code)
