@@ -25,6 +25,7 @@ _MANY_DOFS = 20_000  # of an elastic joint for which a factorisation takes longe
 _LINEAR_TOLERANCE = 1e-3  # residual of a linear system over its right-hand side, where it is solved so
 _NEVER = 1_000_000  # iterations
 _MANY_SOLVES = 12  # that cost what a factorisation does
+_MANY_FLIPS = 100  # contact points that open or close, which make so many solves
 
 
 @dataclass
@@ -74,6 +75,7 @@ class NewtonSolver:
         self._raised: BaseException | None = None
         self._failure = ""
         self._renewed = True  # the last factorisation is of another matrix
+        self._flipped = 0  # contact points that opened or closed since
         many = 2 * equilibrium.V.dofmap.index_map.size_global >= _MANY_DOFS
         self._iterative = many and self.elastic and equilibrium.tangent.condensed is None
         self._snes = self._make_snes()
@@ -105,7 +107,7 @@ class NewtonSolver:
         if self._iterative:
             ksp.setType("gmres")
             ksp.setPCSide(PETSc.PC.Side.RIGHT)
-            ksp.setTolerances(rtol=_LINEAR_TOLERANCE)
+            ksp.setConvergenceTest(self._linear_test)
         options = PETSc.Options("archord_")
         options["snes_linesearch_type"] = "bt"
         options["snes_linesearch_max_it"] = 8
@@ -145,15 +147,28 @@ class NewtonSolver:
             self._factorisations += self.equilibrium.tangent.factorisations - before
             self._renewed = False
 
+    def _linear_test(self, ksp: PETSc.KSP, iteration: int, norm: float) -> PETSc.KSP.ConvergedReason:
+        """GMRES is done when the residual is small, or when a new factorisation would have been quicker."""
+        if iteration == 0:
+            self._right_side = norm
+        if norm <= _LINEAR_TOLERANCE * self._right_side:
+            return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
+        many = iteration >= 2 * _MANY_SOLVES
+        return PETSc.KSP.ConvergedReason.CONVERGED_ITS if many else PETSc.KSP.ConvergedReason.ITERATING
+
     def _factorise(self, snes: PETSc.SNES) -> bool:
         """Whether the next matrix is to be factorised, and not solved with by GMRES and the last factorisation.
 
-        From one iteration to the next but few contact points change in a large elastic joint: GMRES needs one to three
-        iterations. From step to step there are too many of them, and plastic joints change all over.
+        With a good guess but few contact points change from one iteration to the next in a large elastic joint: GMRES
+        needs one to three iterations. From step to step there are too many of them, and plastic joints change all over.
         """
         if not self._iterative:
             return True
-        factorise = self._renewed or snes.getKSP().getIterationNumber() > _MANY_SOLVES
+        self._flipped += self._flips[-1]
+        many = snes.getKSP().getIterationNumber() > _MANY_SOLVES or self._flipped > _MANY_FLIPS
+        factorise = self._renewed or many
+        if factorise:
+            self._flipped = 0
         options = PETSc.Options("archord_")
         options["snes_lag_preconditioner"] = 1 if factorise else _NEVER
         snes.setFromOptions()

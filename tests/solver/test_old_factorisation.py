@@ -37,7 +37,7 @@ def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
 def test_many_solves_bring_a_new_factorisation(small_is_large, monkeypatch):
     scene = paper_joint(0.15, 2)
     usual = solve(scene)
-    monkeypatch.setattr(newton_module, "_MANY_SOLVES", 0)
+    monkeypatch.setattr(newton_module, "_MANY_SOLVES", 1)
     often = solve(scene)
     P = often.steps[-1].P
     assert often.joint.tangent_factorisations > usual.joint.tangent_factorisations
@@ -97,3 +97,11 @@ def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
     system.update(*borders[1])
     system.apply(None, r, x)
     assert whole(new, borders[1]) @ x.array_r == pytest.approx(r.array_r, abs=1e-12)
+
+
+def test_many_changes_of_the_contact_bring_a_new_factorisation(small_is_large, monkeypatch):
+    """A guess from afar opens and closes points everywhere: as many factorisations as flips ask for."""
+    scene = paper_joint(0.15, 2)
+    usual = solve(scene).joint.tangent_factorisations
+    monkeypatch.setattr(newton_module, "_MANY_FLIPS", 0)
+    assert solve(scene).joint.tangent_factorisations > usual
