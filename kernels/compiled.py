@@ -12,6 +12,7 @@ import platform
 import shlex
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,17 +21,28 @@ import cffi
 import numpy as np
 
 _FLAGS = ["-std=c11", "-O3", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off"]
-_TYPES = {"d": "double[]", "i": "int32_t[]", "?": "uint8_t[]"}
 _ffi = cffi.FFI()
+_TYPES = {np.dtype(a): _ffi.typeof(c) for a, c in (("d", "double[]"), ("i", "int32_t[]"), ("?", "uint8_t[]"))}
 
 
 class CompilerError(RuntimeError):
     """The C compiler is missing or failed."""
 
 
-@cache
 def library(name: str, prototypes: str) -> Any:
     """The functions of ``name``.c that ``prototypes`` declares. Raises `CompilerError`."""
+    return _loaded(name, prototypes)[1]
+
+
+def structure(name: str, prototypes: str, kind: str, members: Sequence[int | float | np.ndarray]) -> Any:
+    """A pointer to a structure of the type ``kind``, declared in ``prototypes``, with numbers and pointers to arrays,
+    which have to live as long as it is used. Raises `CompilerError`."""
+    values = [pointer(m) if isinstance(m, np.ndarray) else m for m in members]
+    return _loaded(name, prototypes)[0].new(f"{kind} *", values)
+
+
+@cache
+def _loaded(name: str, prototypes: str) -> tuple[cffi.FFI, Any]:
     source = Path(__file__).with_name(f"{name}.c")
     compiler = shlex.split(os.environ.get("CC", "cc"))
     key = "\0".join([*compiler, *_FLAGS, platform.machine()]).encode() + source.read_bytes()
@@ -39,12 +51,12 @@ def library(name: str, prototypes: str) -> Any:
         _compile([*compiler, *_FLAGS], source, path)
     ffi = cffi.FFI()
     ffi.cdef(prototypes)
-    return ffi.dlopen(str(path))
+    return ffi, ffi.dlopen(str(path))
 
 
 def pointer(array: np.ndarray) -> Any:
     """The C-contiguous ``array`` of float64, int32 or bool for a C function."""
-    return _ffi.from_buffer(_TYPES[array.dtype.char], array)
+    return _ffi.from_buffer(_TYPES[array.dtype], array)
 
 
 def _cache() -> Path:

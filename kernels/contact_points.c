@@ -2,11 +2,10 @@
 
 #include <stdint.h>
 
-/* traction (m, 2) = stress . outward, gap = opening . normal, pressure = [traction . normal - gamma gap]_+ where found;
- * stress is [xx, yy, zz, xy] */
+/* traction (m, 2) = stress . outward, gap = opening . normal, trial = traction . normal - gamma gap; stress is [xx, yy, zz,
+ * xy] */
 void contact_pressure(int32_t m, const double *stress, const double *outward, const double *opening,
-                      const double *normal, const double *gamma, const uint8_t *found, double *traction, double *gap,
-                      double *pressure)
+                      const double *normal, const double *gamma, double *traction, double *gap, double *trial)
 {
     for (int32_t i = 0; i < m; i++) {
         const double *s = stress + 4 * i, *N = outward + 2 * i, *n = normal + 2 * i, *d = opening + 2 * i;
@@ -14,8 +13,7 @@ void contact_pressure(int32_t m, const double *stress, const double *outward, co
         t[0] = s[0] * N[0] + s[3] * N[1];
         t[1] = s[3] * N[0] + s[1] * N[1];
         gap[i] = d[0] * n[0] + d[1] * n[1];
-        const double trial = t[0] * n[0] + t[1] * n[1] - gamma[i] * gap[i];
-        pressure[i] = !found[i] || trial <= 0 ? 0 : trial; /* not a number stays that */
+        trial[i] = t[0] * n[0] + t[1] * n[1] - gamma[i] * gap[i];
     }
 }
 

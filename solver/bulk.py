@@ -144,6 +144,8 @@ class Bulk:
             self._force_forms.append(fem.form(ufl.inner(self._sigma, _voigt(v)) * dx))
             self._softened = self._softening_form(ufl.TrialFunction(V), dx)
             self._softening_kernel = fem.compile_form(V.mesh.comm, self._softened)
+        self._softened_cells: np.ndarray | None = None  # those of the form that was made last
+        self._softening_forms: list[fem.Form] = []
         self._action_forms: list[fem.Form] | None = None
         self._elastic_of = forms
         self.stiffness = None
@@ -190,9 +192,13 @@ class Bulk:
             n, q = body.weight.shape
             sigma = self._sigma.x.array.reshape(-1, q, 3)
             sigma[body.cells] = body.stress[:, [0, 1, 3]].reshape(n, q, 3)
-            softening = (tangent - body.points.elastic_tangent).reshape(n, 9 * q)
-            self._softening.x.array.reshape(-1, 9 * q)[body.cells] = softening
-            body.yielding = body.cells[softening.any(axis=1)]
+            elastic = body.points.elastic_tangent
+            # of a point that flows the diagonal differs
+            flows = (tangent.reshape(-1, 9)[:, ::4] != elastic.diagonal()).reshape(n, 3 * q).any(axis=1)
+            softening = self._softening.x.array.reshape(-1, 9 * q)
+            softening[body.yielding] = 0.0
+            body.yielding = body.cells[flows]
+            softening[body.yielding] = (tangent.reshape(n, q, 3, 3)[flows] - elastic).reshape(-1, 9 * q)
 
     def add_force(self, u: PETSc.Vec, force: PETSc.Vec) -> None:
         """Add the internal force of the displacement ``u`` (last passed to `update`) to ``force``."""
@@ -229,10 +235,12 @@ class Bulk:
         if not self._plastic:
             return
         cells = np.sort(np.concatenate([body.yielding for body in self._plastic.values()]))
-        domains = {fem.IntegralType.cell: [(1, cells)]}
-        coefficients = {self._softening: self._softening}
-        form = fem.create_form(self._softening_kernel, [self.V, self.V], self.V.mesh, domains, coefficients, {})
-        assemble(A, [form], bcs)
+        if self._softened_cells is None or not np.array_equal(cells, self._softened_cells):
+            domains = {fem.IntegralType.cell: [(1, cells)]}
+            coefficients = {self._softening: self._softening}
+            form = fem.create_form(self._softening_kernel, [self.V, self.V], self.V.mesh, domains, coefficients, {})
+            self._softened_cells, self._softening_forms = cells, [form]
+        assemble(A, self._softening_forms, bcs)
 
     def commit(self) -> None:
         """Accept the history of the last `update`."""

@@ -37,7 +37,7 @@ from archord.solver.contact_pairing import Kinematics, Pairing
 from archord.solver.contact_pattern import ContactPattern
 from archord.solver.contact_segments import segment_rule
 from archord.solver.contact_side import ContactSide
-from archord.solver.contact_tangent import ContactTangent
+from archord.solver.contact_tangent import ContactTangent, pressure_rate
 from archord.solver.points import PlasticPoints
 
 GAMMA_FACTOR = 0.5  # twice the bound of coercivity; larger values stiffen the edge of the contact and cost iterations
@@ -135,6 +135,20 @@ class Contact:
         if grew:
             self._tangent = None
         return grew
+
+    def anticipate(self, u: Array) -> bool:
+        """Open and close the points whose pressure would change its sign with the displacements ``u`` ``(n, 2)``, to
+        first order and between the same partners, while a rigid disc stands still; returns whether any does.
+
+        Closed points carry their trial pressure, a tension too, until the next evaluation. Of one rank.
+        """
+        flips = 0
+        for pair in self.pairings:
+            expected = pair.trial + pressure_rate(pair, u, pair.opposite_motion(u))
+            active = pair.projection.found & (expected > 0)
+            flips += int((active != pair.active).sum())
+            pair.press(active)
+        return flips > 0
 
     def _raise_together(self, failure: str | None) -> None:
         """Raise `ProjectionError` on every rank if any rank reports a ``failure``, and forget the pairs."""

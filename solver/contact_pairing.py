@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from archord.geometry.curve import Array, Curve, Projection, RigidCircle
 from archord.kernels.compiled import library, pointer
@@ -13,7 +14,7 @@ from archord.solver.contact_side import ContactSide
 
 _PROTOTYPES = """
 void contact_pressure(int32_t m, const double *stress, const double *outward, const double *opening,
-    const double *normal, const double *gamma, const uint8_t *found, double *traction, double *gap, double *pressure);
+    const double *normal, const double *gamma, double *traction, double *gap, double *trial);
 void contact_forces(int32_t n, int32_t q, int32_t k, int32_t o, const double *force, const double *trace,
     const int32_t *own_nodes, const double *shape, const int32_t *opposite_nodes, double *own, double *opposite);
 """
@@ -37,17 +38,22 @@ class Pairing:
     separation: Array = field(init=False)  # x - y (m, 2)
     gap: Array = field(init=False)  # (m,)
     traction: Array = field(init=False)  # (m, 2) of the own body; tied: with the penalty of the jump
+    trial: Array = field(init=False)  # (m,) what the pressure would be, were it not for its sign
     pressure: Array = field(init=False)  # (m,)
+    active: npt.NDArray[np.bool_] = field(init=False)  # (m,) points that carry a contact force
     tangent: Array = field(init=False)  # (m, 3, 3) of the material
+    _kernels: Any = field(init=False, repr=False)
     _search: bool = field(init=False, default=True)
     _hold: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         """Pair the undeformed curves. Raises `ProjectionError`."""
+        self._kernels = library("contact_points", _PROTOTYPES)
         x, outward = self.side.point.reshape(-1, 2), self.side.outward.reshape(-1, 2)
         self.projection = self.curve.closest_point(x, outward, self.opposite_motion(None))
         self.separation = x - self.projection.point
-        self.pressure = np.zeros(len(x))
+        self.trial = self.pressure = np.zeros(len(x))
+        self.active = self.projection.found if self.kinematics == "tied" else np.zeros(len(x), dtype=bool)
 
     @property
     def curve(self) -> Curve | RigidCircle:
@@ -82,17 +88,23 @@ class Pairing:
         else:
             jump = displacement - self._opposite_displacement(motion)
             opening = self.separation + jump
-        self.traction, self.gap, self.pressure = self._pressed(stress, outward, opening)
+        self.traction, self.gap, self.trial = self._pressed(stress, outward, opening)
         if self.kinematics == "tied":
             self.traction -= self.gamma[:, None] * jump
             self.pressure = (self.traction * self.projection.normal).sum(1)
+        else:
+            self.press(self.projection.found & ~(self.trial <= 0))  # not a number stays that
+
+    def press(self, active: npt.NDArray[np.bool_]) -> None:
+        """Let the points ``active`` ``(m,)`` carry their trial pressures, whatever the sign, and no others."""
+        self.active, self.pressure = active, np.where(active, self.trial, 0.0)
 
     def _pressed(self, stress: Array, outward: Array, opening: Array) -> tuple[Array, Array, Array]:
-        """Traction ``(m, 2)``, gap and pressure ``(m,)`` of a contact that only presses."""
+        """Traction ``(m, 2)``, gap and trial pressure ``(m,)``."""
         m, P = len(stress), self.projection
-        given = stress, outward, opening, P.normal, self.gamma, P.found
+        given = stress, outward, opening, P.normal, self.gamma
         found = np.empty((m, 2)), np.empty(m), np.empty(m)
-        library("contact_points", _PROTOTYPES).contact_pressure(m, *map(pointer, given + found))
+        self._kernels.contact_pressure(m, *map(pointer, given + found))
         return found
 
     def _pair_anew(self, x: Array, outward: Array, motion: Array) -> None:
@@ -112,11 +124,6 @@ class Pairing:
         return np.einsum("ma,mai->mi", self.projection.shape, motion[self.projection.nodes])
 
     @property
-    def active(self) -> np.ndarray:
-        """Points ``(m,)`` that carry a contact force."""
-        return self.projection.found if self.kinematics == "tied" else self.pressure > 0
-
-    @property
     def forces(self) -> Array:
         """Weighted contact force ``(m, 2)`` of each point on its own body."""
         w = self.share * self.side.weight.ravel()
@@ -130,5 +137,5 @@ class Pairing:
         n, q, k = side.trace_shape.shape
         on_own = self.forces, side.trace_shape, side.curve.connectivity[side.facet]
         on_opposite = P.shape, P.nodes
-        forces = library("contact_points", _PROTOTYPES).contact_forces
-        forces(n, q, k, P.shape.shape[1], *map(pointer, (*on_own, *on_opposite, own, opposite)))
+        arrays = *on_own, *on_opposite, own, opposite
+        self._kernels.contact_forces(n, q, k, P.shape.shape[1], *map(pointer, arrays))

@@ -7,22 +7,33 @@ for every facet and each opposite facet that it may meet.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.kernels.compiled import library, pointer
+from archord.kernels.compiled import library, pointer, structure
 from archord.solver.contact_pairing import Kinematics, Pairing
 from archord.solver.contact_side import ContactSide
 
+_NAME = "contact_tangent"
 _KINEMATICS: dict[Kinematics, int] = {"tied": 0, "reference": 1, "current": 2}
-_PROTOTYPE = """void contact_tangent(int32_t kinematics, int32_t n, int32_t q, int32_t a, int32_t k, int32_t o,
-    const double *own_shape, const double *gradient, const int32_t *trace, const double *outward,
-    const double *weight, double share, const double *gamma, const uint8_t *active, const double *pressure,
-    const double *traction, const double *separation, const double *gap, const double *moduli,
-    const double *shape, const double *slope, const double *normal, const double *tangent, const double *bend,
-    const uint8_t *slides, const int32_t *facet, const int32_t *base, const int32_t *low, const int32_t *slots,
-    double *values);"""
+_PROTOTYPES = """
+typedef struct {
+    int32_t kinematics, n, q, a, k, o;
+    const double *own_shape, *gradient;
+    const int32_t *trace;
+    const double *outward, *weight;
+    double share;
+    const double *gamma;
+    const uint8_t *active;
+    const double *pressure, *traction, *separation, *gap, *moduli, *shape, *slope, *normal, *tangent, *bend;
+    const uint8_t *slides;
+    const int32_t *facet;
+} Side;
+void contact_tangent(const Side *s, const int32_t *base, const int32_t *low, const int32_t *slots, double *values);
+void contact_pressure_rate(const Side *s, const double *own, const double *opposite, double *rate);
+"""
 
 
 @dataclass(frozen=True)
@@ -43,7 +54,7 @@ class ContactTangent:
     """
 
     def __init__(self, pairings: list[Pairing], reaches: list[np.ndarray]) -> None:
-        self.pairings = pairings
+        self.pairings, self._kernels = pairings, library(_NAME, _PROTOTYPES)
         parts = [_dofs(pair, reach) for pair, reach in zip(pairings, reaches, strict=True)]
         size = 1 + max((part[i].max(initial=0) for part in parts for i in (2, 3)), default=0)
         keys = [rows[:, :, None] * size + columns[:, None, :] for _, _, rows, columns in parts]
@@ -58,7 +69,8 @@ class ContactTangent:
         """Derivative ``(n, 2, 2)`` of the residual at the pairings' last evaluation."""
         values = np.zeros((len(self.rows), 2, 2))
         for pair, slots in zip(self.pairings, self._slots, strict=True):
-            _add(pair, slots, values)
+            places = slots.base, slots.low, slots.slots, values
+            self._kernels.contact_tangent(_points(pair), *map(pointer, places))
         return values
 
 
@@ -84,16 +96,23 @@ def _dofs(pair: Pairing, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
     return base.astype(np.int32), low.astype(np.int32), rows, columns
 
 
-def _add(pair: Pairing, slots: _Slots, values: Array) -> None:
+def pressure_rate(pair: Pairing, u: Array, motion: Array) -> Array:
+    """What displacements ``u`` ``(n, 2)``, with the opposite moved by ``motion``, add to the trial pressures ``(m,)``,
+    linearised at the last evaluation, where points keep their partners."""
+    own = u[pair.side.cell_dofs]
+    opposite = motion[pair.projection.nodes] if isinstance(pair.opposite, ContactSide) else motion[None]
+    opposite = np.ascontiguousarray(np.broadcast_to(opposite, (*pair.projection.shape.shape, 2)))
+    rate = np.empty(len(pair.pressure))
+    library(_NAME, _PROTOTYPES).contact_pressure_rate(_points(pair), *map(pointer, (own, opposite, rate)))
+    return rate
+
+
+def _points(pair: Pairing) -> Any:
+    """What the kernels know of a pairing, of arrays that it and its side hold."""
     side, P = pair.side, pair.projection
-    n, q, a = side.shape.shape
-    sizes = n, q, a, side.trace.shape[1], P.shape.shape[1]
-    active = np.ascontiguousarray(pair.active)
-    at_points = (side.shape, side.gradient, side.trace, side.outward, side.weight)
-    state = (pair.gamma, active, pair.pressure, pair.traction, pair.separation, pair.gap, pair.tangent)
-    opposite = (P.shape, P.slope, P.normal, P.tangent, P.bend, P.slides, P.facet)
-    places = (slots.base, slots.low, slots.slots, values)
-    library("contact_tangent", _PROTOTYPE).contact_tangent(
-        _KINEMATICS[pair.kinematics], *sizes, *map(pointer, at_points), pair.share,
-        *map(pointer, state + opposite + places),
-    )  # fmt: skip
+    sizes = *side.shape.shape, side.trace.shape[1], P.shape.shape[1]
+    at_points = side.shape, side.gradient, side.trace, side.outward, side.weight, pair.share
+    state = pair.gamma, pair.active, pair.pressure, pair.traction, pair.separation, pair.gap, pair.tangent
+    opposite = P.shape, P.slope, P.normal, P.tangent, P.bend, P.slides, P.facet
+    members = _KINEMATICS[pair.kinematics], *sizes, *at_points, *state, *opposite
+    return structure(_NAME, _PROTOTYPES, "Side", members)

@@ -70,7 +70,8 @@ class TangentMatrix:
         self.A = A
         if self._condense:
             assert self.contact is not None
-            self.condensed = Condensed(A, np.unique(np.concatenate([side.curve_dofs for side in self.contact.sides])))
+            self._touching = np.unique(np.concatenate([side.curve_dofs for side in self.contact.sides]))
+            self.condensed = Condensed(A, self._touching, self._revise)
         else:
             self._elastic = A.copy()
         self._find_contact()
@@ -103,6 +104,8 @@ class TangentMatrix:
         self._row, self._column = row, column
         self._in_matrix = (tangent.rows < size) & (tangent.columns < size)
         self._free = free[row, :, None] * free[column, None, :]
+        if self.condensed is not None:
+            self.condensed.occupy(tangent.rows[self._in_matrix], tangent.columns[self._in_matrix])
 
     def update(self, *, factorise: bool = True) -> None:
         """Assemble ``A``, to be factorised or not."""
@@ -123,11 +126,29 @@ class TangentMatrix:
         assert self.contact is not None
         self.factorisations = 1
         with self.timer("assemble contact"):
-            tangent = self.contact.tangent
-            self._contact_blocks = tangent.blocks()
-            kept = np.flatnonzero(self._contact_blocks.any(axis=(1, 2)) & self._in_matrix)
-            blocks = self._contact_blocks[kept] * self._free[kept]
-        condensed.update(tangent.rows[kept], tangent.columns[kept], blocks)
+            self._contact_blocks = self.contact.tangent.blocks()
+            blocks = self._contact_blocks[self._in_matrix] * self._free[self._in_matrix]
+        condensed.update(blocks)
+
+    def _revise(self, increment: Array) -> Array | None:
+        """Go over to the contact points that would be closed after ``increment`` ``(2 n,)``: the change of the residual
+        ``(m, 2)`` at the nodes of the contact, with the matrix up to date; None if they are closed already."""
+        assert self.contact is not None
+        assert self.condensed is not None
+        with self.timer("contact"):
+            before = self._contact_force()
+            if not self.contact.anticipate(increment.reshape(-1, 2)):
+                return None
+            change = self._contact_force() - before
+        self._update_condensed(self.condensed)
+        return np.where(self._fixed[self._touching], 0.0, change[self._touching])
+
+    def _contact_force(self) -> Array:
+        """The contact's part of the residual ``(n, 2)``."""
+        assert self.contact is not None
+        force = np.zeros((self._index_map.size_local, 2))
+        self.contact.add_force(force)
+        return force
 
     def _add_contact(self, rows: np.ndarray, columns: np.ndarray) -> None:
         """Add the contact's blocks to ``A``, nothing to those of prescribed displacements and of a rigid pin."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from archord.kernels import compiled
-from archord.kernels.compiled import CompilerError, library, pointer
+from archord.kernels.compiled import CompilerError, _loaded, library, pointer, structure
 
 PROTOTYPE = "double twice(double x);"
 
@@ -14,9 +14,9 @@ def source(tmp_path, monkeypatch):
     """A folder of kernels and a cache of their own."""
     monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled.py"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    library.cache_clear()
+    _loaded.cache_clear()
     yield tmp_path / "doubling.c"
-    library.cache_clear()
+    _loaded.cache_clear()
 
 
 def test_a_kernel_is_compiled_once_and_anew_when_its_source_changes(source):
@@ -24,11 +24,11 @@ def test_a_kernel_is_compiled_once_and_anew_when_its_source_changes(source):
     assert library("doubling", PROTOTYPE).twice(1.5) == 3.0
     (first,) = (source.parent / "cache" / "archord").iterdir()
     made = first.stat().st_mtime_ns
-    library.cache_clear()
+    _loaded.cache_clear()
     library("doubling", PROTOTYPE)
     assert first.stat().st_mtime_ns == made
     source.write_text("double twice(double x) { return x + x + 1; }\n")
-    library.cache_clear()
+    _loaded.cache_clear()
     assert library("doubling", PROTOTYPE).twice(1.5) == 4.0
     assert len(list((source.parent / "cache" / "archord").iterdir())) == 2
 
@@ -47,6 +47,19 @@ def test_a_cache_that_cannot_be_written_is_no_hindrance(source, monkeypatch):
     source.write_text("double twice(double x) { return 2 * x; }\n")
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/nowhere")
     assert library("doubling", PROTOTYPE).twice(2.0) == 4.0
+
+
+def test_a_structure_has_numbers_and_pointers(source):
+    """In the order of its declaration."""
+    kind = "typedef struct { int32_t n; const double *x; double by; } Sum;"
+    prototypes = f"{kind} double total(const Sum *s);"
+    body = (
+        "double total(const Sum *s) { double t = 0; for (int i = 0; i < s->n; i++) t += s->by * s->x[i]; return t; }\n"
+    )
+    source.with_name("summing.c").write_text(f"#include <stdint.h>\n{kind}\n{body}")
+    x = np.array([1.0, 2.0, 4.0])
+    total = structure("summing", prototypes, "Sum", [3, x, 0.5])
+    assert library("summing", prototypes).total(total) == 3.5
 
 
 @pytest.mark.parametrize("array", [np.zeros((4, 4)).T[1:], np.zeros(4)[::2]], ids=["transposed", "strided"])

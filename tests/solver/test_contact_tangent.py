@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from archord.geometry.joint_mesh import Cells
+from archord.solver.contact_tangent import pressure_rate
 from tests.solver.parts import (
     DR,
     ELASTIC,
@@ -40,6 +41,12 @@ def matrix(contact, n):
     for i, j in np.ndindex(2, 2):
         K += sp.coo_matrix((values[:, i, j], (2 * rows + i, 2 * columns + j)), shape=(n, n)).tocsr()
     return K
+
+
+def partners(contact):
+    """Every point's partner."""
+    projections = [pair.projection for pair in contact.pairings]
+    return np.concatenate([(P.found, P.slides, P.facet) for P in projections], axis=1)
 
 
 def branch(contact):
@@ -130,6 +137,46 @@ def test_tangent_where_the_closest_points_are_vertices():
     corner = ~pair.projection.slides & (pair.pressure > 0)
     assert corner.sum() >= 2, corner.sum()
     assert_tangent_is_derivative(parts, u)
+
+
+@pytest.mark.parametrize("kinematics", ["current", "reference"])
+@pytest.mark.parametrize("bodies", ["elastic", "elastic pin, plastic hole", "rigid pin"])
+def test_trial_pressures_follow_the_displacements(bodies, kinematics):
+    """At every point, open or closed, by central differences."""
+    pin, block = BODIES[bodies]
+    parts = joint_parts(pin=pin, block=block, kinematics=kinematics)
+    contact, u = parts.contact, indented(parts)
+    direction, h = np.random.default_rng(3).normal(size=u.shape), 1e-6 * DR
+    contact.evaluate(u)
+    at = partners(contact)
+    rates = [pressure_rate(pair, direction, pair.opposite_motion(direction)) for pair in contact.pairings]
+    trials = []
+    for sign in (1, -1):
+        contact.evaluate(u + sign * h * direction)
+        np.testing.assert_array_equal(partners(contact), at)
+        trials.append([pair.trial for pair in contact.pairings])
+    for pair, rate, ahead, behind in zip(contact.pairings, rates, *trials, strict=True):
+        difference = (ahead - behind) / (2 * h)
+        assert 0.1 < pair.active.mean() < 0.95
+        assert rate == pytest.approx(difference, abs=1e-6 * np.abs(difference).max())
+
+
+def test_the_points_that_are_expected_to_close_do():
+    """Under reference kinematics pressures are linear where signs do not matter: the next evaluation finds no other."""
+    parts = joint_parts(kinematics="reference")
+    contact = parts.contact
+    u, v = parts.pressed(DR), parts.pressed(3 * DR, noise=1e-4)
+    contact.evaluate(u)
+    few = contact.n_active()
+    assert contact.anticipate(v - u)
+    assert not contact.anticipate(v - u)
+    expected = [pair.active for pair in contact.pairings]
+    assert any((pair.pressure < 0).any() for pair in contact.pairings), "closed points pull where they were open"
+    contact.evaluate(v)
+    assert contact.flips == 0
+    assert contact.n_active() > few
+    for pair, active in zip(contact.pairings, expected, strict=True):
+        assert (pair.active == active).all()
 
 
 def test_tangent_of_a_tied_elastic_contact_is_constant():

@@ -46,7 +46,7 @@ def test_force_and_displacement_control_find_the_same_state(sections, kinematics
     assert (found.eps, found.p0, found.plastic_dissipation) == pytest.approx(
         (pressed.eps, pressed.p0, pressed.plastic_dissipation), rel=1e-6
     )
-    assert found.iterations <= 2 * pressed.iterations
+    assert found.iterations <= max(6, 2 * pressed.iterations)
 
 
 @pytest.mark.mpi
