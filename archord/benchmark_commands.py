@@ -238,6 +238,7 @@ def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, war
     from archord.benchmarks import work_precision as table
     from archord.benchmarks.work_precision_figure import draw
     from archord.benchmarks.work_precision_report import markdown, write_csv
+    from archord.benchmarks.work_precision_run import INTERRUPTED
     from archord.solver.run_folder import claim_folder
 
     claim_folder(output, force=True)
@@ -249,8 +250,9 @@ def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, war
         say(f"{task.case}: {task.code}, {task.series}, {task.label}: {sentence} ({counted})")
 
     lines = table.run(found, repeats, said)
+    whole = all(len(line.point.seconds) == repeats for line in lines if line.point.failure in ("", INTERRUPTED))
     seconds = None
-    if warm:
+    if warm and whole:
         from archord.benchmarks.work_precision_warm import warm_seconds
 
         seconds = warm_seconds(repeats)
@@ -267,8 +269,11 @@ def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, war
         print(text)
         for file in files:
             print(file)
-    failed = [line for line in lines if not line.point.done]
+    failed = [line for line in lines if not line.point.done and line.point.failure != INTERRUPTED]
     for line in failed:
         task = line.task
         print(f"archord: {task.case}: {task.code}, {task.series}, {task.label}: {line.point.failure}.", file=sys.stderr)
+    if not whole:
+        print("archord: interrupted; the tables have what was timed before.", file=sys.stderr)
+        return 130
     return 1 if any(line.task.code == "archord" for line in failed) else 0

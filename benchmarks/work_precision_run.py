@@ -15,6 +15,7 @@ from archord.benchmarks import timed_process
 from archord.benchmarks.work_precision_cases import Kinematics
 from archord.geometry.basis import Array
 
+INTERRUPTED = "interrupted before its first run"
 LIMIT = 600.0  # seconds that a process may take
 
 
@@ -113,9 +114,22 @@ def run_all(
 
     The first task of each code, case and series runs once before, untimed, so that what is compiled on first use is
     there. A task that fails once is not tried again. ``said(task, repeat, sentence)`` follows every run (0: untimed).
+    After Ctrl-C the points are those that were timed, and the others have a failure; it is raised again before the
+    first.
     """
     core = pinned_core() if core is None else core
     points = [Point(task) for task in tasks]
+    try:
+        _time_all(points, repeats, core, said)
+    except KeyboardInterrupt:
+        if not any(point.seconds for point in points):
+            raise
+        for point in points:
+            point.failure = point.failure or ("" if point.seconds else INTERRUPTED)
+    return points
+
+
+def _time_all(points: list[Point], repeats: int, core: int, said: Callable[[Task, int, str], None]) -> None:
     kinds: set[tuple[str, str, str]] = set()
     for point in points:
         kind = point.task.code, point.task.case, point.task.series
@@ -126,7 +140,6 @@ def run_all(
         for point in points:
             if not point.failure:
                 _run(point, repeat, core, said)
-    return points
 
 
 def _run(point: Point, repeat: int, core: int, said: Callable[[Task, int, str], None]) -> None:

@@ -268,6 +268,25 @@ def test_repeats_are_interleaved(tmp_path):
     assert " ".join(said) == "a1:0 b1:0 a1:1 a2:1 b1:1 a1:2 a2:2 b1:2"
 
 
+def test_what_was_timed_before_an_interruption_is_kept(tmp_path):
+    """Ctrl-C in the second repetition leaves a table; before anything was timed it ends the benchmark."""
+    tasks = [task(tmp_path / n, "true", label=n) for n in ("a", "b", "c")]
+
+    def interrupted(when):
+        def said(t, repeat, sentence):
+            if (t.label, repeat) == when:
+                raise KeyboardInterrupt
+
+        return said
+
+    points = run_all(tasks, 3, interrupted(("b", 1)))
+    assert [len(p.seconds) for p in points] == [1, 1, 0]
+    assert "| c | failed: interrupted before its first run |" in markdown([judge(p) for p in points])
+    assert [len(p.seconds) for p in run_all(tasks, 3, interrupted(("a", 2)))] == [2, 1, 1]
+    with pytest.raises(KeyboardInterrupt):
+        run_all(tasks, 3, interrupted(("a", 0)))
+
+
 def test_the_result_of_a_peer(tmp_path):
     """Quantities that it knows, its kinematics, its own sentence where it failed."""
     file = tmp_path / "result.json"
