@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
@@ -26,16 +27,18 @@ _MOST_REVISIONS = 2  # of the closed points in one solve: more cost what the ite
 
 
 class Condensed:
-    """Python context of the matrix ``K + E D`` and of its preconditioner, which solves with it. Of one rank.
+    """Python context of the matrix ``K + E D`` and of its preconditioner, which solves with it. Collective.
 
-    ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)`` are the block dofs that may get forces.
-    ``revise(increment)`` goes over to the points that are closed after an increment ``(n,)`` of the solution, calls
-    `update`, and returns what that adds to the residual ``(m, 2)``, or None where nothing changes.
+    ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)``, sorted, are the block dofs that may get
+    forces, and ``near`` ``(k,)`` those on which they depend, the same on every rank, as is all that is as small as the
+    contact. ``revise(increment)`` goes over to the points that are closed after an increment ``(k, 2)`` of the solution
+    at ``near``, calls `update`, and returns what that adds to the residual at the nodes ``(m, 2)``, or None where
+    nothing changes.
     """
 
     def __init__(self, K: PETSc.Mat, nodes: np.ndarray, revise: Callable[[Array], Array | None]) -> None:
-        self._K, n = K, K.getSize()[0]
-        self._revise = revise
+        self.comm, self._K, self._nodes, self._revise = K.comm.tompi4py(), K, nodes, revise
+        self._start, self._end = K.getOwnershipRange()
         K.setOption(PETSc.Mat.Option.SPD, True)
         self._ksp = PETSc.KSP().create(K.comm)
         self._ksp.setType("preonly")
@@ -44,21 +47,19 @@ class Condensed:
         pc.setType("cholesky")
         pc.setFactorSolverType("mumps")
         self._y = K.createVecLeft()
-        self._dofs = (2 * nodes[:, None] + np.arange(2)).ravel()
-        self._place = np.full(n, -1)  # column of Z that belongs to a dof
-        self._place[self._dofs] = np.arange(len(self._dofs))
-        self._Z = self._responses(self._dofs)
+        self._Z = self._responses(_dofs(nodes))
         none = np.zeros(0, dtype=np.int64)
         self.occupy(none, none)
-        self.matrix = PETSc.Mat().createPython(((n, None), (n, None)), context=self, comm=K.comm)
+        sizes = K.getSizes()
+        self.matrix = PETSc.Mat().createPython(sizes, context=self, comm=K.comm)
         self.matrix.setUp()
 
     def _responses(self, dofs: np.ndarray) -> Array:
-        """Displacements ``(n, m)`` under unit forces at ``dofs`` ``(m,)``, one after the other."""
-        n, m = len(self._place), len(dofs)
-        unit = PETSc.Mat().createDense(((n, None), (m, None)), comm=self._K.comm)
+        """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one after the other."""
+        unit = PETSc.Mat().createDense((self._K.getSizes()[0], (None, len(dofs))), comm=self._K.comm)
         unit.setUp()
-        unit.getDenseArray()[dofs, np.arange(m)] = 1.0
+        mine, at = self._own(dofs)
+        unit.getDenseArray()[at, mine] = 1.0
         unit.assemble()
         found = unit.duplicate()
         self._ksp.setUp()
@@ -68,46 +69,66 @@ class Condensed:
         found.destroy()
         return responses
 
+    def _own(self, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which of ``dofs`` this rank owns, and where they are among its own."""
+        mine = np.flatnonzero((dofs >= self._start) & (dofs < self._end))
+        return mine, dofs[mine] - self._start
+
+    def _on_all(self, dofs: np.ndarray, own: Array) -> Array:
+        """The entries of ``own``, of the dofs of each rank, at ``dofs`` on every rank."""
+        mine, at = self._own(dofs)
+        values = np.zeros((len(dofs), *own.shape[1:]))
+        values[mine] = own[at]
+        return self._sum(values)
+
+    def _sum(self, values: Array) -> Array:
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, values)
+        return values
+
     def occupy(self, rows: np.ndarray, columns: np.ndarray) -> None:
-        """Let the blocks of `update` be at block dofs ``rows``, among the nodes, and ``columns`` ``(k,)``, each place
-        once; all are zero."""
-        axis = np.arange(2)
-        near, column = np.unique(columns, return_inverse=True)
-        self._columns = (2 * near[:, None] + axis).ravel()
-        self._row = self._place[2 * rows] // 2
+        """Let this rank's blocks of `update` be at block dofs ``rows``, among the nodes, and ``columns`` ``(b,)``, each
+        place once; all are zero."""
+        self.near = np.unique(np.concatenate(self.comm.allgather(np.unique(columns))))
+        self._columns = _dofs(self.near)
+        self._row = np.searchsorted(self._nodes, rows)
+        axis, column = np.arange(2), np.searchsorted(self.near, columns)
         self._at = 2 * self._row[:, None, None] + axis[:, None], 2 * column[:, None, None] + axis
-        self._near_Z = np.ascontiguousarray(self._Z[self._columns])
+        self._near_Z = self._on_all(self._columns, self._Z)
         m = self._Z.shape[1]
         self._blocks = np.zeros((len(rows), 2, 2))
-        self._D, self._DZ = np.zeros((m, len(self._columns))), np.zeros((m, m))
+        self._own_D, self._DZ = np.zeros((m, len(self._columns))), np.zeros((m, m))
+        self._D = self._own_D if self.comm.size == 1 else self._own_D.copy()
         self._filled = np.zeros(m, dtype=bool)  # rows of D
 
     def update(self, blocks: Array) -> None:
-        """Make ``E D`` of ``blocks`` ``(k, 2, 2)``; what has not changed costs nothing."""
+        """Make ``E D`` the sum of all ranks' ``blocks`` ``(b, 2, 2)``; what has not changed costs nothing."""
         changed = np.flatnonzero((blocks != self._blocks).any(axis=(1, 2)))
-        self._D[self._at[0][changed], self._at[1][changed]] = blocks[changed]
+        self._own_D[self._at[0][changed], self._at[1][changed]] = blocks[changed]
         self._blocks = blocks
-        row = (2 * np.unique(self._row[changed])[:, None] + np.arange(2)).ravel()
-        D = self._D[row]
-        self._filled[row] = D.any(axis=1)
+        touched = np.zeros(len(self._nodes))
+        touched[self._row[changed]] = 1.0
+        row = _dofs(np.flatnonzero(self._sum(touched)))
+        D = self._sum(self._own_D[row])
+        self._D[row], self._filled[row] = D, D.any(axis=1)
         used = np.flatnonzero(D.any(axis=0))
         self._DZ[row] = D[:, used] @ self._near_Z[used]
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """``y = (K + E D) x``, called by PETSc."""
         self._K.mult(x, y)
-        y.array[self._dofs] += self._D @ x.array_r[self._columns]
+        forces = self._D @ self._on_all(self._columns, x.array_r)
+        mine, at = self._own(_dofs(self._nodes))
+        y.array[at] += forces[mine]
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x = (K + E D)^-1 r`` with the points that are closed after ``-x``, called by PETSc; not a number if that is
         singular."""
         self._ksp.solve(r, self._y)
-        forces, near = np.zeros(self._Z.shape[1]), self._y.array_r[self._columns]
+        forces, near = np.zeros(self._Z.shape[1]), self._on_all(self._columns, self._y.array_r)
         for _ in range(_MOST_REVISIONS):
             drawn = self._drawn(near)
-            increment = np.zeros(len(self._place))
-            increment[self._columns] = self._near_Z @ drawn - near
-            change = self._revise(increment)
+            change = self._revise((self._near_Z @ drawn - near).reshape(-1, 2))
             if change is None:
                 break
             forces += change.ravel()
@@ -117,7 +138,7 @@ class Condensed:
         x.array[:] = self._y.array_r + self._Z @ (forces - drawn)
 
     def _drawn(self, y: Array) -> Array:
-        """``(1 + D Z)^-1 D y`` of ``y`` ``(columns,)``, a force on each dof of the nodes ``(2 m,)``."""
+        """``(1 + D Z)^-1 D y`` of ``y`` ``(2 k,)`` at ``near``, a force on each dof of the nodes ``(2 m,)``."""
         force = np.zeros(len(self._DZ))
         rows = np.flatnonzero(self._filled)
         small = self._DZ[np.ix_(rows, rows)]
@@ -127,3 +148,8 @@ class Condensed:
         except np.linalg.LinAlgError:
             force[:] = np.nan
         return force
+
+
+def _dofs(nodes: np.ndarray) -> np.ndarray:
+    """Both dofs of each of ``nodes``."""
+    return (2 * nodes[:, None] + np.arange(2)).ravel()

@@ -140,7 +140,7 @@ class Contact:
         """Open and close the points whose pressure would change its sign with the displacements ``u`` ``(n, 2)``, to
         first order and between the same partners, while a rigid disc stands still; returns whether any does.
 
-        Closed points carry their trial pressure, a tension too, until the next evaluation. Of one rank.
+        Closed points carry their trial pressure, a tension too, until the next evaluation. Collective.
         """
         flips = 0
         for pair in self.pairings:
@@ -148,7 +148,7 @@ class Contact:
             active = pair.projection.found & (expected > 0)
             flips += int((active != pair.active).sum())
             pair.press(active)
-        return flips > 0
+        return self.comm.allreduce(flips) > 0
 
     def _raise_together(self, failure: str | None) -> None:
         """Raise `ProjectionError` on every rank if any rank reports a ``failure``, and forget the pairs."""

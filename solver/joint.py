@@ -101,7 +101,7 @@ class Joint:
         """Whether the linear systems shrink to the contact (`condensed`): the bodies are elastic and held, the mesh is
         small (the work on contact dofs grows faster than a factorisation), gamma leaves the small system regular."""
         held = self.scene.joint.model == "block" and not self.scene.force_controlled
-        small = self.comm.size == 1 and self.n_dofs < _MOST_CONDENSED
+        small = self.n_dofs < _MOST_CONDENSED
         return held and small and not self.bulk.plastic and self.scene.analysis.gamma_factor <= _LARGE_GAMMA
 
     def _core_force(self) -> Array:

@@ -20,7 +20,7 @@ class TangentMatrix:
     """``A``, of the last evaluation of ``bulk`` and ``contact``, assembled by `update`. Collective.
 
     ``fixed`` ``(n_local, 2)`` are the prescribed displacements, ``rate`` what they are per unit of the level, and
-    ``rigid_rate`` ``(2,)`` that of a rigid pin. With ``condense``, for elastic bodies on one rank which their supports
+    ``rigid_rate`` ``(2,)`` that of a rigid pin. With ``condense``, for elastic bodies which their supports
     hold, ``A`` is that of the bulk, and the contact is in ``condensed``.
     """
 
@@ -131,24 +131,35 @@ class TangentMatrix:
         condensed.update(blocks)
 
     def _revise(self, increment: Array) -> Array | None:
-        """Go over to the contact points that would be closed after ``increment`` ``(2 n,)``: the change of the residual
-        ``(m, 2)`` at the nodes of the contact, with the matrix up to date; None if they are closed already."""
+        """Go over to the contact points that would be closed after ``increment`` ``(k, 2)`` of the nodes near the
+        contact: the change of the residual ``(m, 2)`` at those of the contact, with the matrix up to date; None if they
+        are closed already."""
         assert self.contact is not None
         assert self.condensed is not None
         with self.timer("contact"):
-            before = self._contact_force()
-            if not self.contact.anticipate(increment.reshape(-1, 2)):
+            u = np.zeros((len(self._fixed), 2))
+            here = self._index_map.global_to_local(self.condensed.near)
+            u[here[here >= 0]] = increment[here >= 0]
+            change = -self._contact_force()
+            if not self.contact.anticipate(u):
                 return None
-            change = self._contact_force() - before
+            change += self._contact_force()
         self._update_condensed(self.condensed)
-        return np.where(self._fixed[self._touching], 0.0, change[self._touching])
+        return change
 
     def _contact_force(self) -> Array:
-        """The contact's part of the residual ``(n, 2)``."""
+        """The contact's part of the residual at its nodes ``(m, 2)``, on every rank."""
         assert self.contact is not None
-        force = np.zeros((self._index_map.size_local, 2))
+        n, start = self._index_map.size_local, self._index_map.local_range[0]
+        force = np.zeros((n, 2))
         self.contact.add_force(force)
-        return force
+        force[self._fixed[:n]] = 0.0
+        mine = (self._touching >= start) & (self._touching < start + n)
+        found = np.zeros((len(self._touching), 2))
+        found[mine] = force[self._touching[mine] - start]
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, found)
+        return found
 
     def _add_contact(self, rows: np.ndarray, columns: np.ndarray) -> None:
         """Add the contact's blocks to ``A``, nothing to those of prescribed displacements and of a rigid pin."""

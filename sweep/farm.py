@@ -26,6 +26,7 @@ from archord.solver.scene import Scene
 from archord.sweep.case_run import Result, solve_case
 
 _MESHES_KEPT = 4
+_LONG_ENOUGH = 0.5  # over the longest case that waits, for one that suits better
 _BACKOFF = 0.005  # seconds between two looks of idle ranks and of the manager
 
 
@@ -36,6 +37,11 @@ class Job:
     scene: Scene
     folder: Path
     cost: float
+
+    @property
+    def mesh(self) -> str:
+        """The same for scenes whose meshes are the same."""
+        return f"{self.scene.joint!r} {self.scene.analysis.degree} {self.scene.pin.rigid}"
 
 
 class Farm:
@@ -121,14 +127,34 @@ class Farm:
             handed.append(executor.submit(_solve_there, job))
             handed[-1].add_done_callback(partial(ended, job))
         threads = MPI.Query_thread() == MPI.THREAD_MULTIPLE
-        for job, future in zip(jobs, handed, strict=True):
+        mine: set[str] = set()
+        while waiting := [i for i, future in enumerate(handed) if not (future.running() or future.done())]:
             if interrupted.is_set() or _here.interrupt.received:
-                future.cancel()
-            elif not threads:
-                wait([future])  # the manager's thread must be the only one that calls MPI
-            elif future.cancel():
+                for i in waiting:
+                    handed[i].cancel()
+                break
+            if not threads:
+                wait([handed[waiting[0]]])  # the manager's thread must be the only one that calls MPI
+                continue
+            taken = [i for i, f in enumerate(handed) if (f.running() or f.done()) and not f.cancelled()]
+            next_there = waiting[: self.workers - 1]
+            theirs = {jobs[i].mesh for i in (*taken, *next_there)}
+            i = waiting[suited([jobs[i] for i in waiting], mine, theirs)]
+            if handed[i].cancel():
+                mine.add(jobs[i].mesh)
                 running(1 + sum(f.running() for f in handed))
-                finish(_here.solve(job))
+                finish(_here.solve(jobs[i]))
+
+
+def suited(jobs: list[Job], mine: set[str], theirs: set[str]) -> int:
+    """Which of ``jobs``, the longest first, rank 0 should take: one whose mesh it has, or else one whose mesh the other
+    ranks do not have, if it is not much shorter than the longest; that, where there is none."""
+    long = [i for i, job in enumerate(jobs) if job.cost >= _LONG_ENOUGH * jobs[0].cost]
+    for suits in (lambda mesh: mesh in mine, lambda mesh: mesh not in theirs):
+        for i in long:
+            if suits(jobs[i].mesh):
+                return i
+    return 0
 
 
 class _Here:

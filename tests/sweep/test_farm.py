@@ -15,7 +15,7 @@ from archord.solver.run_folder import claim_folder
 from archord.sweep import case_run
 from archord.sweep.case_run import report_of, solve_case, standing
 from archord.sweep.cases import read_sweep
-from archord.sweep.farm import Farm, Job
+from archord.sweep.farm import Farm, Job, suited
 from archord.sweep.run import Share, open_jobs
 from archord.sweep.tables import of_case
 from tests.sweep.parts import SOFT, written
@@ -182,3 +182,20 @@ def test_a_case_with_an_accuracy_gets_its_meshes_again_after_a_kill_between_two(
     del report["accuracy"]
     (folder / "run.json").write_text(json.dumps(report))
     assert [job.folder for job in open_jobs(sweep, tmp_path, Share(), retry=False)[1]] == [folder]
+
+
+def test_rank_0_takes_cases_whose_mesh_it_has(tmp_path):
+    """Its own meshes first, then one that nobody has, and the longest where others are much shorter."""
+    base = read_sweep(written(tmp_path, SOFT)).cases[0].scene
+
+    def job(number: int, size: float, cost: float) -> Job:
+        joint = base.joint.model_copy(update={"relative_element_size": size})
+        return Job(base.model_copy(update={"joint": joint}), tmp_path / f"{number}", cost)
+
+    jobs = [job(1, 0.2, 9.0), job(2, 0.2, 8.0), job(3, 0.3, 5.0), job(4, 0.3, 5.0), job(5, 0.4, 2.0)]
+    mesh = [job.mesh for job in jobs]
+    assert mesh[0] == mesh[1] != mesh[2] == mesh[3] != mesh[4]
+    assert suited(jobs, set(), {mesh[0]}) == 2, "the other rank has the first mesh"
+    assert suited(jobs[1:], {mesh[2]}, {mesh[0]}) == 1
+    assert suited(jobs, {mesh[4]}, {mesh[0], mesh[2]}) == 0, "the last case is too short"
+    assert suited(jobs[4:], {mesh[0]}, {mesh[4]}) == 0
