@@ -248,14 +248,19 @@ class Bulk:
             body.points.commit()
 
     def energies(self, u: Array) -> tuple[float, float]:
-        """Elastic energy and plastic dissipation of this rank's cells."""
+        """Elastic energy and plastic dissipation, this rank's part; collective."""
         stored = dissipated = 0.0
         for data in self._plastic.values():
             w, points = data.weight.ravel(), data.points
             stored += float(w @ points.material.elastic_energy(data.stress))
             dissipated += float(w @ points.material.dissipation(points.trial.peeq))
-        for _, weight, eps, sigma in self._elastic_points(u):
-            stored += 0.5 * float(np.einsum("p,pi,pi->", weight.ravel(), eps, sigma[:, [0, 1, 3]]))
+        if self.stiffness is not None:
+            x, force = self.stiffness.createVecs()
+            x.array[:] = u[: x.local_size // 2].ravel()
+            self.stiffness.mult(x, force)
+            stored += 0.5 * float(x.array_r @ force.array_r)
+            x.destroy()
+            force.destroy()
         return stored, dissipated
 
     def peeq(self) -> tuple[float, float]:
@@ -277,13 +282,13 @@ class Bulk:
             mean[data.cells] = _cell_mean(data.weight, mean_stress(data.stress))
             peeq[data.cells] = _cell_mean(data.weight, data.points.trial.peeq)
             increment[data.cells] = _cell_mean(data.weight, data.points.trial.peeq - data.points.state.peeq)
-        for cells, weight, _, sigma in self._elastic_points(u):
+        for cells, weight, sigma in self._elastic_points(u):
             mises[cells] = _cell_mean(weight, von_mises(sigma))
             mean[cells] = _cell_mean(weight, mean_stress(sigma))
         return CellFields(mises, mean, *((peeq, increment) if self.plastic else (None, None)))
 
-    def _elastic_points(self, u: Array) -> Iterator[tuple[np.ndarray, Array, Array, Array]]:
-        """Cells ``(n,)``, weights ``(n, q)``, strains ``(n q, 3)`` and stresses ``(n q, 4)`` of each elastic body."""
+    def _elastic_points(self, u: Array) -> Iterator[tuple[np.ndarray, Array, Array]]:
+        """Cells ``(n,)``, weights ``(n, q)`` and stresses ``(n q, 4)`` of each elastic body."""
         X, w = bulk_quadrature(self.degree)
         for body in self.bodies:
             m = body.material
@@ -291,7 +296,7 @@ class Bulk:
                 cells = self.cells[body.tag]
                 basis = cell_basis(self.V.mesh, self.degree, cells, X)
                 eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)
-                yield cells, basis.measure * w, eps, elastic_stress(eps, m.E, m.nu, m.plane)
+                yield cells, basis.measure * w, elastic_stress(eps, m.E, m.nu, m.plane)
 
 
 def _cell_mean(weight: Array, values: Array) -> Array:

@@ -105,8 +105,7 @@ class NewtonSolver:
             ksp.getPC().setType("python")
             ksp.getPC().setPythonContext(system)
         if self._iterative:
-            ksp.setType("gmres")
-            ksp.setPCSide(PETSc.PC.Side.RIGHT)
+            ksp.setType("fgmres")  # which needs one solve less than GMRES: it keeps the preconditioned vectors
             ksp.setConvergenceTest(self._linear_test)
         options = PETSc.Options("archord_")
         options["snes_linesearch_type"] = "bt"

@@ -89,7 +89,7 @@ class Farm:
     def _lead(self, jobs: list[Job], report: Callable[[Result], None], running: Callable[[int], None]) -> None:
         assert _here is not None
         if self.leaders.rank == 0:
-            jobs = sorted(jobs, key=lambda job: -job.cost)
+            jobs = sorted(jobs, key=lambda job: (-job.cost, job.mesh))
         if self.leaders.size == 1:
             for job in jobs:
                 if not _here.interrupt.received:
