@@ -193,8 +193,10 @@ class Bulk:
             sigma = self._sigma.x.array.reshape(-1, q, 3)
             sigma[body.cells] = body.stress[:, [0, 1, 3]].reshape(n, q, 3)
             elastic = body.points.elastic_tangent
-            # of a point that flows the diagonal differs
-            flows = (tangent.reshape(-1, 9)[:, ::4] != elastic.diagonal()).reshape(n, 3 * q).any(axis=1)
+            a, b, c = (
+                tangent.reshape(-1, 9)[:, ::4].T != elastic.diagonal()[:, None]
+            )  # equal at points that do not flow
+            flows = (a | b | c).reshape(n, q).any(axis=1)
             softening = self._softening.x.array.reshape(-1, 9 * q)
             softening[body.yielding] = 0.0
             body.yielding = body.cells[flows]

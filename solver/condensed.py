@@ -103,7 +103,7 @@ class Condensed:
 
     def update(self, blocks: Array) -> None:
         """Make ``E D`` the sum of all ranks' ``blocks`` ``(b, 2, 2)``; what has not changed costs nothing."""
-        changed = np.flatnonzero((blocks != self._blocks).any(axis=(1, 2)))
+        changed = filled(blocks != self._blocks)
         self._own_D[self._at[0][changed], self._at[1][changed]] = blocks[changed]
         self._blocks = blocks
         touched = np.zeros(len(self._nodes))
@@ -148,6 +148,12 @@ class Condensed:
         except np.linalg.LinAlgError:
             force[:] = np.nan
         return force
+
+
+def filled(blocks: np.ndarray) -> np.ndarray:
+    """Which of ``blocks`` ``(n, 2, 2)`` are not all zero; numpy's `any` takes several times as long on so short axes."""
+    a, b, c, d = blocks.reshape(-1, 4).T != 0
+    return np.flatnonzero(a | b | c | d)
 
 
 def _dofs(nodes: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from archord.geometry.basis import Array
 from archord.geometry.fenicsx import create_vector
 from archord.solver.bordered import Bordered
 from archord.solver.bulk import Bulk, matrix
-from archord.solver.condensed import Condensed
+from archord.solver.condensed import Condensed, filled
 from archord.solver.contact import Contact
 from archord.solver.timer import Timer
 
@@ -163,10 +163,12 @@ class TangentMatrix:
 
     def _add_contact(self, rows: np.ndarray, columns: np.ndarray) -> None:
         """Add the contact's blocks to ``A``, nothing to those of prescribed displacements and of a rigid pin."""
-        kept = np.flatnonzero(self._contact_blocks.any(axis=(1, 2)) & self._in_matrix)
+        kept = filled(self._contact_blocks)
+        kept = kept[self._in_matrix[kept]]
         if not len(kept):
             return
-        rowmap, start = np.unique(rows[kept], return_index=True)
+        start = np.flatnonzero(np.diff(rows[kept], prepend=-1))  # rows are sorted
+        rowmap = rows[kept[start]]
         offsets = np.append(start, len(kept))
         offsets, column, rowmap = (i.astype(PETSc.IntType) for i in (offsets, columns[kept], rowmap))
         values = self._contact_blocks[kept] * self._free[kept]
