@@ -193,9 +193,8 @@ class Bulk:
             sigma = self._sigma.x.array.reshape(-1, q, 3)
             sigma[body.cells] = body.stress[:, [0, 1, 3]].reshape(n, q, 3)
             elastic = body.points.elastic_tangent
-            a, b, c = (
-                tangent.reshape(-1, 9)[:, ::4].T != elastic.diagonal()[:, None]
-            )  # equal at points that do not flow
+            stiffness = elastic.diagonal()  # that of points that do not flow
+            a, b, c = (tangent[:, i, i] != stiffness[i] for i in range(3))
             flows = (a | b | c).reshape(n, q).any(axis=1)
             softening = self._softening.x.array.reshape(-1, 9 * q)
             softening[body.yielding] = 0.0

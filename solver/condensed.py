@@ -151,7 +151,7 @@ class Condensed:
 
 
 def filled(blocks: np.ndarray) -> np.ndarray:
-    """Which of ``blocks`` ``(n, 2, 2)`` are not all zero; numpy's `any` takes several times as long on so short axes."""
+    """Which of ``blocks`` ``(n, 2, 2)`` are not all zero; numpy's `any` is several times slower on so short axes."""
     a, b, c, d = blocks.reshape(-1, 4).T != 0
     return np.flatnonzero(a | b | c | d)
 
