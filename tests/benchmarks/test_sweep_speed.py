@@ -1,5 +1,7 @@
 """The time of a sweep on one rank and on several."""
 
+import os
+
 import pytest
 
 from archord.benchmarks.sweep_speed import Pair, measure, table, timed
@@ -12,7 +14,9 @@ def test_a_pair_is_two_sweeps_that_were_solved(tmp_path):
     """Both ranks work: no less processor time than alone for the same cases."""
     pair = measure(written(tmp_path, TWO), 2)
     assert 0.5 < pair.alone_cpu < 2 * pair.together_cpu
-    assert 0.3 < pair.times_faster < 3
+    cores = os.cpu_count() or 1
+    assert pair.alone * cores >= pair.alone_cpu
+    assert pair.together * cores >= pair.together_cpu
 
 
 def test_a_sweep_that_fails_is_no_measurement(tmp_path):
