@@ -29,26 +29,27 @@ class CompilerError(RuntimeError):
     """The C compiler is missing or failed."""
 
 
-def library(name: str, prototypes: str) -> Any:
-    """The functions of ``name``.c that ``prototypes`` declares. Raises `CompilerError`."""
-    return _loaded(name, prototypes)[1]
+def library(name: str, prototypes: str, libraries: tuple[str, ...] = ()) -> Any:
+    """The functions of ``name``.c that ``prototypes`` declares, which needs other ``libraries``. Raises
+    `CompilerError`."""
+    return _loaded(name, prototypes, libraries)[1]
 
 
 def structure(name: str, prototypes: str, kind: str, members: Sequence[int | float | np.ndarray]) -> Any:
     """A pointer to a structure of the type ``kind``, declared in ``prototypes``, with numbers and pointers to arrays,
     which have to live as long as it is used. Raises `CompilerError`."""
     values = [pointer(m) if isinstance(m, np.ndarray) else m for m in members]
-    return _loaded(name, prototypes)[0].new(f"{kind} *", values)
+    return _loaded(name, prototypes, ())[0].new(f"{kind} *", values)
 
 
 @cache
-def _loaded(name: str, prototypes: str) -> tuple[cffi.FFI, Any]:
+def _loaded(name: str, prototypes: str, libraries: tuple[str, ...]) -> tuple[cffi.FFI, Any]:
     source = Path(__file__).with_name(f"{name}.c")
     compiler = shlex.split(os.environ.get("CC", "cc"))
     key = "\0".join([*compiler, *_FLAGS, platform.machine()]).encode() + source.read_bytes()
     path = _cache() / f"{name}-{hashlib.sha256(key).hexdigest()[:16]}.so"
     if not path.exists():
-        _compile([*compiler, *_FLAGS], source, path)
+        _compile([*compiler, *_FLAGS], source, path, libraries)
     ffi = cffi.FFI()
     ffi.cdef(prototypes)
     return ffi, ffi.dlopen(str(path))
@@ -68,12 +69,13 @@ def _cache() -> Path:
     return folder if os.access(folder, os.W_OK) else Path(tempfile.gettempdir())
 
 
-def _compile(command: list[str], source: Path, path: Path) -> None:
+def _compile(command: list[str], source: Path, path: Path, libraries: tuple[str, ...]) -> None:
     """Several processes may compile at once: each into a file of its own, and the last one stays."""
     with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".so", delete=False) as file:
         target = Path(file.name)
     try:
-        result = subprocess.run([*command, "-o", str(target), str(source), "-lm"], capture_output=True, text=True)
+        command = [*command, "-o", str(target), str(source), *(f"-l{name}" for name in ("m", *libraries))]
+        result = subprocess.run(command, capture_output=True, text=True)
     except OSError as error:
         target.unlink()
         raise CompilerError(f"no C compiler ({error}); install gcc, or set CC") from None

@@ -11,15 +11,21 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.solver.substructures import substructures
 
 _FREE = 1e-9  # stiffness of the joint over ``stiffness`` below which nothing resists the force
 
 
 def direct_solver(ksp: PETSc.KSP, A: PETSc.Mat) -> None:
-    """Let ``ksp`` factorise ``A`` by MUMPS."""
+    """Let ``ksp`` factorise ``A`` by MUMPS, on several ranks by `Substructures` where they can."""
     ksp.setType("preonly")
     ksp.setOperators(A)
     pc = ksp.getPC()
+    parts = substructures(A)
+    if parts is not None:
+        pc.setType("python")
+        pc.setPythonContext(parts)
+        return
     pc.setType("lu")
     pc.setFactorSolverType("mumps")
     pc.setFactorSetUpSolverType()

@@ -57,7 +57,8 @@ class PointState:
 class Contact:
     """Contact of ``sides``; the opposite of a lone side is ``rigid``.
 
-    ``rigid_motion`` is the displacement of the rigid disc, set before each evaluation. Collective; raises
+    ``rigid_motion`` is the displacement of the rigid disc, set before each evaluation; ``slide`` how far pairs are
+    expected to slide, for which the matrix gets room from the start. Collective; raises
     `ProjectionError` on every rank if a point on any of them finds no partner.
     """
 
@@ -69,6 +70,7 @@ class Contact:
         kinematics: Kinematics = "current",
         gamma_factor: float = GAMMA_FACTOR,
         one_sided: int | None = None,
+        slide: float = 0.0,
     ) -> None:
         self.sides = sides
         self.kinematics, self.gamma_factor = kinematics, gamma_factor
@@ -95,7 +97,7 @@ class Contact:
             for pair in self.pairings:
                 if pair.side is sides[0]:
                     pair.projection = replace(pair.projection, normal=-pair.side.outward.reshape(-1, 2))
-        self._pattern = ContactPattern(self.comm, self.pairings)
+        self._pattern = ContactPattern(self.comm, self.pairings, slide if kinematics == "current" else 0.0)
         self._tangent: ContactTangent | None = None
 
     def search(self) -> None:

@@ -9,13 +9,16 @@ from archord.solver.contact_pairing import Pairing
 from archord.solver.contact_side import ContactSide
 
 _MARGIN = 2  # opposite facets kept in the pattern on either side of those that are paired
+_WIDEST = 16  # the same where pairs are expected to slide further
 
 
 class ContactPattern:
-    """Ranges of opposite facets that each facet of each pairing may meet. Collective over ``comm``."""
+    """Ranges of opposite facets that each facet of each pairing may meet, where pairs are expected to slide by a length
+    ``slide``. Collective over ``comm``."""
 
-    def __init__(self, comm: MPI.Comm, pairings: list[Pairing]) -> None:
+    def __init__(self, comm: MPI.Comm, pairings: list[Pairing], slide: float = 0.0) -> None:
         self.comm, self.pairings = comm, pairings
+        self._margins = [self._margin(pair, slide) for pair in pairings]
         # per pairing, first and last opposite facet of every facet of the curve; empty: first > last
         self.reach = [np.tile([np.iinfo(np.int64).max, -1], (p.side.curve.n_facets, 1)) for p in pairings]
         self.extend()
@@ -23,12 +26,19 @@ class ContactPattern:
     def extend(self) -> bool:
         """Widen the ranges to hold the pairs of the last evaluation; True if any rank had to."""
         grew = False
-        for pair, reach in zip(self.pairings, self.reach, strict=True):
+        for pair, margin, reach in zip(self.pairings, self._margins, self.reach, strict=True):
             if isinstance(pair.opposite, ContactSide):
-                grew |= self._widen(pair, pair.opposite.curve.n_facets - 1, reach)
+                grew |= self._widen(pair, margin, pair.opposite.curve.n_facets - 1, reach)
         return grew
 
-    def _widen(self, pair: Pairing, last: int, reach: np.ndarray) -> bool:
+    def _margin(self, pair: Pairing, slide: float) -> int:
+        """Opposite facets kept on either side of those that are paired: more where facets are short."""
+        if not isinstance(pair.opposite, ContactSide):
+            return 0
+        length = self.comm.allreduce(float(pair.side.weight.sum())) / pair.opposite.curve.n_facets
+        return min(_MARGIN + int(slide / length), _WIDEST)
+
+    def _widen(self, pair: Pairing, margin: int, last: int, reach: np.ndarray) -> bool:
         facet, met = pair.side.facet, pair.projection.facet.reshape(pair.side.weight.shape)
         low, high = met.min(axis=1, initial=last), met.max(axis=1, initial=0)
         outside = (low < reach[facet, 0]) | (high > reach[facet, 1])
@@ -36,8 +46,8 @@ class ContactPattern:
             return False
         wanted = np.stack([reach[:, 0], -reach[:, 1]])  # both as minima, for one reduction
         at = facet[outside]
-        wanted[0, at] = np.minimum(wanted[0, at], np.maximum(low[outside] - _MARGIN, 0))
-        wanted[1, at] = np.minimum(wanted[1, at], -np.minimum(high[outside] + _MARGIN, last))
+        wanted[0, at] = np.minimum(wanted[0, at], np.maximum(low[outside] - margin, 0))
+        wanted[1, at] = np.minimum(wanted[1, at], -np.minimum(high[outside] + margin, last))
         self.comm.Allreduce(MPI.IN_PLACE, wanted, op=MPI.MIN)
         reach[:] = np.stack([wanted[0], -wanted[1]], axis=1)
         return True

@@ -69,6 +69,7 @@ class Joint:
                 kinematics=analysis.kinematics,
                 gamma_factor=analysis.gamma_factor,
                 one_sided=one_sided,
+                slide=self._travel() - abs(geometry.dR),
             )
             self.equilibrium = Equilibrium(
                 self.V,

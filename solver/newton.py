@@ -98,20 +98,23 @@ class NewtonSolver:
         snes.setConvergenceTest(self._test)
         ksp = snes.getKSP()
         if system is None:
-            direct_solver(ksp, tangent.A)
+            self._use_direct_solver(ksp)
         else:
             ksp.setType("preonly")
             ksp.setOperators(system.matrix)
             ksp.getPC().setType("python")
             ksp.getPC().setPythonContext(system)
-        if self._iterative:
-            ksp.setType("fgmres")  # which needs one solve less than GMRES: it keeps the preconditioned vectors
-            ksp.setConvergenceTest(self._linear_test)
         options = PETSc.Options("archord_")
         options["snes_linesearch_type"] = "bt"
         options["snes_linesearch_max_it"] = 8
         snes.setFromOptions()
         return snes
+
+    def _use_direct_solver(self, ksp: PETSc.KSP) -> None:
+        direct_solver(ksp, self.equilibrium.tangent.A)
+        if self._iterative:
+            ksp.setType("fgmres")  # which needs one solve less than GMRES: it keeps the preconditioned vectors
+            ksp.setConvergenceTest(self._linear_test)
 
     def _guarded(self, callback: Callable) -> Callable:
         """Keep what ``callback`` raises, which PETSc would turn into an error number."""
@@ -136,6 +139,7 @@ class NewtonSolver:
         tangent = self.equilibrium.tangent
         if renewed and self.equilibrium.border is None and tangent.condensed is None:
             self._snes.setJacobian(self._guarded(self._jacobian), tangent.A)
+            self._use_direct_solver(self._snes.getKSP())
         self._renewed |= renewed
 
     def _jacobian(self, snes, x, A, P) -> None:

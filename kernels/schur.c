@@ -1,0 +1,83 @@
+/* MUMPS within one process, by its own C interface: a sparse matrix is factorised but for some of its unknowns, whose Schur
+ * complement it gives, and solved with in two halves around a solve with that. PETSc's interface has no such halves.
+ * Numbers count from 1. Functions return MUMPS's INFOG(1): 0, a warning above, an error below. */
+
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <dmumps_c.h>
+
+#define ICNTL(i) icntl[(i) - 1]
+#define MORE_SPACE 4 /* times the workspace is doubled where it was too small */
+
+static int run(DMUMPS_STRUC_C *id, int job)
+{
+    id->job = job;
+    dmumps_c(id);
+    return id->infog[0];
+}
+
+/* Analyse the matrix (n, n) with entries at rows, columns (nnz), without the unknowns kept (m), which come last in the order of
+ * elimination, place (n). comm is Fortran's handle of a communicator of one process. The arrays must live as long as what is
+ * returned: NULL where there is no memory. */
+void *schur_create(int32_t comm, int32_t n, int64_t nnz, int32_t *rows, int32_t *columns, int32_t m, int32_t *kept,
+                   int32_t *place, int32_t *status)
+{
+    DMUMPS_STRUC_C *id = calloc(1, sizeof *id);
+    *status = -13;
+    if (!id) return NULL;
+    id->comm_fortran = comm;
+    id->par = 1;
+    *status = run(id, -1);
+    if (*status < 0) return id;
+    for (int i = 1; i <= 4; i++) id->ICNTL(i) = 0; /* says nothing */
+    id->ICNTL(6) = 0; /* the diagonal needs no rows exchanged */
+    id->ICNTL(7) = 1; /* the order is given: MUMPS's own for complements have twice the fill-in */
+    id->ICNTL(8) = 1; /* scale by the diagonal */
+    id->ICNTL(14) = 60;
+    id->ICNTL(19) = 1; /* the whole complement, by rows */
+    id->n = n, id->nnz = nnz, id->irn = rows, id->jcn = columns, id->perm_in = place;
+    id->size_schur = m, id->listvar_schur = kept;
+    *status = run(id, 1);
+    return id;
+}
+
+/* Factorise the matrix with values (nnz); complement (m, m) is overwritten. */
+int32_t schur_factorise(void *at, double *values, double *complement)
+{
+    DMUMPS_STRUC_C *id = at;
+    id->a = values, id->schur = complement;
+    int status = run(id, 2);
+    for (int i = 0; i < MORE_SPACE && (status == -8 || status == -9); i++) {
+        id->ICNTL(14) *= 2;
+        status = run(id, 2);
+    }
+    return status;
+}
+
+/* What the right-hand side b (n) is on the kept unknowns once the others are eliminated, reduced (m). */
+int32_t schur_condense(void *at, double *b, double *reduced)
+{
+    DMUMPS_STRUC_C *id = at;
+    id->ICNTL(26) = 1;
+    id->rhs = b, id->nrhs = 1, id->lrhs = id->n;
+    id->redrhs = reduced, id->lredrhs = id->size_schur;
+    return run(id, 3);
+}
+
+/* After schur_condense: b becomes the solution, given that on the kept unknowns, x (m). */
+int32_t schur_expand(void *at, double *x, double *b)
+{
+    DMUMPS_STRUC_C *id = at;
+    id->ICNTL(26) = 2;
+    id->rhs = b, id->redrhs = x;
+    return run(id, 3);
+}
+
+void schur_destroy(void *at)
+{
+    DMUMPS_STRUC_C *id = at;
+    if (!id) return;
+    run(id, -2);
+    free(id);
+}

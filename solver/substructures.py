@@ -1,0 +1,175 @@
+"""Sparse systems on several ranks, each of which eliminates its own unknowns (direct substructuring).
+
+An unknown belongs to the interface if it is coupled with one of a lower rank. Without the interface the ranks' blocks
+do not know of each other: every rank orders and factorises its own by itself, and what is left of the interface is the
+sum of the Schur complements (Smith, Bjorstad and Gropp 1996, 4.2)
+
+    S = sum over ranks of A_GG - A_GI A_II^-1 A_IG,
+
+a dense matrix on all ranks. Bodies that are cut in sectors have short interfaces. MUMPS does the same within one tree,
+but orders the whole matrix on one rank, and waits where fronts span the ranks.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from archord.kernels.compiled import CompilerError, library, pointer
+from archord.solver.elimination_order import available, nested_dissection
+
+_LARGEST_INTERFACE = 3000  # unknowns: every rank factorises a dense matrix of that size
+_PROTOTYPES = """
+void *schur_create(int32_t comm, int32_t n, int64_t nnz, int32_t *rows, int32_t *columns, int32_t m, int32_t *kept,
+                   int32_t *place, int32_t *status);
+int32_t schur_factorise(void *at, double *values, double *complement);
+int32_t schur_condense(void *at, double *b, double *reduced);
+int32_t schur_expand(void *at, double *x, double *b);
+void schur_destroy(void *at);
+"""
+
+
+def substructures(A: PETSc.Mat) -> Substructures | None:
+    """Substructures for matrices with the pattern of ``A``; None on one rank, where the interface is too large, and
+    where MUMPS cannot be compiled against. Collective."""
+    comm = A.comm.tompi4py()
+    if comm.size == 1 or not comm.allreduce(_available(), op=MPI.LAND):
+        return None
+    interface = _interface(A, comm)
+    return Substructures(A, interface) if len(interface) <= _LARGEST_INTERFACE else None
+
+
+def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
+    """Dofs without which the ranks' blocks of ``A`` are not coupled: those on cells of several ranks, and of any others
+    that are, as the contact's, the ones of the higher rank."""
+    start, end = A.getOwnershipRange()
+    local = np.asarray(A.getLGMap()[0].indices)
+    shared = _union(comm, local[(local < start) | (local >= end)])
+    offsets, columns, _ = A.getValuesCSR()
+    rows = np.repeat(np.arange(start, end, dtype=columns.dtype), np.diff(offsets))
+    across = np.flatnonzero((columns < start) | (columns >= end))
+    rows, columns = rows[across], columns[across]
+    across = np.flatnonzero(~_within(rows, shared) & ~_within(columns, shared))
+    rows, columns = rows[across], columns[across]
+    size = A.getBlockSize()
+    blocks = np.unique(np.union1d(shared, _union(comm, np.maximum(rows, columns))) // size)
+    return (size * blocks[:, None] + np.arange(size)).ravel()
+
+
+def _union(comm: MPI.Comm, dofs: np.ndarray) -> np.ndarray:
+    return np.unique(np.concatenate(comm.allgather(np.unique(dofs))))
+
+
+def _within(dofs: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """Which of ``dofs`` are among ``some``, sorted."""
+    at = np.searchsorted(some, dofs)
+    return some[np.minimum(at, len(some) - 1)] == dofs if len(some) else np.zeros(len(dofs), dtype=bool)
+
+
+def _available() -> bool:
+    try:
+        library("schur", _PROTOTYPES, libraries=("dmumps",))
+    except CompilerError:
+        return False
+    return available()
+
+
+class Substructures:
+    """Python context of a preconditioner that solves with matrices of the pattern of ``A``, whose dofs ``interface``
+    ``(m,)``, sorted, separate the ranks. Collective."""
+
+    def __init__(self, A: PETSc.Mat, interface: np.ndarray) -> None:
+        self.comm = A.comm.tompi4py()
+        self._kernels = library("schur", _PROTOTYPES, libraries=("dmumps",))
+        start, end = A.getOwnershipRange()
+        local = np.union1d(np.arange(start, end), interface)
+        first = int(np.searchsorted(local, start))
+        self._own = slice(first, first + end - start)  # among the local ones
+        kept = np.searchsorted(local, interface)
+        self._kept = kept
+        mine = (interface >= start) & (interface < end)
+        self._mine = np.flatnonzero(mine), interface[mine] - start
+        self._set = PETSc.IS().createGeneral(local.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        self._block = A.createSubMatrices(self._set)[0]
+        offsets, columns, _ = self._block.getValuesCSR()
+        rows = np.repeat(np.arange(len(local), dtype=np.int32), np.diff(offsets))
+        on_interface = np.zeros(len(local), dtype=bool)
+        on_interface[kept] = True
+        self._shared = np.flatnonzero(on_interface[rows] & on_interface[columns])  # entries that all ranks have
+        place = _places(rows, columns, on_interface, A.getBlockSize())
+        self._arrays = rows + 1, columns.astype(np.int32) + 1, kept.astype(np.int32) + 1, place + 1
+        self._b = np.zeros(len(local))
+        m = len(interface)
+        self._reduced, self._complement = np.zeros(m), np.zeros((m, m))
+        self._x, self._y = (PETSc.Vec().createSeq(m, comm=PETSc.COMM_SELF) for _ in range(2))
+        self._mumps: Any = None
+        self._dense = PETSc.KSP().create(PETSc.COMM_SELF)
+        self._dense.setType("preonly")
+        self._dense.getPC().setType("lu")
+        self.singular = False
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Factorise the matrix as it is now, called by PETSc."""
+        A = pc.getOperators()[1]
+        A.createSubMatrices(self._set, submats=[self._block])
+        values = self._block.getValuesCSR()[2]
+        values[self._shared] /= self.comm.size
+        status = np.zeros(1, dtype=np.int32)
+        if self._mumps is None:
+            rows, columns, kept, place = map(pointer, self._arrays)
+            sizes = len(self._b), len(rows)
+            self._mumps = self._kernels.schur_create(
+                MPI.COMM_SELF.py2f(), *sizes, rows, columns, len(kept), kept, place, pointer(status)
+            )
+        worst = int(status[0])
+        if worst >= 0:
+            worst = self._kernels.schur_factorise(self._mumps, pointer(values), pointer(self._complement))
+        self.singular = self.comm.allreduce(worst, op=MPI.MIN) < 0
+        if self.singular:
+            return
+        self.comm.Allreduce(MPI.IN_PLACE, self._complement)
+        S = PETSc.Mat().createDense(self._complement.shape, comm=PETSc.COMM_SELF)
+        S.getDenseArray()[:] = self._complement
+        S.assemble()
+        self._dense.setOperators(S)
+        self._dense.setUp()
+
+    def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
+        """``x = A^-1 r``, called by PETSc; not a number if a block is singular."""
+        if self.singular:
+            x.set(np.nan)
+            return
+        self._b[:] = 0.0
+        self._b[self._own] = r.array_r
+        self._kernels.schur_condense(self._mumps, pointer(self._b), pointer(self._reduced))
+        self.comm.Allreduce(MPI.IN_PLACE, self._reduced)
+        self._x.array[:] = self._reduced
+        self._dense.solve(self._x, self._y)
+        self._reduced[:] = self._y.array_r
+        self._kernels.schur_expand(self._mumps, pointer(self._reduced), pointer(self._b))
+        x.array[:] = self._b[self._own]
+        among, own = self._mine
+        x.array[own] = self._y.array_r[among]
+
+    def destroy(self, pc: PETSc.PC) -> None:
+        """Free MUMPS's memory, called by PETSc."""
+        if self._mumps is not None:
+            self._kernels.schur_destroy(self._mumps)
+            self._mumps = None
+
+
+
+def _places(rows: np.ndarray, columns: np.ndarray, last: np.ndarray, size: int) -> np.ndarray:
+    """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)`` behind the others. Dofs and
+    entries at ``rows`` and ``columns`` are in blocks of ``size``."""
+    behind = last[::size]
+    inner = np.flatnonzero(~behind)
+    number = np.cumsum(~behind) - 1
+    of_block = (rows % size == 0) & (columns % size == 0) & ~(last[rows] | last[columns])
+    place = np.empty(len(behind), dtype=np.int32)
+    place[inner] = nested_dissection(len(inner), number[rows[of_block] // size], number[columns[of_block] // size])
+    place[behind] = np.arange(len(inner), len(behind))
+    return (size * place[:, None] + np.arange(size, dtype=np.int32)).ravel()
