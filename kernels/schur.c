@@ -34,7 +34,7 @@ void *schur_create(int32_t comm, int32_t n, int64_t nnz, int32_t *rows, int32_t 
     id->ICNTL(6) = 0; /* the diagonal needs no rows exchanged */
     id->ICNTL(7) = 1; /* the order is given: MUMPS's own for complements have twice the fill-in */
     id->ICNTL(8) = 1; /* scale by the diagonal */
-    id->ICNTL(14) = 60;
+    id->ICNTL(14) = 10; /* per cent of workspace to spare: memory is dear before it is used, and more is asked for if need be */
     id->ICNTL(19) = 1; /* the whole complement, by rows */
     id->n = n, id->nnz = nnz, id->irn = rows, id->jcn = columns, id->perm_in = place;
     id->size_schur = m, id->listvar_schur = kept;

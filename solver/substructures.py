@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from archord.kernels.compiled import CompilerError, library, pointer
 from archord.solver.elimination_order import available, nested_dissection
 
-_LARGEST_INTERFACE = 3000  # unknowns: every rank factorises a dense matrix of that size
+_LARGEST_INTERFACE = 4000  # unknowns: every rank factorises a dense matrix of that size
 _PROTOTYPES = """
 void *schur_create(int32_t comm, int32_t n, int64_t nnz, int32_t *rows, int32_t *columns, int32_t m, int32_t *kept,
                    int32_t *place, int32_t *status);
@@ -89,18 +89,18 @@ class Substructures:
         first = int(np.searchsorted(local, start))
         self._own = slice(first, first + end - start)  # among the local ones
         kept = np.searchsorted(local, interface)
-        self._kept = kept
         mine = (interface >= start) & (interface < end)
         self._mine = np.flatnonzero(mine), interface[mine] - start
         self._set = PETSc.IS().createGeneral(local.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         self._block = A.createSubMatrices(self._set)[0]
         offsets, columns, _ = self._block.getValuesCSR()
-        rows = np.repeat(np.arange(len(local), dtype=np.int32), np.diff(offsets))
         on_interface = np.zeros(len(local), dtype=bool)
         on_interface[kept] = True
-        self._shared = np.flatnonzero(on_interface[rows] & on_interface[columns])  # entries that all ranks have
-        place = _places(rows, columns, on_interface, A.getBlockSize())
-        self._arrays = rows + 1, columns.astype(np.int32) + 1, kept.astype(np.int32) + 1, place + 1
+        entries = _ranges(offsets[kept], offsets[kept + 1])
+        self._shared = entries[on_interface[columns[entries]]]  # of the interface alone: all ranks have them
+        place = _places(offsets, columns, on_interface, A.getBlockSize())
+        rows = np.repeat(np.arange(1, len(local) + 1, dtype=np.int32), np.diff(offsets))
+        self._arrays = rows, columns.astype(np.int32, copy=False) + 1, kept.astype(np.int32) + 1, place + 1
         self._b = np.zeros(len(local))
         m = len(interface)
         self._reduced, self._complement = np.zeros(m), np.zeros((m, m))
@@ -162,14 +162,25 @@ class Substructures:
 
 
 
-def _places(rows: np.ndarray, columns: np.ndarray, last: np.ndarray, size: int) -> np.ndarray:
-    """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)`` behind the others. Dofs and
-    entries at ``rows`` and ``columns`` are in blocks of ``size``."""
+def _ranges(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """The numbers from each of ``starts`` to that of ``ends``, without it, one after the other."""
+    counts = ends - starts
+    first = np.cumsum(counts) - counts
+    return np.arange(counts.sum()) + np.repeat(starts - first, counts)
+
+
+def _places(offsets: np.ndarray, columns: np.ndarray, last: np.ndarray, size: int) -> np.ndarray:
+    """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)`` behind the others.
+
+    Rows from ``offsets`` have sorted ``columns``; dofs and entries come in blocks of ``size``.
+    """
     behind = last[::size]
     inner = np.flatnonzero(~behind)
     number = np.cumsum(~behind) - 1
-    of_block = (rows % size == 0) & (columns % size == 0) & ~(last[rows] | last[columns])
+    starts, ends = offsets[size * inner], offsets[size * inner + 1]
+    row, column = np.repeat(inner, (ends - starts) // size), columns[_ranges(starts, ends)[::size]] // size
+    both = ~behind[column]
     place = np.empty(len(behind), dtype=np.int32)
-    place[inner] = nested_dissection(len(inner), number[rows[of_block] // size], number[columns[of_block] // size])
+    place[inner] = nested_dissection(len(inner), number[row[both]], number[column[both]])
     place[behind] = np.arange(len(inner), len(behind))
     return (size * place[:, None] + np.arange(size, dtype=np.int32)).ravel()
