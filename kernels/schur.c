@@ -8,6 +8,7 @@
 #include <dmumps_c.h>
 
 #define ICNTL(i) icntl[(i) - 1]
+#define SINGULAR -10
 #define MORE_SPACE 4 /* times the workspace is doubled where it was too small */
 
 static int run(DMUMPS_STRUC_C *id, int job)
@@ -36,6 +37,7 @@ void *schur_create(int32_t comm, int32_t n, int64_t nnz, int32_t *rows, int32_t 
     id->ICNTL(8) = 1; /* scale by the diagonal */
     id->ICNTL(14) = 10; /* per cent of workspace to spare: memory is dear before it is used, and more is asked for if need be */
     id->ICNTL(19) = 1; /* the whole complement, by rows */
+    id->ICNTL(24) = 1; /* count pivots of zero: a complement hides them otherwise */
     id->n = n, id->nnz = nnz, id->irn = rows, id->jcn = columns, id->perm_in = place;
     id->size_schur = m, id->listvar_schur = kept;
     *status = run(id, 1);
@@ -52,7 +54,7 @@ int32_t schur_factorise(void *at, double *values, double *complement)
         id->ICNTL(14) *= 2;
         status = run(id, 2);
     }
-    return status;
+    return status >= 0 && id->infog[27] ? SINGULAR : status;
 }
 
 /* What the right-hand side b (n) is on the kept unknowns once the others are eliminated, reduced (m). */

@@ -7,7 +7,7 @@ it: displacement control is regular wherever force control is, and beyond.
 from __future__ import annotations
 
 import numpy as np
-from mpi4py import MPI
+from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
@@ -16,12 +16,13 @@ from archord.solver.substructures import substructures
 _FREE = 1e-9  # stiffness of the joint over ``stiffness`` below which nothing resists the force
 
 
-def direct_solver(ksp: PETSc.KSP, A: PETSc.Mat) -> None:
-    """Let ``ksp`` factorise ``A`` by MUMPS, on several ranks by `Substructures` where they can."""
+def direct_solver(ksp: PETSc.KSP, A: PETSc.Mat, V: fem.FunctionSpace | None = None) -> None:
+    """Let ``ksp`` factorise ``A`` by MUMPS; on several ranks, of the displacements ``V``, by `Substructures` where that
+    goes. Collective."""
     ksp.setType("preonly")
     ksp.setOperators(A)
     pc = ksp.getPC()
-    parts = substructures(A)
+    parts = None if V is None else substructures(A, V)
     if parts is not None:
         pc.setType("python")
         pc.setPythonContext(parts)
@@ -38,13 +39,14 @@ class Bordered:
     """Python context of the bordered matrix and of its preconditioner, which solves with the last one that was
     factorised.
 
-    The level is the last entry of rank 0. ``stiffness`` scales what counts as resistance. Collective.
+    The level is the last entry of rank 0. ``stiffness`` scales what counts as resistance; ``V`` as for `direct_solver`.
+    Collective.
     """
 
-    def __init__(self, comm: MPI.Comm, A: PETSc.Mat, stiffness: float) -> None:
-        self.comm, self._stiffness = comm, stiffness
+    def __init__(self, A: PETSc.Mat, stiffness: float, V: fem.FunctionSpace | None = None) -> None:
+        self.comm, self._stiffness, self._V = A.comm.tompi4py(), stiffness, V
         self._n = A.getLocalSize()[0]
-        self._extra = int(comm.rank == 0)
+        self._extra = int(self.comm.rank == 0)
         self.b, self.c, self.d = np.zeros(self._n), np.zeros(self._n), 0.0
         self._factorised = self.c, self.d  # with the matrix that the preconditioner is of
         self._stale, self.came_free = True, False
@@ -52,7 +54,7 @@ class Bordered:
         self._along_b = np.zeros(self._n)
         self._ksp = PETSc.KSP()
         size = (self._n + self._extra, None)
-        self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=comm)
+        self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=self.comm)
         self.matrix.setUp()
         self.replace(A)
 
@@ -61,7 +63,7 @@ class Bordered:
         self._A, self._stale = A, True
         self._ksp.destroy()
         self._ksp = PETSc.KSP().create(self.comm)
-        direct_solver(self._ksp, A)
+        direct_solver(self._ksp, A, self._V)
 
     def vector(self) -> PETSc.Vec:
         """A vector with the level as its last entry."""

@@ -5,8 +5,10 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+import basix
 import cffi
 import numpy as np
+from dolfinx import fem
 
 _PROTOTYPES = """
 int METIS_NodeND(int32_t *n, int32_t *offsets, int32_t *neighbours, int32_t *weights, int32_t *options, int32_t *order,
@@ -31,9 +33,43 @@ def available() -> bool:
     return True
 
 
+def corners(V: fem.FunctionSpace) -> np.ndarray:
+    """The nodes ``(n_owned, 3)``, in global numbers, at the corners of the edge or the triangle that each of this
+    rank's nodes of ``V`` lies on; those at corners are their own."""
+    topology = basix.topology(basix.CellType.triangle)
+    nodes = V.element.basix_element.entity_dofs
+    at = np.zeros((V.dofmap.list.shape[1], 3), dtype=np.int64)
+    for entities, dofs in zip(topology, nodes, strict=True):
+        for ends, own in zip(entities, dofs, strict=True):
+            at[own] = np.resize([nodes[0][end][0] for end in ends], 3)
+    index_map = V.dofmap.index_map
+    found = np.zeros((index_map.size_local + index_map.num_ghosts, 3), dtype=np.int32)
+    found[V.dofmap.list] = V.dofmap.list[:, at]
+    return index_map.local_to_global(found[: index_map.size_local].ravel()).reshape(-1, 3)
+
+
+def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.ndarray) -> np.ndarray:
+    """As `nested_dissection`, quicker: only unknowns at corners are ordered by METIS, the others come right before the
+    first one of their corners ``(n, 3)``, -1 where that is none of the unknowns.
+
+    That keeps what separates parts: of the nodes of an edge or a triangle none is in a part without its corners.
+    """
+    alone = corner[:, 0] == np.arange(n)
+    at = np.flatnonzero(alone)
+    number = np.cumsum(alone) - 1
+    both = alone[rows] & alone[columns]
+    place = np.append(np.full(n, n), n)  # the last is that of no corner
+    place[at] = nested_dissection(len(at), number[rows[both]], number[columns[both]])
+    first = np.where(alone, place[:n], place[corner].min(axis=1, initial=n))
+    order = np.lexsort((alone, first))
+    found = np.empty(n, dtype=np.int32)
+    found[order] = np.arange(n)
+    return found
+
+
 def nested_dissection(n: int, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Places ``(n,)`` of ``n`` unknowns in an order with little fill-in; ``rows`` and ``columns`` ``(k,)`` are coupled, one
-    way or the other. Raises MemoryError if METIS does not get what it needs."""
+    """Places ``(n,)`` of ``n`` unknowns in an order with little fill-in; ``rows`` and ``columns`` ``(k,)`` are coupled,
+    one way or the other. Raises MemoryError if METIS does not get what it needs."""
     apart = rows != columns
     rows, columns = rows[apart].astype(np.int64), columns[apart].astype(np.int64)
     row, column = np.divmod(np.unique(np.concatenate([rows * n + columns, columns * n + rows])), max(n, 1))

@@ -93,7 +93,7 @@ class Equilibrium:
         self.tangent = TangentMatrix(V, bulk, contact, self.fixed, self.rate, rigid_rate, self.timer, condense=condense)
         self.border: Bordered | None = None
         if by_force is not None:
-            self.border = Bordered(self.comm, self.tangent.A, stiffness)
+            self.border = Bordered(self.tangent.A, stiffness, V)
             self._direction = fem.Function(V)
             self._direction.x.array[:] = self.rate.ravel()
 

@@ -98,20 +98,20 @@ class NewtonSolver:
         snes.setConvergenceTest(self._test)
         ksp = snes.getKSP()
         if system is None:
-            self._use_direct_solver(ksp)
+            direct_solver(ksp, tangent.A, self.equilibrium.V)
         else:
             ksp.setType("preonly")
             ksp.setOperators(system.matrix)
             ksp.getPC().setType("python")
             ksp.getPC().setPythonContext(system)
+        self._iterate(ksp)
         options = PETSc.Options("archord_")
         options["snes_linesearch_type"] = "bt"
         options["snes_linesearch_max_it"] = 8
         snes.setFromOptions()
         return snes
 
-    def _use_direct_solver(self, ksp: PETSc.KSP) -> None:
-        direct_solver(ksp, self.equilibrium.tangent.A)
+    def _iterate(self, ksp: PETSc.KSP) -> None:
         if self._iterative:
             ksp.setType("fgmres")  # which needs one solve less than GMRES: it keeps the preconditioned vectors
             ksp.setConvergenceTest(self._linear_test)
@@ -139,7 +139,8 @@ class NewtonSolver:
         tangent = self.equilibrium.tangent
         if renewed and self.equilibrium.border is None and tangent.condensed is None:
             self._snes.setJacobian(self._guarded(self._jacobian), tangent.A)
-            self._use_direct_solver(self._snes.getKSP())
+            direct_solver(self._snes.getKSP(), tangent.A, self.equilibrium.V)
+            self._iterate(self._snes.getKSP())
         self._renewed |= renewed
 
     def _jacobian(self, snes, x, A, P) -> None:

@@ -1,8 +1,8 @@
 """Sparse systems on several ranks, each of which eliminates its own unknowns (direct substructuring).
 
-An unknown belongs to the interface if it is coupled with one of a lower rank. Without the interface the ranks' blocks
-do not know of each other: every rank orders and factorises its own by itself, and what is left of the interface is the
-sum of the Schur complements (Smith, Bjorstad and Gropp 1996, 4.2)
+The interface are the unknowns on cells of several ranks, and few more where pairs in contact lie on two. Without it the
+ranks' blocks do not know of each other: every rank orders and factorises its own by itself, and what is left of the
+interface is the sum of the Schur complements (Smith, Bjorstad and Gropp 1996, 4.2)
 
     S = sum over ranks of A_GG - A_GI A_II^-1 A_IG,
 
@@ -15,11 +15,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.kernels.compiled import CompilerError, library, pointer
-from archord.solver.elimination_order import available, nested_dissection
+from archord.solver.elimination_order import available, before_corners, corners
 
 _LARGEST_INTERFACE = 4000  # unknowns: every rank factorises a dense matrix of that size
 _PROTOTYPES = """
@@ -32,14 +33,21 @@ void schur_destroy(void *at);
 """
 
 
-def substructures(A: PETSc.Mat) -> Substructures | None:
-    """Substructures for matrices with the pattern of ``A``; None on one rank, where the interface is too large, and
-    where MUMPS cannot be compiled against. Collective."""
+def substructures(A: PETSc.Mat, V: fem.FunctionSpace) -> Substructures | None:
+    """Substructures for matrices with the pattern of ``A``, of the displacements ``V``. Collective.
+
+    None on one rank, where the interface is too large, where a rank has no unknowns of its own, and where MUMPS's
+    headers or METIS are not installed.
+    """
     comm = A.comm.tompi4py()
     if comm.size == 1 or not comm.allreduce(_available(), op=MPI.LAND):
         return None
     interface = _interface(A, comm)
-    return Substructures(A, interface) if len(interface) <= _LARGEST_INTERFACE else None
+    start, end = A.getOwnershipRange()
+    alone = end - start > ((interface >= start) & (interface < end)).sum()  # whether this rank has unknowns of its own
+    if not 0 < len(interface) <= _LARGEST_INTERFACE or not comm.allreduce(bool(alone), op=MPI.LAND):
+        return None
+    return Substructures(A, interface, corners(V))
 
 
 def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
@@ -69,9 +77,14 @@ def _within(dofs: np.ndarray, some: np.ndarray) -> np.ndarray:
     return some[np.minimum(at, len(some) - 1)] == dofs if len(some) else np.zeros(len(dofs), dtype=bool)
 
 
+def schur_kernels() -> Any:
+    """The functions of kernels/schur.c. Raises `CompilerError` where MUMPS's headers are not installed."""
+    return library("schur", _PROTOTYPES, libraries=("dmumps",))
+
+
 def _available() -> bool:
     try:
-        library("schur", _PROTOTYPES, libraries=("dmumps",))
+        schur_kernels()
     except CompilerError:
         return False
     return available()
@@ -79,11 +92,11 @@ def _available() -> bool:
 
 class Substructures:
     """Python context of a preconditioner that solves with matrices of the pattern of ``A``, whose dofs ``interface``
-    ``(m,)``, sorted, separate the ranks. Collective."""
+    ``(m,)``, sorted, separate the ranks, and whose nodes have ``corner`` as in `corners`. Collective."""
 
-    def __init__(self, A: PETSc.Mat, interface: np.ndarray) -> None:
+    def __init__(self, A: PETSc.Mat, interface: np.ndarray, corner: np.ndarray) -> None:
         self.comm = A.comm.tompi4py()
-        self._kernels = library("schur", _PROTOTYPES, libraries=("dmumps",))
+        self._kernels = schur_kernels()
         start, end = A.getOwnershipRange()
         local = np.union1d(np.arange(start, end), interface)
         first = int(np.searchsorted(local, start))
@@ -98,7 +111,9 @@ class Substructures:
         on_interface[kept] = True
         entries = _ranges(offsets[kept], offsets[kept + 1])
         self._shared = entries[on_interface[columns[entries]]]  # of the interface alone: all ranks have them
-        place = _places(offsets, columns, on_interface, A.getBlockSize())
+        size = A.getBlockSize()
+        corner = np.searchsorted(local[::size] // size, corner)  # all are on cells of this rank
+        place = _places(offsets, columns, on_interface, corner, self._own.start // size, size)
         rows = np.repeat(np.arange(1, len(local) + 1, dtype=np.int32), np.diff(offsets))
         self._arrays = rows, columns.astype(np.int32, copy=False) + 1, kept.astype(np.int32) + 1, place + 1
         self._b = np.zeros(len(local))
@@ -139,6 +154,8 @@ class Substructures:
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x = A^-1 r``, called by PETSc; not a number if a block is singular."""
+        if self._mumps is None:  # put in the place of another one
+            self.setUp(pc)
         if self.singular:
             x.set(np.nan)
             return
@@ -161,7 +178,6 @@ class Substructures:
             self._mumps = None
 
 
-
 def _ranges(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """The numbers from each of ``starts`` to that of ``ends``, without it, one after the other."""
     counts = ends - starts
@@ -169,18 +185,22 @@ def _ranges(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     return np.arange(counts.sum()) + np.repeat(starts - first, counts)
 
 
-def _places(offsets: np.ndarray, columns: np.ndarray, last: np.ndarray, size: int) -> np.ndarray:
+def _places(
+    offsets: np.ndarray, columns: np.ndarray, last: np.ndarray, corner: np.ndarray, start: int, size: int
+) -> np.ndarray:
     """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)`` behind the others.
 
-    Rows from ``offsets`` have sorted ``columns``; dofs and entries come in blocks of ``size``.
+    Rows from ``offsets`` have sorted ``columns``; dofs and entries come in blocks of ``size``. Block ``start + i`` has
+    the blocks ``corner[i]`` at its corners; all that are not last have some.
     """
     behind = last[::size]
     inner = np.flatnonzero(~behind)
-    number = np.cumsum(~behind) - 1
+    number = np.where(behind, -1, np.cumsum(~behind) - 1)
     starts, ends = offsets[size * inner], offsets[size * inner + 1]
     row, column = np.repeat(inner, (ends - starts) // size), columns[_ranges(starts, ends)[::size]] // size
     both = ~behind[column]
+    row, column = number[row[both]], number[column[both]]
     place = np.empty(len(behind), dtype=np.int32)
-    place[inner] = nested_dissection(len(inner), number[row[both]], number[column[both]])
+    place[inner] = before_corners(len(inner), row, column, number[corner[inner - start]])
     place[behind] = np.arange(len(inner), len(behind))
     return (size * place[:, None] + np.arange(size, dtype=np.int32)).ravel()

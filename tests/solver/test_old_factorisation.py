@@ -82,7 +82,7 @@ def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
         return np.block([[values, b[:, None]], [c[None], np.array([[d]])]])
 
     fill(old)
-    system = Bordered(MPI.COMM_SELF, A, 1.0)
+    system = Bordered(A, 1.0)
     r, x = system.vector(), system.vector()
     r.array[:] = rng.normal(size=n + 1)
     system.update(*borders[0])
