@@ -56,18 +56,28 @@ class Condensed:
 
     def _responses(self, dofs: np.ndarray) -> Array:
         """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one after the other."""
+        unit = self._unit_forces(dofs)
+        self._found = PETSc.Mat().createDense((self._K.getSizes()[0], (None, len(dofs))), comm=self._K.comm)
+        self._found.setUp()
+        self._ksp.setUp()
+        self._ksp.getPC().getFactorMatrix().matSolve(unit, self._found)
+        unit.destroy()
+        return self._found.getDenseArray()
+
+    def _unit_forces(self, dofs: np.ndarray) -> PETSc.Mat:
+        """A column for each of ``dofs``. On one rank they are sparse, and MUMPS skips what they leave zero; on several
+        PETSc spoils sparse ones."""
+        if self.comm.size == 1:
+            offsets, columns = (part.astype(PETSc.IntType) for part in (np.arange(len(dofs) + 1), dofs))
+            shape = len(dofs), self._K.getSize()[0]
+            csr = offsets, columns, np.ones(len(dofs))
+            return PETSc.Mat().createTranspose(PETSc.Mat().createAIJ(shape, csr=csr, comm=self._K.comm))
         unit = PETSc.Mat().createDense((self._K.getSizes()[0], (None, len(dofs))), comm=self._K.comm)
         unit.setUp()
         mine, at = self._own(dofs)
         unit.getDenseArray()[at, mine] = 1.0
         unit.assemble()
-        found = unit.duplicate()
-        self._ksp.setUp()
-        self._ksp.getPC().getFactorMatrix().matSolve(unit, found)
-        responses = found.getDenseArray().copy(order="F")
-        unit.destroy()
-        found.destroy()
-        return responses
+        return unit
 
     def _own(self, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which of ``dofs`` this rank owns, and where they are among its own."""

@@ -15,6 +15,7 @@ from archord.geometry.curve import ProjectionError
 from archord.solver.bordered import direct_solver
 from archord.solver.contact import GAMMA_FACTOR
 from archord.solver.equilibrium import Equilibrium
+from archord.solver.timer import BEFORE_SOLVING
 
 _STIFF_CONTACT = 5.0  # gamma factor above which it is raised by and by where a solve fails
 _GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
@@ -78,7 +79,8 @@ class NewtonSolver:
         self._flipped = 0  # contact points that opened or closed since
         many = 2 * equilibrium.V.dofmap.index_map.size_global >= _MANY_DOFS
         self._iterative = many and self.elastic and equilibrium.tangent.condensed is None
-        self._snes = self._make_snes()
+        with equilibrium.timer(BEFORE_SOLVING):
+            self._snes = self._make_snes()
 
     @property
     def elastic(self) -> bool:

@@ -21,6 +21,7 @@ from archord.solver.disk import replace_text
 from archord.solver.joint import Joint
 from archord.solver.measures import Measures
 from archord.solver.stepping import Step
+from archord.solver.timer import BEFORE_SOLVING
 
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")
 _FEW_FACETS = 5
@@ -121,6 +122,9 @@ class Report:
         s = dict(self.joint.timer.seconds)
         if "solve" in s:
             s["linear solve"] = s.pop("solve") - sum(s.get(name, 0.0) for name in _INSIDE_SOLVE)
+        before = s.pop(BEFORE_SOLVING, 0.0)
+        s["setup"] -= before
+        s["linear solve"] = s.get("linear solve", 0.0) + before
         s["total"] = perf_counter() - self.begun
         for name, value in self._before.get("seconds", {}).items():
             s[name] = s.get(name, 0.0) + value

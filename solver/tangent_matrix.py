@@ -13,7 +13,7 @@ from archord.solver.bordered import Bordered
 from archord.solver.bulk import Bulk, matrix
 from archord.solver.condensed import Condensed, filled
 from archord.solver.contact import Contact
-from archord.solver.timer import Timer
+from archord.solver.timer import BEFORE_SOLVING, Timer
 
 
 class TangentMatrix:
@@ -71,7 +71,8 @@ class TangentMatrix:
         if self._condense:
             assert self.contact is not None
             self._touching = np.unique(np.concatenate([side.curve_dofs for side in self.contact.sides]))
-            self.condensed = Condensed(A, self._touching, self._revise)
+            with self.timer(BEFORE_SOLVING):
+                self.condensed = Condensed(A, self._touching, self._revise)
         else:
             self._elastic = A.copy()
         self._find_contact()

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 
+BEFORE_SOLVING = "linear solver's setup"  # orders and factorisations that the setup asks for
+
 
 @dataclass
 class Timer:
