@@ -57,9 +57,8 @@ def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
     local = np.asarray(A.getLGMap()[0].indices)
     shared = _union(comm, local[(local < start) | (local >= end)])
     offsets, columns, _ = A.getValuesCSR()
-    rows = np.repeat(np.arange(start, end, dtype=columns.dtype), np.diff(offsets))
     across = np.flatnonzero((columns < start) | (columns >= end))
-    rows, columns = rows[across], columns[across]
+    rows, columns = start - 1 + np.searchsorted(offsets, across, side="right"), columns[across]
     across = np.flatnonzero(~_within(rows, shared) & ~_within(columns, shared))
     rows, columns = rows[across], columns[across]
     size = A.getBlockSize()
@@ -178,11 +177,11 @@ class Substructures:
             self._mumps = None
 
 
-def _ranges(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """The numbers from each of ``starts`` to that of ``ends``, without it, one after the other."""
-    counts = ends - starts
+def _ranges(starts: np.ndarray, ends: np.ndarray, step: int = 1) -> np.ndarray:
+    """Every ``step``-th number from each of ``starts`` to that of ``ends``, without it, one after the other."""
+    counts = (ends - starts) // step
     first = np.cumsum(counts) - counts
-    return np.arange(counts.sum()) + np.repeat(starts - first, counts)
+    return step * np.arange(counts.sum()) + np.repeat(starts - step * first, counts)
 
 
 def _places(
@@ -197,7 +196,7 @@ def _places(
     inner = np.flatnonzero(~behind)
     number = np.where(behind, -1, np.cumsum(~behind) - 1)
     starts, ends = offsets[size * inner], offsets[size * inner + 1]
-    row, column = np.repeat(inner, (ends - starts) // size), columns[_ranges(starts, ends)[::size]] // size
+    row, column = np.repeat(inner, (ends - starts) // size), columns[_ranges(starts, ends, size)] // size
     both = ~behind[column]
     row, column = number[row[both]], number[column[both]]
     place = np.empty(len(behind), dtype=np.int32)

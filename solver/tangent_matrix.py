@@ -72,6 +72,7 @@ class TangentMatrix:
             assert self.contact is not None
             self._touching = np.unique(np.concatenate([side.curve_dofs for side in self.contact.sides]))
             with self.timer(BEFORE_SOLVING):
+                A.convert("aij")  # PETSc has no Cholesky factors of block matrices from MUMPS
                 self.condensed = Condensed(A, self._touching, self._revise)
         else:
             self._elastic = A.copy()
