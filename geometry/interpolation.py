@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import basix.ufl
 import numpy as np
+from dolfinx.geometry import bb_tree, compute_closest_entity, compute_collisions_points, create_midpoint_tree
+from dolfinx.mesh import create_mesh
+from mpi4py import MPI
 
 from archord.geometry.basis import Array, lagrange_triangle
 
-_FEW, _MANY = 4, 12  # cells whose centres are next to a point: the first hold nearly every point
 _NEWTON = 4  # iterations for the reference point: the cells are nearly straight
 _STRAIGHT = 1e-9  # last step in a reference cell
 _CHUNK = 50_000  # points at once
@@ -15,54 +18,71 @@ _CHUNK = 50_000  # points at once
 class Interpolation:
     """From the nodes ``x`` ``(n, 2)`` of ``cells`` ``(m, a)``, of the given ``degree``, to points ``to`` ``(k, 2)``.
 
-    A point outside of all cells, as between a curved edge and its coarser image, gets the continuation of the next
-    cell's polynomial.
+    A point outside of all cells, as between a curved edge and its coarser image, gets the continuation of a cell next
+    to it.
     """
 
     def __init__(self, x: Array, cells: np.ndarray, degree: int, to: Array) -> None:
-        from scipy.spatial import cKDTree  # only meshes that are interpolated need it
-
-        corners = x[cells[:, :3]]
-        tree = cKDTree(corners.mean(axis=1))
-        element = lagrange_triangle(degree)
+        element, locate = lagrange_triangle(degree), _Triangles(x, cells[:, :3])
         self._nodes = np.empty((len(to), cells.shape[1]), dtype=np.int64)
         self._weights = np.empty(self._nodes.shape)
         for start in range(0, len(to), _CHUNK):
             part = slice(start, start + _CHUNK)
             points = to[part]
-            cell, X, outside = np.zeros(len(points), dtype=np.int64), np.zeros_like(points), np.arange(len(points))
-            for candidates in (min(n, len(cells)) for n in (_FEW, _MANY)):
-                some = points[outside]
-                near = tree.query(some, k=candidates)[1].reshape(len(some), candidates)
-                cell[outside], X[outside], margin = _inside(corners[near], near, some)
-                outside = outside[margin < 0]
+            cell, X = locate(points)
+            self._nodes[part] = cells[cell]
+            nodes = x[self._nodes[part]]
             moving = np.arange(len(points))
             for _ in range(_NEWTON if degree > 1 else 0):
-                table, nodes = element.tabulate(1, X[moving])[..., 0], x[cells[cell[moving]]]
-                misfit = points[moving] - np.einsum("na,nai->ni", table[0], nodes)
-                J = np.einsum("jna,nai->nij", table[1:], nodes)
+                table = element.tabulate(1, X[moving])[..., 0]
+                misfit = points[moving] - np.einsum("na,nai->ni", table[0], nodes[moving])
+                J = np.einsum("jna,nai->nij", table[1:], nodes[moving])
                 step = np.linalg.solve(J, misfit[..., None])[..., 0]
                 X[moving] += step
                 moving = moving[np.abs(step).max(axis=1) > _STRAIGHT]
-            self._nodes[part], self._weights[part] = cells[cell], element.tabulate(0, X)[0, ..., 0]
+            self._weights[part] = element.tabulate(0, X)[0, ..., 0]
 
     def __call__(self, values: Array) -> Array:
         """Values ``(k, c)`` at the points from those ``(n, c)`` at the nodes."""
         return np.einsum("ka,kac->kc", self._weights, values[self._nodes])
 
 
-def _inside(corners: Array, near: np.ndarray, to: Array) -> tuple[np.ndarray, Array, Array]:
-    """Of the triangles ``near`` ``(k, c)`` with ``corners`` ``(k, c, 3, 2)`` the one around (or next to) each point of
-    ``to``, the point's reference coordinates ``(k, 2)`` there, and the smallest barycentric one ``(k,)``."""
-    origin = corners[:, :, 0]
-    J = np.moveaxis(corners[:, :, 1:] - origin[:, :, None], -1, -2)
-    d = to[:, None] - origin
-    det = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
-    X = np.stack(
-        [J[..., 1, 1] * d[..., 0] - J[..., 0, 1] * d[..., 1], J[..., 0, 0] * d[..., 1] - J[..., 1, 0] * d[..., 0]],
-        axis=-1,
-    )
-    X /= det[..., None]
-    smallest = np.minimum(X.min(axis=-1), 1 - X.sum(axis=-1))
-    best, row = smallest.argmax(axis=1), np.arange(len(to))
-    return near[row, best], X[row, best], smallest[row, best]
+class _Triangles:
+    """Straight ``triangles`` ``(m, 3)`` with vertices ``x`` ``(n, 2)``, in which points are searched for."""
+
+    def __init__(self, x: Array, triangles: np.ndarray) -> None:
+        self._corners = x[triangles]
+        line = basix.ufl.element("P", "triangle", 1, shape=(2,))
+        places = np.ascontiguousarray(x)
+        self._mesh = create_mesh(MPI.COMM_SELF, cells=triangles.astype(np.int64, order="C"), x=places, e=line)
+        self._number = np.asarray(self._mesh.topology.original_cell_index)
+        self._tree = bb_tree(self._mesh, 2)
+
+    def __call__(self, to: Array) -> tuple[np.ndarray, Array]:
+        """The number of a triangle around each point of ``to`` ``(k, 2)``, or next to it, and the point's reference
+        coordinates ``(k, 2)`` there."""
+        places = np.pad(to, ((0, 0), (0, 1)))
+        found = compute_collisions_points(self._tree, places)
+        count = np.diff(found.offsets)
+        point, cell = np.repeat(np.arange(len(to)), count), found.array
+        lost = np.flatnonzero(count == 0)  # in no triangle's bounding box
+        if len(lost):
+            everything = create_midpoint_tree(self._mesh, 2, np.arange(len(self._number), dtype=np.int32))
+            nearest = compute_closest_entity(self._tree, everything, self._mesh, places[lost])
+            point, cell = np.append(point, lost), np.append(cell, nearest)
+            order = np.argsort(point, kind="stable")
+            point, cell = point[order], cell[order]
+        cell = self._number[cell]
+        X = _reference_points(self._corners[cell], to[point])
+        smallest = np.minimum(X.min(axis=1), 1 - X.sum(axis=1))  # barycentric coordinate
+        start = np.flatnonzero(np.diff(point, prepend=-1))
+        best = np.flatnonzero(smallest == np.maximum.reduceat(smallest, start)[point])
+        best = best[np.diff(point[best], prepend=-1) > 0]
+        return cell[best], X[best]
+
+
+def _reference_points(corners: Array, to: Array) -> Array:
+    """Coordinates ``(k, 2)`` of the points ``to`` in the reference triangle of those with ``corners`` ``(k, 3, 2)``."""
+    (ax, ay), (bx, by) = (corners[:, i].T - corners[:, 0].T for i in (1, 2))
+    dx, dy = to.T - corners[:, 0].T
+    return np.stack([by * dx - bx * dy, ax * dy - ay * dx], axis=1) / (ax * by - bx * ay)[:, None]

@@ -26,8 +26,9 @@ class SecondOrder:
                 for k, ends in enumerate(_EDGES)
             ]
         )
-        pair = np.sort(edges[:, :2], axis=1)
-        _, first, of_edge = np.unique(pair, axis=0, return_index=True, return_inverse=True)
+        pair = np.sort(edges[:, :2].astype(np.int64), axis=1)
+        number = pair[:, 0] * (pair.max(initial=0) + 1) + pair[:, 1]
+        _, first, of_edge = np.unique(number, return_index=True, return_inverse=True)
         middles = len(vertices) + of_edge.reshape(3, -1).T
         self.cells = np.concatenate([corners, middles], axis=1)
         self._vertices, self._edges = vertices, edges[first]
