@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -76,20 +77,8 @@ def launcher(ranks: int) -> list[str]:
     return ["mpirun", "-n", str(ranks)]
 
 
-def solve(case: Case, folder: Path, repeats: int = 1) -> Cost:
-    """Run ``case`` in processes of its own below ``folder``, ``repeats`` times; the run with the median time.
-
-    A run that fails is told as it is.
-    """
-    costs = []
-    for _ in range(repeats):
-        costs.append(_solve_once(case, folder))
-        if costs[-1].fault:
-            return costs[-1]
-    return sorted(costs, key=lambda cost: cost.total)[(len(costs) - 1) // 2]
-
-
-def _solve_once(case: Case, folder: Path) -> Cost:
+def solve(case: Case, folder: Path) -> Cost:
+    """Run ``case`` in processes of its own below ``folder``. A run that fails is told as it is."""
     run, scene = folder / case.name, folder / f"{case.name}.toml"
     claim_folder(run, force=True)
     scene.write_text(resolved(case.scene()), encoding="utf-8")
@@ -101,6 +90,12 @@ def _solve_once(case: Case, folder: Path) -> Cost:
         said = done.stderr.strip().splitlines() or [""]
         return Cost(case, fault=f"exit code {done.returncode}: {said[-1]}")
     return read_cost(case, json.loads((run / "run.json").read_text(encoding="utf-8")), total)
+
+
+def middle(costs: Sequence[Cost]) -> Cost:
+    """Of runs of one case the one with the median time, or the first that failed."""
+    failed = [cost for cost in costs if cost.fault]
+    return failed[0] if failed else sorted(costs, key=lambda cost: cost.total)[(len(costs) - 1) // 2]
 
 
 def read_cost(case: Case, report: dict[str, Any], total: float) -> Cost:

@@ -11,7 +11,7 @@ from archord.benchmarks import scaling, scaling_cases
 from archord.benchmarks.scaling import Costs, exponent, extrapolated, goals, serial_fraction
 from archord.benchmarks.scaling_cases import ELASTIC, Case, cases, refined
 from archord.benchmarks.scaling_report import markdown
-from archord.benchmarks.scaling_run import PARTS, Cost, read_cost, solve
+from archord.benchmarks.scaling_run import PARTS, Cost, middle, read_cost, solve
 from archord.cli import run
 from archord.solver.scene import SceneError
 
@@ -74,6 +74,24 @@ def test_every_size_runs_on_every_number_of_ranks_and_doubled_ones_on_two():
 def test_what_cannot_be_compared_is_refused(largest, ranks, said):
     with pytest.raises(SceneError, match=said):
         cases(largest, ranks)
+
+
+def test_ranks_take_turns_and_the_median_counts(monkeypatch, tmp_path):
+    """Where the speed-up is asked for, every number of ranks is solved several times, one after the other."""
+    order, seconds = [], iter([0, 0, 9, 8, 5, 3, 7, 4])
+
+    def solved(case, folder):
+        order.append(case.ranks)
+        return cost(case.dofs, case.ranks, solve=float(next(seconds)))
+
+    monkeypatch.setattr(scaling, "solve", solved)
+    monkeypatch.setattr(scaling, "launcher", lambda ranks: [])
+    monkeypatch.setattr(scaling, "cases", lambda largest, ranks: [Case(10**6, 1), Case(10**6, 2)])
+    found = scaling.run(1e6, [1, 2], tmp_path, 1)
+    assert order[2:] == [1, 2] * scaling.ROUNDS
+    assert [c.seconds["linear solve"] for c in found] == [7.0, 4.0]
+    failed = Cost(Case(10**6, 1), fault="exit code 3: no")
+    assert middle([*found, failed]) is failed
 
 
 def test_goals_follow_the_numbers():
