@@ -78,10 +78,9 @@ def refinements(cells: float) -> int:
 
 
 def on_circle(x: Array, centre: tuple[float, float], radius: float) -> Array:
-    """Points ``x`` ``(n, 3)`` moved along their rays to exact ``radius``.
+    """Points ``x`` ``(n, 2)`` moved along their rays to exact ``radius``.
 
     The clearance is a small difference of large numbers, which the rounding of a mesh generator would spoil.
     """
-    middle = np.array([*centre, 0.0])
-    ray = x - middle
-    return ray * (radius / np.linalg.norm(ray, axis=1))[:, None] + middle
+    ray = x - centre
+    return ray * (radius / np.linalg.norm(ray, axis=1))[:, None] + centre

@@ -1,44 +1,10 @@
-"""Meshes kept for the next joint of the same shape, without gmsh and bound to no communicator."""
+"""Meshes kept for the next joint of the same shape, bound to no communicator."""
 
 from __future__ import annotations
 
-import copy
 from collections import OrderedDict
-from typing import Any
 
-
-class Answers:
-    """What a gmsh model answered to each question that dolfinx asked it, to be asked again when gmsh is gone.
-
-    Answers are copied, as dolfinx works in some of the arrays. Knows nothing but what was asked while ``model`` was
-    there, until `forget_model`.
-    """
-
-    def __init__(self, model: Any, _prefix: str = "", _known: dict[tuple, Any] | None = None) -> None:
-        self._model, self._prefix = model, _prefix
-        self._known: dict[tuple, Any] = {} if _known is None else _known
-
-    @property
-    def mesh(self) -> Answers:
-        """The same for ``model.mesh``."""
-        return Answers(None if self._model is None else self._model.mesh, "mesh.", self._known)
-
-    def __getattr__(self, name: str) -> Any:
-        """The method ``name`` of the model."""
-        if name.startswith("__"):
-            raise AttributeError(name)
-
-        def ask(*arguments: Any, **named: Any) -> Any:
-            question = (self._prefix + name, *map(int, arguments), *((k, int(v)) for k, v in sorted(named.items())))
-            if question not in self._known:
-                self._known[question] = getattr(self._model, name)(*arguments, **named)
-            return copy.deepcopy(self._known[question])
-
-        return ask
-
-    def forget_model(self) -> None:
-        """Answer from memory alone from now on."""
-        self._model = None
+from archord.geometry.plane_mesh import PlaneMesh
 
 
 class MeshCache:
@@ -50,9 +16,9 @@ class MeshCache:
     def __init__(self, capacity: int = 0) -> None:
         self.capacity = capacity
         self.made = self.reused = 0
-        self._kept: OrderedDict[tuple, Answers] = OrderedDict()
+        self._kept: OrderedDict[tuple, PlaneMesh] = OrderedDict()
 
-    def find(self, key: tuple) -> Answers | None:
+    def find(self, key: tuple) -> PlaneMesh | None:
         """The mesh that was made from ``key``; None if it is not kept."""
         if key not in self._kept:
             return None
@@ -60,11 +26,13 @@ class MeshCache:
         self._kept.move_to_end(key)
         return self._kept[key]
 
-    def keep(self, key: tuple, answers: Answers) -> None:
-        """Keep a mesh just made from ``key``, and forget the one that was not used for longest."""
+    def keep(self, key: tuple, mesh: PlaneMesh) -> None:
+        """Keep a ``mesh`` just made from ``key``, if there is room, and forget the one that was not used for
+        longest."""
+        if not self.capacity:
+            return
         self.made += 1
-        answers.forget_model()
-        self._kept[key] = answers
+        self._kept[key] = mesh
         while len(self._kept) > self.capacity:
             self._kept.popitem(last=False)
 

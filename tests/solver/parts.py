@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from archord.geometry.curve import RigidCircle
 from archord.geometry.fenicsx import create_vector, gmsh_to_mesh
-from archord.geometry.joint_mesh import Cells, Facets
+from archord.geometry.joint_mesh import Cells, Facets, on_circle
 from archord.geometry.quarter_joint import quarter_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.j2 import J2Material
@@ -176,7 +176,8 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> tuple[Me
         gmsh.option.setNumber("Mesh.MeshSizeMin", size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
-    return gmsh_to_mesh(comm, build)
+    radii = {INNER: a, OUTER: b}
+    return gmsh_to_mesh(comm, build, lambda x, tag: on_circle(x, (0.0, 0.0), radii[tag]) if tag in radii else x)
 
 
 def solve(V, bulk: Bulk, supports: list[Support], contact: Contact | None, loads) -> Equilibrium:

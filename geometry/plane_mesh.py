@@ -1,0 +1,76 @@
+"""A mesh of curved triangles as arrays, as the mesh generator made it and before dolfinx distributes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx.cpp.io import perm_gmsh
+from dolfinx.mesh import CellType
+
+from archord.geometry.basis import Array
+
+_ENDS = [[1, 2], [0, 2], [0, 1]]  # vertices of a triangle's edges, in basix' order
+
+
+@dataclass(frozen=True)
+class PlaneMesh:
+    """Nodes ``x`` ``(n, 2)``, ``cells`` ``(m, a)`` of the ``bodies`` ``(m,)`` and ``edges`` ``(k, b)`` of the curves
+    ``tags`` ``(k,)``; the nodes of cells and edges come in basix' order."""
+
+    x: Array
+    cells: np.ndarray
+    bodies: np.ndarray
+    edges: np.ndarray
+    tags: np.ndarray
+
+    @classmethod
+    def empty(cls, order: int) -> PlaneMesh:
+        """No cells of this order: what the ranks have that did not make the mesh."""
+        nodes, none = (order + 1) * (order + 2) // 2, np.zeros(0, dtype=np.int32)
+        cells, edges = (np.zeros((0, a), dtype=np.int64) for a in (nodes, order + 1))
+        return cls(np.zeros((0, 2)), cells, none, edges, none)
+
+    @classmethod
+    def from_gmsh(cls, gmsh) -> PlaneMesh:
+        """What gmsh's model has in physical groups."""
+        numbers, x, _ = gmsh.model.mesh.getNodes()
+        cells, bodies = _elements(gmsh, CellType.triangle, 2)
+        edges, tags = _elements(gmsh, CellType.interval, 1)
+        used = np.zeros(int(numbers.max()) + 1, dtype=bool)  # but for centres of arcs, which dolfinx does not expect
+        used[cells] = True
+        number = np.cumsum(used) - 1
+        nodes = np.empty((number[-1] + 1, 2))
+        kept = used[numbers]
+        nodes[number[numbers[kept]]] = x.reshape(-1, 3)[kept, :2]
+        return cls(nodes, number[cells], bodies, number[edges], tags)
+
+    def second_order(self) -> PlaneMesh:
+        """This mesh of straight triangles with nodes on the middles of their edges, behind the others."""
+        n = len(self.x)
+        ends = np.sort(self.cells[:, _ENDS].reshape(-1, 2), axis=1)
+        number, first, of_edge = np.unique(ends @ [n, 1], return_index=True, return_inverse=True)
+        x = np.concatenate([self.x, self.x[ends[first]].mean(axis=1)])
+        cells = np.hstack([self.cells, n + of_edge.reshape(-1, 3)])
+        middles = np.searchsorted(number, np.sort(self.edges, axis=1) @ [n, 1])
+        return PlaneMesh(x, cells, self.bodies, np.column_stack([self.edges, n + middles]), self.tags)
+
+    def adjust(self, move: Callable[[Array, int], Array]) -> None:
+        """Put the nodes ``x`` ``(n, 2)`` of each curve where ``move(x, tag)`` says."""
+        for tag in np.unique(self.tags):
+            nodes = np.unique(self.edges[self.tags == tag])
+            self.x[nodes] = move(self.x[nodes], int(tag))
+
+
+def _elements(gmsh, kind: CellType, dim: int) -> tuple[np.ndarray, np.ndarray]:
+    """gmsh's numbers of the nodes ``(n, a)`` of elements in physical groups of dimension ``dim``, and the groups' tags
+    ``(n,)``."""
+    nodes, tags = [], []
+    for _, tag in gmsh.model.getPhysicalGroups(dim):
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
+            types, _, found = gmsh.model.mesh.getElements(dim, entity)
+            per_element = gmsh.model.mesh.getElementProperties(types[0])[3]
+            nodes.append(found[0].reshape(-1, per_element)[:, perm_gmsh(kind, per_element)])
+            tags.append(np.full(len(nodes[-1]), tag, dtype=np.int32))
+    return np.concatenate(nodes), np.concatenate(tags)
