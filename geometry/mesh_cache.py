@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from typing import TYPE_CHECKING
 
-from archord.geometry.plane_mesh import PlaneMesh
+if TYPE_CHECKING:
+    from archord.geometry.plane_mesh import PlaneMesh
 
 
 class MeshCache:
