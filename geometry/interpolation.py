@@ -52,9 +52,9 @@ class _Triangles:
 
     def __init__(self, x: Array, triangles: np.ndarray) -> None:
         self._corners = x[triangles]
-        line = basix.ufl.element("P", "triangle", 1, shape=(2,))
+        straight = basix.ufl.element("P", "triangle", 1, shape=(2,))
         places = np.ascontiguousarray(x)
-        self._mesh = create_mesh(MPI.COMM_SELF, cells=triangles.astype(np.int64, order="C"), x=places, e=line)
+        self._mesh = create_mesh(MPI.COMM_SELF, cells=triangles.astype(np.int64, order="C"), x=places, e=straight)
         self._number = np.asarray(self._mesh.topology.original_cell_index)
         self._tree = bb_tree(self._mesh, 2)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import basix
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 from dolfinx.mesh import CellType
 
 from archord.geometry.basis import Array
 
-_ENDS = [[1, 2], [0, 2], [0, 1]]  # vertices of a triangle's edges, in basix' order
+_ENDS = basix.topology(basix.CellType.triangle)[1]  # vertices of a triangle's edges
 
 
 @dataclass(frozen=True)
