@@ -49,19 +49,28 @@ class PlaneMesh:
 
     def second_order(self) -> PlaneMesh:
         """This mesh of straight triangles with nodes on the middles of their edges, behind the others."""
-        n = len(self.x)
-        ends = np.sort(self.cells[:, _ENDS].reshape(-1, 2), axis=1)
-        number, first, of_edge = np.unique(ends @ [n, 1], return_index=True, return_inverse=True)
+        ends = np.concatenate([self.cells[:, _ENDS].reshape(-1, 2), self.edges])
+        first, which = distinct_edges(ends)
         x = np.concatenate([self.x, self.x[ends[first]].mean(axis=1)])
-        cells = np.hstack([self.cells, n + of_edge.reshape(-1, 3)])
-        middles = np.searchsorted(number, np.sort(self.edges, axis=1) @ [n, 1])
-        return PlaneMesh(x, cells, self.bodies, np.column_stack([self.edges, n + middles]), self.tags)
+        middle = len(self.x) + which
+        of_cells, of_edges = np.split(middle, [3 * len(self.cells)])
+        cells, edges = np.hstack([self.cells, of_cells.reshape(-1, 3)]), np.column_stack([self.edges, of_edges])
+        return PlaneMesh(x, cells, self.bodies, edges, self.tags)
 
     def adjust(self, move: Callable[[Array, int], Array]) -> None:
         """Put the nodes ``x`` ``(n, 2)`` of each curve where ``move(x, tag)`` says."""
         for tag in np.unique(self.tags):
             nodes = np.unique(self.edges[self.tags == tag])
             self.x[nodes] = move(self.x[nodes], int(tag))
+
+
+def distinct_edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where each edge comes first among those with these ``ends`` ``(k, 2)``, either way round, and which one each of
+    them is ``(k,)``."""
+    low, high = np.sort(ends.astype(np.int64), axis=1).T
+    number = low * (high.max(initial=0) + 1) + high
+    _, first, which = np.unique(number, return_index=True, return_inverse=True)
+    return first, which
 
 
 def _elements(gmsh, kind: CellType, dim: int) -> tuple[np.ndarray, np.ndarray]:

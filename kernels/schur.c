@@ -48,8 +48,8 @@ void *schur_create(int32_t comm, int32_t n, int64_t nnz, int32_t *rows, int32_t 
     return id;
 }
 
-/* Room to factorise in, with so many per cent to spare, on huge pages: small ones take as long as a third of the work when they
- * are used for the first time. Returns whether there is that much. */
+/* Room to factorise in, with so many per cent to spare, on huge pages: small ones take long when they are used for the first
+ * time. Returns whether there is that much. */
 static int reserve(DMUMPS_STRUC_C *id, int percent)
 {
     int64_t words = id->info[7] < 0 ? -1000000LL * id->info[7] : id->info[7];

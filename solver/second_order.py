@@ -6,6 +6,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import lagrange
+from archord.geometry.plane_mesh import distinct_edges
 
 _EDGES = [(1, 2), (0, 2), (0, 1)]  # vertices of a cell's edges, in basix' order of its nodes
 
@@ -26,9 +27,7 @@ class SecondOrder:
                 for k, ends in enumerate(_EDGES)
             ]
         )
-        pair = np.sort(edges[:, :2].astype(np.int64), axis=1)
-        number = pair[:, 0] * (pair.max(initial=0) + 1) + pair[:, 1]
-        _, first, of_edge = np.unique(number, return_index=True, return_inverse=True)
+        first, of_edge = distinct_edges(edges[:, :2])
         middles = len(vertices) + of_edge.reshape(3, -1).T
         self.cells = np.concatenate([corners, middles], axis=1)
         self._vertices, self._edges = vertices, edges[first]
