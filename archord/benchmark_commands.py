@@ -74,7 +74,9 @@ def scaling(
         float, typer.Option("--largest", metavar="N", help="dofs of the largest mesh, 1 million at most")
     ] = 1_000_000,
     ranks: Annotated[str, typer.Option("--ranks", metavar="1,2", help="numbers of ranks, 1 first")] = "1,2",
-    repeats: Annotated[int, typer.Option("--repeats", min=1, help="runs of each case (3 of the largest); the median counts")] = 1,
+    repeats: Annotated[
+        int, typer.Option("--repeats", min=1, help="runs of each case, 3 of a million dofs; the median counts")
+    ] = 1,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what is wrong")] = False,
 ) -> int:
     """Solve the paper's joint on ever finer meshes and several ranks: time by part and memory per rank.
