@@ -16,17 +16,18 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from archord.api import load, load_scene, solve
-    from archord.results.run_result import Run
-    from archord.results.sweep_result import Sweep
-    from archord.solver.scene import Scene, SceneError
+    from archord.postprocess.run_result import Run
+    from archord.postprocess.sweep_result import Sweep
+    from archord.scene.errors import InputError
+    from archord.scene.scene import Scene
 
-__all__ = ["Run", "Scene", "SceneError", "Sweep", "load", "load_scene", "solve"]
+__all__ = ["InputError", "Run", "Scene", "Sweep", "load", "load_scene", "solve"]
 
 _HOME = {
-    "Run": "archord.results.run_result",
-    "Scene": "archord.solver.scene",
-    "SceneError": "archord.solver.scene",
-    "Sweep": "archord.results.sweep_result",
+    "Run": "archord.postprocess.run_result",
+    "Scene": "archord.scene.scene",
+    "InputError": "archord.scene.errors",
+    "Sweep": "archord.postprocess.sweep_result",
     "load": "archord.api",
     "load_scene": "archord.api",
     "solve": "archord.api",

@@ -12,25 +12,26 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from archord.results.run_result import Run
-from archord.results.sweep_result import Sweep
-from archord.solver.run_folder import is_sweep
-from archord.solver.scene import Scene, SceneError
-from archord.solver.scene_file import load_scene as load_scene_file
-from archord.solver.scene_format import toml_value
-from archord.solver.scene_sections import plain
+from archord.output.folder import is_sweep
+from archord.postprocess.run_result import Run
+from archord.postprocess.sweep_result import Sweep
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene as load_scene_file
+from archord.scene.reference import toml_value
+from archord.scene.scene import Scene
+from archord.scene.sections import plain
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
 
 def load(folder: str | Path) -> Any:
-    """The results in ``folder``: a `Run`, or a `Sweep` if it is a sweep's folder. Raises `SceneError` for neither.
+    """The results in ``folder``: a `Run`, or a `Sweep` if it is a sweep's folder. Raises `InputError` for neither.
 
     As the folder alone tells which, a type checker knows more of ``Run(folder)`` and ``Sweep(folder)``.
     """
     if not Path(folder).is_dir():
-        raise SceneError(f"{folder}: is not a folder; give the folder of a run or of a sweep.")
+        raise InputError(f"{folder}: is not a folder; give the folder of a run or of a sweep.")
     return Sweep(folder) if is_sweep(folder) else Run(folder)
 
 
@@ -38,10 +39,10 @@ def load_scene(path: str | Path, changes: Sequence[str] | Mapping[str, Any] = ()
     """Read and check a scene file, with ``changes`` like ``{"joint.clearance": 0.01}`` or as the command line has them,
     ``["joint.clearance=0.01"]``; None or nothing behind the sign drops a key.
 
-    Raises `SceneError` with one sentence per fault.
+    Raises `InputError` with one sentence per fault.
     """
     if isinstance(changes, str):
-        raise SceneError(f"changes = {changes!r}: must be a list of them, or a dictionary.")
+        raise InputError(f"changes = {changes!r}: must be a list of them, or a dictionary.")
     if isinstance(changes, Mapping):
         changes = [f"{key}={'' if value is None else toml_value(plain(value))}" for key, value in changes.items()]
     return load_scene_file(path, list(changes))
@@ -63,14 +64,14 @@ def solve(
     run that could not reach its end has the status "stopped", and the logger "archord" warns of it; its accepted steps
     stay.
 
-    Raises `SceneError` for bad input, on all ranks, and KeyboardInterrupt for Ctrl-C (SystemExit for SIGTERM and
+    Raises `InputError` for bad input, on all ranks, and KeyboardInterrupt for Ctrl-C (SystemExit for SIGTERM and
     SIGHUP) once the steps accepted so far are on disk.
     """
     from mpi4py import MPI
 
+    from archord.output.folder import claim_folder
+    from archord.output.ranks import agreed
     from archord.progress import reporting
-    from archord.solver.ranks import agreed
-    from archord.solver.run_folder import claim_folder
 
     comm = MPI.COMM_WORLD if comm is None else comm
 
@@ -78,14 +79,14 @@ def solve(
         checked = scene if isinstance(scene, Scene) else load_scene(scene)
         target = Path(tempfile.mkdtemp(prefix="archord-")) if folder is None else Path(folder)
         if target.is_dir() and any(target.iterdir()) and not force:
-            raise SceneError(f"{target}: is not empty; choose another folder, or overwrite a run in it: force=True.")
+            raise InputError(f"{target}: is not empty; choose another folder, or overwrite a run in it: force=True.")
         claim_folder(target, force)
         return checked, target
 
     checked, target = agreed(comm, claimed)
     if folder is None and comm.rank == 0 and comm.size > 1:
         atexit.register(shutil.rmtree, target, ignore_errors=True)
-    from archord.solver.run import solve_as_asked
+    from archord.output.run import solve_as_asked
 
     report, options = reporting(checked, silent=not progress or comm.rank != 0)
     try:
@@ -113,7 +114,7 @@ def _read(folder: Path, message: str) -> Run:
     """The run in ``folder``; RuntimeError with ``message``, if that tells why there is nothing to read."""
     try:
         return Run(folder)
-    except SceneError:
+    except InputError:
         if message:
             raise RuntimeError(message) from None
         raise

@@ -34,7 +34,7 @@ def stability(
     """
     from mpi4py import MPI
 
-    from archord.benchmarks import stability as table
+    from archord.benchmarks.stability import stability as table
 
     begun, comm = perf_counter(), MPI.COMM_WORLD
     names = table.chosen(only)
@@ -52,7 +52,7 @@ def stability(
     lines = table.run(names, output / "runs", comm, said)
     wrong = [line for line in lines if line.faults]
     if comm.rank == 0:
-        from archord.benchmarks.stability_report import summary, write_report
+        from archord.benchmarks.stability.report import summary, write_report
 
         files = write_report(lines, output)
         if not quiet:
@@ -84,12 +84,12 @@ def scaling(
     Writes scaling.csv, scaling.md and scaling.png. Exit code 0 only if every run finishes, with the same force on any
     number of ranks.
     """
-    from archord.benchmarks import scaling as table
-    from archord.benchmarks.scaling_report import markdown, write_report
-    from archord.solver.scene import SceneError
+    from archord.benchmarks.cost import scaling as table
+    from archord.benchmarks.cost.scaling_report import markdown, write_report
+    from archord.scene.errors import InputError
 
     if not all(part.strip().isdecimal() for part in ranks.split(",")):
-        raise SceneError(f"--ranks {ranks}: must be whole numbers with commas between them, like 1,2.")
+        raise InputError(f"--ranks {ranks}: must be whole numbers with commas between them, like 1,2.")
 
     def said(cost) -> None:
         if not quiet:
@@ -117,7 +117,7 @@ def variants(
 
     Writes variants.csv and variants.md. Exit code 0 only if none loads what it does not use.
     """
-    from archord.benchmarks import variants as table
+    from archord.benchmarks.cost import variants as table
 
     def said(use) -> None:
         if not quiet:
@@ -145,9 +145,9 @@ def accuracy(
 
     Writes accuracy.csv and accuracy.md. Exit code 0 only if all errors are below what was asked.
     """
-    from archord.benchmarks import accuracy as table
-    from archord.benchmarks.work_precision_cases import matches
-    from archord.solver.scene import SceneError
+    from archord.benchmarks.cost import accuracy as table
+    from archord.benchmarks.cost.work_precision_cases import matches
+    from archord.scene.errors import InputError
 
     def said(sentence: str) -> None:
         if not quiet:
@@ -155,7 +155,7 @@ def accuracy(
 
     begun, cases = perf_counter(), tuple(case for case in table.CASES if matches(only, case.name))
     if not cases:
-        raise SceneError(f"--only {only}: must be part of {', '.join(case.name for case in table.CASES)}.")
+        raise InputError(f"--only {only}: must be part of {', '.join(case.name for case in table.CASES)}.")
     lines = table.run(output / "runs", cases, said)
     files = table.write_report(lines, output)
     if not quiet:
@@ -172,7 +172,7 @@ def _print_table(lines) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from archord.benchmarks.stability_report import row
+    from archord.benchmarks.stability.report import row
 
     shown = ("case", "status", "steps", "iterations", "cutbacks", "force balance", "energy error", "deviation",
              "tolerance", "seconds", "verdict")  # fmt: skip
@@ -208,7 +208,7 @@ def work_precision(
     Writes work_precision.csv, work_precision.md and a diagram for each case. Every point is a whole process on one core
     with one thread, the median of all repeats. Exit code 0 if all of archord's points were solved.
     """
-    from archord.benchmarks.work_precision_cases import chosen_cases
+    from archord.benchmarks.cost.work_precision_cases import chosen_cases
 
     def say(sentence: str) -> None:
         if not quiet:
@@ -225,8 +225,8 @@ def work_precision(
 
 
 def _store_reference(cases, folder: Path, say) -> int:
-    from archord.benchmarks.work_precision_reference import FILE, compute
-    from archord.benchmarks.work_precision_report import reference_table
+    from archord.benchmarks.cost.work_precision_reference import FILE, compute
+    from archord.benchmarks.cost.work_precision_report import reference_table
 
     for case in cases:
         for kinematics in ("current", "reference"):
@@ -237,11 +237,11 @@ def _store_reference(cases, folder: Path, say) -> int:
 
 
 def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, warm, quiet, say) -> int:
-    from archord.benchmarks import work_precision as table
-    from archord.benchmarks.work_precision_figure import draw
-    from archord.benchmarks.work_precision_report import markdown, write_csv
-    from archord.benchmarks.work_precision_run import INTERRUPTED
-    from archord.solver.run_folder import claim_folder
+    from archord.benchmarks.cost import work_precision as table
+    from archord.benchmarks.cost.work_precision_figure import draw
+    from archord.benchmarks.cost.work_precision_report import markdown, write_csv
+    from archord.benchmarks.cost.work_precision_run import INTERRUPTED
+    from archord.output.folder import claim_folder
 
     claim_folder(output, force=True)
     found = [t for case in cases for t in table.tasks(case, output / "runs", quick=quick, peers=peers, limit=limit)]
@@ -255,7 +255,7 @@ def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, war
     whole = all(len(line.point.seconds) == repeats for line in lines if line.point.failure in ("", INTERRUPTED))
     seconds = None
     if warm and whole:
-        from archord.benchmarks.work_precision_warm import warm_seconds
+        from archord.benchmarks.cost.work_precision_warm import warm_seconds
 
         seconds = warm_seconds(repeats)
     text = markdown(lines, seconds)

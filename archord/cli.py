@@ -64,9 +64,9 @@ def _run(arguments: list[str]) -> int:
         say("archord: interrupted.")
         return 130
     except Exception as error:
-        from archord.solver.scene import SceneError
+        from archord.scene.errors import InputError
 
-        if isinstance(error, SceneError):
+        if isinstance(error, InputError):
             for sentence in str(error).splitlines():
                 say(sentence)
             return 2
@@ -143,7 +143,7 @@ def solve(
             scene, overrides or [], output, extend=extend, debug=debug, quiet=quiet, begun=_begun
         )
     from archord.progress import solve_with_progress
-    from archord.solver.scene_file import load_scene
+    from archord.scene.file import load_scene
 
     folder = output or Path("runs") / scene.stem
     return solve_with_progress(
@@ -160,7 +160,7 @@ def picture(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="file to draw [RUN/picture.png]")] = None,
 ) -> int:
     """Draw a run: plastic zone, contact pressure, P(delta)."""
-    from archord.results.picture import draw
+    from archord.postprocess.picture import draw
 
     print(draw(folder, output))
     return 0
@@ -182,7 +182,7 @@ def scene_format(
     """Print what a scene file may hold."""
     if schema + example + reference != 1:
         raise click.UsageError("choose one of --schema, --example and --reference")
-    from archord.solver import scene_format as scene
+    from archord.scene import reference as scene
 
     if schema:
         import json

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from archord.solver.scene import SceneError
-from archord.solver.scene_file import load_scene
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene
 
 
 def continue_with_progress(
@@ -13,23 +13,24 @@ def continue_with_progress(
 ) -> int:
     """Continue the run of ``source``, a scene file or the run folder itself; returns the exit code. Collective.
 
-    Raises `SceneError` on every rank if that cannot be.
+    Raises `InputError` on every rank if that cannot be.
     """
     from mpi4py import MPI
 
+    from archord.output.ranks import agreed
+    from archord.output.restart import Plan, plan_extension, plan_restart
+
     # on all ranks: it imports petsc4py, which is collective
     from archord.progress import solve_with_progress
-    from archord.solver.ranks import agreed
-    from archord.solver.restart import Plan, plan_extension, plan_restart
 
     folder = source if source.is_dir() else output or Path("runs") / source.stem
 
     def plan() -> Plan:
         if source.is_dir() and output is not None and output.resolve() != source.resolve():
-            raise SceneError(f"-o {output}: does not go with a run folder, {source}.")
+            raise InputError(f"-o {output}: does not go with a run folder, {source}.")
         scene = load_scene(source / "scene.toml" if source.is_dir() else source, overrides)
         if scene.analysis.accuracy is not None:
-            raise SceneError(
+            raise InputError(
                 f"{source}: analysis.accuracy = {scene.analysis.accuracy:g} does not go with --restart and --extend; "
                 f"the last mesh of the run goes on with archord solve {folder} --restart."
             )

@@ -29,13 +29,13 @@ def export_deck(
     force: Annotated[bool, typer.Option("--force", help="overwrite the deck if it is there")] = False,
 ) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
-    from archord.solver.scene import SceneError
-    from archord.solver.scene_file import load_scene
+    from archord.scene.errors import InputError
+    from archord.scene.file import load_scene
 
     checked = load_scene(scene, overrides or [])
     if checked.joint.model != "block":
-        raise SceneError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
-    from archord.benchmarks.deck import write_deck
+        raise InputError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
+    from archord.benchmarks.peers.deck import write_deck
 
     path = output or Path(f"{scene.stem}.inp")
     write_deck(checked, path, elements.value, force=force)

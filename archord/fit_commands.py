@@ -50,17 +50,17 @@ def fit(
 
     from rich.console import Console
 
-    from archord.postprocess import fit_report
-    from archord.postprocess.calibration import calibrate
+    from archord.output.output_file import check_output, writing
+    from archord.postprocess.laws import fit_report
+    from archord.postprocess.laws.calibration import calibrate
     from archord.postprocess.run_curve import read_run
-    from archord.solver.output_file import check_output, writing
-    from archord.solver.scene import SceneError
+    from archord.scene.errors import InputError
 
     if any(is_sweep(folder) for folder in folders):
         if len(folders) > 1:
-            raise SceneError(f"{folders[0]}: a sweep is fitted alone, but {len(folders)} folders are given.")
+            raise InputError(f"{folders[0]}: a sweep is fitted alone, but {len(folders)} folders are given.")
         if hold_k is not None or residuals or python:
-            raise SceneError(f"{folders[0]}: --hold-k, --residuals and --python are for runs, this is a sweep.")
+            raise InputError(f"{folders[0]}: --hold-k, --residuals and --python are for runs, this is a sweep.")
         return fit_sweep(
             folders[0],
             load_range or (0.0, math.inf),
@@ -72,7 +72,7 @@ def fit(
             picture,
         )
     if csv_file or law_file or held_out is not None:
-        raise SceneError(f"{folders[0]}: --csv, --law and --held-out are for a sweep, and this is none.")
+        raise InputError(f"{folders[0]}: --csv, --law and --held-out are for a sweep, and this is none.")
     runs = [read_run(folder).loading() for folder in folders]
     calibration = calibrate(runs, load_range or (0.0, math.inf), confidence, hold_k)
     law = calibration.law()
@@ -81,9 +81,9 @@ def fit(
     for file in files:
         check_output(file)
     if len({file.resolve() for file in files}) < len(files):
-        raise SceneError("--json, --python, --picture: must be different files.")
+        raise InputError("--json, --python, --picture: must be different files.")
     if picture:
-        from archord.postprocess.fit_picture import draw_fit
+        from archord.postprocess.laws.fit_picture import draw_fit
 
         draw_fit(calibration, picture)
     if json_file:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from archord.postprocess.fitted_cases import FittedCase
-    from archord.sweep.cases import Case
+    from archord.postprocess.laws.fitted_cases import FittedCase
+    from archord.studies.cases import Case
 
 FILE = "sweep.toml"
 TABLE = "fit.csv"
@@ -44,18 +44,18 @@ def fit_sweep(
     """Fit the sweep in the folder ``path``, or the stored table ``path``; print all, and write what is asked for."""
     from rich.console import Console
 
-    from archord.postprocess.calibrated_fit import TooFewError
-    from archord.postprocess.calibrated_report import case_table
-    from archord.postprocess.calibrated_study import study, usable
-    from archord.postprocess.fitted_cases import write_cases
-    from archord.solver.output_file import check_output, writing
-    from archord.solver.scene import SceneError
+    from archord.output.output_file import check_output, writing
+    from archord.postprocess.laws.calibrated_fit import TooFewError
+    from archord.postprocess.laws.calibrated_report import case_table
+    from archord.postprocess.laws.calibrated_study import study, usable
+    from archord.postprocess.laws.fitted_cases import write_cases
+    from archord.scene.errors import InputError
 
     if not 0 <= held_out <= 0.5:
-        raise SceneError(f"--held-out {held_out:g}: must be a share from 0 to 0.5.")
+        raise InputError(f"--held-out {held_out:g}: must be a share from 0 to 0.5.")
     files = [file for file in (csv_file, law_file, json_file, picture) if file]
     if len({file.resolve() for file in files}) < len(files):
-        raise SceneError("--csv, --law, --json, --picture: must be different files.")
+        raise InputError("--csv, --law, --json, --picture: must be different files.")
     for file in files:
         check_output(file)
     found = _stored(path) if path.suffix == ".csv" else _solved(path, load_range, confidence)
@@ -66,7 +66,7 @@ def fit_sweep(
     except TooFewError as error:
         result, too_few = None, str(error)
     if law_file and result is None:
-        raise SceneError(f"{law_file}: no law to write: {too_few}.")
+        raise InputError(f"{law_file}: no law to write: {too_few}.")
     if csv_file is None and path.is_dir():
         csv_file = path / TABLE
         files.append(csv_file)
@@ -82,12 +82,12 @@ def fit_sweep(
         with writing(law_file):
             law_file.write_text(model.to_json(), encoding="utf-8")
     if json_file:
-        from archord.postprocess.calibrated_report import as_json
+        from archord.postprocess.laws.calibrated_report import as_json
 
         with writing(json_file):
             json_file.write_text(as_json(found.cases, found.notes, found.left_out, model), encoding="utf-8")
     if picture:
-        from archord.postprocess.calibrated_picture import draw_calibrated
+        from archord.postprocess.laws.calibrated_picture import draw_calibrated
 
         draw_calibrated(found.cases, model, picture)
     Console(highlight=False, width=60 + 24 * (len(found.varied) + 6)).print(
@@ -108,9 +108,9 @@ def fit_sweep(
 
 def _print_shipped(cases: list[FittedCase], notes: dict[str, str]) -> None:
     """How good the law that comes with archord is on the ``cases`` of another sweep than its own."""
-    from archord.postprocess.calibrated_law import shipped_model
-    from archord.postprocess.calibrated_report import error_lines
-    from archord.postprocess.calibrated_study import shipped_rows
+    from archord.postprocess.laws.calibrated_law import shipped_model
+    from archord.postprocess.laws.calibrated_report import error_lines
+    from archord.postprocess.laws.calibrated_study import shipped_rows
 
     if notes.get("sweep") == shipped_model().provenance.get("sweep"):
         return
@@ -123,7 +123,7 @@ def _print_shipped(cases: list[FittedCase], notes: dict[str, str]) -> None:
 
 
 def _print_model(result, total: int) -> None:
-    from archord.postprocess.calibrated_report import error_lines, formulas, worst_line
+    from archord.postprocess.laws.calibrated_report import error_lines, formulas, worst_line
 
     model, used, held = result.model, result.used, result.held
     print(
@@ -144,23 +144,23 @@ def _print_model(result, total: int) -> None:
 
 
 def _stored(path: Path) -> Found:
-    from archord.postprocess.calibrated_report import numbers_of
-    from archord.postprocess.fitted_cases import read_cases
-    from archord.solver.scene import SceneError
+    from archord.postprocess.laws.calibrated_report import numbers_of
+    from archord.postprocess.laws.fitted_cases import read_cases
+    from archord.scene.errors import InputError
 
     cases, notes = read_cases(path)
     if not cases:
-        raise SceneError(f"{path}: holds no case.")
+        raise InputError(f"{path}: holds no case.")
     return Found(cases, list(range(1, len(cases) + 1)), numbers_of(cases), notes)
 
 
 def _solved(folder: Path, load_range: tuple[float, float], confidence: float) -> Found:
     """Fit k and c to every distinct case, on its finest mesh."""
-    from archord.postprocess.fitted_cases import fit_case, rounded
+    from archord.postprocess.laws.fitted_cases import fit_case, rounded
     from archord.postprocess.refinement import group
-    from archord.solver.scene import SceneError
-    from archord.sweep.cases import read_sweep
-    from archord.sweep.tables import entry, heading
+    from archord.scene.errors import InputError
+    from archord.studies.cases import read_sweep
+    from archord.studies.tables import entry, heading
 
     design = read_sweep(folder / FILE)
     runs, left_out = _runs(design.distinct, folder)
@@ -171,14 +171,14 @@ def _solved(folder: Path, load_range: tuple[float, float], confidence: float) ->
         left_out += [(of[run.name].run, f"{case.run} is the same joint on a finer mesh") for run in refined.coarser]
         try:
             cases.append(fit_case(refined, load_range, confidence, case.run))
-        except SceneError as error:
+        except InputError as error:
             left_out.append((case.run, str(error)))
         else:
             numbers.append(case.number)
             fitted.append(case)
     if not cases:
         said = "; ".join(f"{name}: {reason}" for name, reason in left_out[:1])
-        raise SceneError(f"{folder}: holds no case that can be fitted{f' ({said})' if said else ''}.")
+        raise InputError(f"{folder}: holds no case that can be fitted{f' ({said})' if said else ''}.")
     varied = {heading(key, case.scene): [_shown(entry(one.value(key))) for one in fitted] for key in design.keys}
     return Found(rounded(cases), numbers, varied, _notes(folder, design.distinct, cases), left_out)
 
@@ -190,9 +190,9 @@ def _shown(value: Any) -> str:
 def _runs(distinct: list[Case], folder: Path) -> tuple[list[tuple[Case, Any]], list[tuple[str, str]]]:
     """The curves of the cases whose joint has such a law, and the others with the reason."""
     from archord.postprocess.run_curve import read_run
-    from archord.solver.scene import SceneError
-    from archord.sweep.case_run import standing
-    from archord.sweep.tables import of_case
+    from archord.scene.errors import InputError
+    from archord.studies.case_run import standing
+    from archord.studies.tables import of_case
 
     runs, left_out = [], []
     for case in distinct:
@@ -208,7 +208,7 @@ def _runs(distinct: list[Case], folder: Path) -> tuple[list[tuple[Case, Any]], l
         else:
             try:
                 runs.append((case, read_run(run).loading()))
-            except SceneError as error:
+            except InputError as error:
                 reason = str(error)
         if reason:
             left_out.append((case.run, reason))
@@ -220,8 +220,8 @@ def _notes(folder: Path, distinct: list[Case], cases: list[FittedCase]) -> dict[
     import hashlib
 
     from archord import __version__
-    from archord.sweep.case_run import report_of
-    from archord.sweep.tables import of_case
+    from archord.studies.case_run import report_of
+    from archord.studies.tables import of_case
 
     reports = [report for case in distinct if (report := report_of(of_case(case, folder)))]
     days = sorted({str(report.get("started", ""))[:10] for report in reports} - {""})

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from archord.plain_typer import typer
 
 if TYPE_CHECKING:
-    from archord.postprocess.law import Law, Outside
-    from archord.postprocess.law_joint import LawJoint
+    from archord.postprocess.laws.law import Law, Outside
+    from archord.postprocess.laws.law_joint import LawJoint
 
 DEFAULT = "calibrated"  # the law that is meant where none is named
 
@@ -25,8 +25,8 @@ def laws(
     markdown: Annotated[bool, typer.Option("--markdown", help="print all that is known of each, as Markdown")] = False,
 ) -> int:
     """List the closed-form laws: name, title, range and source."""
-    from archord.postprocess.law_tables import laws_as_markdown
-    from archord.postprocess.laws import LAWS
+    from archord.postprocess.laws.law_tables import laws_as_markdown
+    from archord.postprocess.laws.laws import LAWS
 
     if markdown:
         print(laws_as_markdown(), end="")
@@ -79,16 +79,16 @@ def law(
     """Print a table of closed-form laws, or draw them against each other."""
     import math
 
-    from archord.postprocess.laws import find_law
-    from archord.solver.scene import SceneError
+    from archord.postprocess.laws.laws import find_law
+    from archord.scene.errors import InputError
 
     chosen = [find_law(name) for name in dict.fromkeys(names or [DEFAULT])]
     if not (math.isfinite(to) and to > 0):
-        raise SceneError(f"--to {to:g}: must be a positive number.")
+        raise InputError(f"--to {to:g}: must be a positive number.")
     if not 1 <= points <= 100000:
-        raise SceneError(f"--points {points}: must be between 1 and 100000.")
+        raise InputError(f"--points {points}: must be between 1 and 100000.")
     if strict and extrapolate:
-        raise SceneError("--strict: must not be given together with --extrapolate.")
+        raise InputError("--strict: must not be given together with --extrapolate.")
     given: dict[str, Any] = {
         "radius": radius,
         "clearance": clearance,
@@ -106,7 +106,7 @@ def law(
     rows = "load" if by_load or not all(entry.gives_displacement for entry in chosen) else "displacement"
     outside: Outside = "raise" if strict else "extrapolate" if extrapolate else "nan"
     if plot is not None:
-        from archord.postprocess.law_picture import draw_laws
+        from archord.postprocess.laws.law_picture import draw_laws
 
         print(_warned(draw_laws, chosen, joint, plot, rows, to, outside))
         return 0
@@ -120,23 +120,23 @@ def _joint(
     """The joint of the scene, or of the options, which come before it; and the names of the units."""
     import dataclasses
 
-    from archord.postprocess.law_joint import LawJoint
-    from archord.solver.scene import SceneError
+    from archord.postprocess.laws.law_joint import LawJoint
+    from archord.scene.errors import InputError
 
     values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if "nu" in values:
         values.setdefault("pin_nu", None)  # one for both
     if scene is not None:
-        from archord.solver.scene_file import load_scene
+        from archord.scene.file import load_scene
 
         loaded = load_scene(scene, overrides)
         units = {"length": loaded.units.length, "stress": loaded.units.stress, "force": loaded.units.force}
         return dataclasses.replace(LawJoint.from_scene(loaded, k=k), **values), units
     if overrides:
-        raise SceneError("--set: changes a scene; give one with --scene.")
+        raise InputError("--set: changes a scene; give one with --scene.")
     missing = [f"--{name.replace('_', '-')}" for name in ("radius", "clearance", "E_star") if name not in values]
     if missing:
-        raise SceneError(f"{', '.join(missing)}: missing; give radius, clearance and E* of the joint, or a --scene.")
+        raise InputError(f"{', '.join(missing)}: missing; give radius, clearance and E* of the joint, or a --scene.")
     return LawJoint(**values, k=k), {}
 
 
@@ -144,7 +144,7 @@ def _warned(function: Any, *arguments: Any) -> Any:
     """Call ``function`` and print each warning about a range once, as one sentence on stderr."""
     import warnings
 
-    from archord.postprocess.law_joint import LawRangeWarning
+    from archord.postprocess.laws.law_joint import LawRangeWarning
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LawRangeWarning)
@@ -159,7 +159,7 @@ def _print_table(
 ) -> None:
     from rich.table import Column, Table
 
-    from archord.postprocess.law_tables import law_columns
+    from archord.postprocess.laws.law_tables import law_columns
 
     for i, entry in enumerate(chosen):
         columns = law_columns(entry, joint, rows, to, points, outside, units)

@@ -9,14 +9,14 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from archord.postprocess.run_warnings import first_of_each_kind
 from archord.ranks import on_terminal
-from archord.results.run_warnings import first_of_each_kind
-from archord.solver.scene import Scene
+from archord.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from archord.solver.accuracy import Level
-    from archord.solver.restart import Start
-    from archord.solver.run import Outcome
+    from archord.output.restart import Start
+    from archord.output.run import Outcome
+    from archord.studies.accuracy import Level
 
 
 def solve_with_progress(
@@ -33,8 +33,8 @@ def solve_with_progress(
     exit code. ``start`` continues the run in ``folder``."""
     from mpi4py import MPI
 
-    from archord.solver.ranks import agreed
-    from archord.solver.run_folder import claim_folder
+    from archord.output.folder import claim_folder
+    from archord.output.ranks import agreed
 
     def claimed() -> Scene:
         scene = load()
@@ -43,7 +43,7 @@ def solve_with_progress(
 
     comm = MPI.COMM_WORLD
     scene = agreed(comm, claimed)
-    from archord.solver.run import solve_as_asked
+    from archord.output.run import solve_as_asked
     from archord.solver.timer import Timer
 
     timer = Timer()

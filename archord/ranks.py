@@ -56,7 +56,7 @@ def _leave_together(code: int) -> None:
     """Wait until all ranks have found their input bad; end them if they do not come, as the fault is here alone."""
     from mpi4py import MPI
 
-    from archord.solver.ranks import arrived_before
+    from archord.output.ranks import arrived_before
 
     if not arrived_before(MPI.COMM_WORLD, _PATIENCE):
         MPI.COMM_WORLD.Abort(code)

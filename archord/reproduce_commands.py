@@ -23,8 +23,8 @@ def reproduce(
     """
     from mpi4py import MPI
 
-    from archord.benchmarks.reproduce import chosen
-    from archord.benchmarks.reproduce import reproduce as make
+    from archord.benchmarks.paper.reproduce import chosen
+    from archord.benchmarks.paper.reproduce import reproduce as make
 
     begun, comm = perf_counter(), MPI.COMM_WORLD
     wanted = chosen(figures or ["all"])

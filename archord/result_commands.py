@@ -10,8 +10,8 @@ from archord.plain_typer import typer
 _WIDE = 10_000  # characters
 
 if TYPE_CHECKING:
-    from archord.results.run_result import Run
-    from archord.results.sweep_result import Sweep
+    from archord.postprocess.run_result import Run
+    from archord.postprocess.sweep_result import Sweep
 
 
 def register(app: typer.Typer) -> None:
@@ -32,23 +32,23 @@ def show(
 
     The pictures of a run are force.png, pressure.png, field.png and iterations.png.
     """
-    from archord.results.sweep_result import Sweep
-    from archord.solver.run_folder import is_sweep
+    from archord.output.folder import is_sweep
+    from archord.postprocess.sweep_result import Sweep
 
     if is_sweep(folder):
         return _show_sweep(Sweep(folder), output or folder, pictures)
-    from archord.results.run_result import Run
+    from archord.postprocess.run_result import Run
 
     return _show_run(Run(folder), output or folder, pictures)
 
 
 def _show_run(run: Run, target: Path, pictures: bool) -> int:
-    from archord.results import run_tables
+    from archord.postprocess import run_tables
 
     files, left_out = [], ["no picture: no step was accepted."]
     if pictures and run.steps:
-        from archord.results.export_files import make_folder
-        from archord.results.run_pictures import draw_run
+        from archord.postprocess.export_files import make_folder
+        from archord.postprocess.run_pictures import draw_run
 
         make_folder(target)
         files, left_out = draw_run(run, target)
@@ -75,12 +75,12 @@ def _show_run(run: Run, target: Path, pictures: bool) -> int:
 
 
 def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
-    from archord.results import sweep_tables
+    from archord.postprocess import sweep_tables
 
     files, left_out = [], "no picture: no case has an accepted step."
     if pictures and sweep.runs:
-        from archord.results.export_files import make_folder
-        from archord.results.sweep_picture import draw_sweep
+        from archord.postprocess.export_files import make_folder
+        from archord.postprocess.sweep_picture import draw_sweep
 
         make_folder(target)
         file, left_out = draw_sweep(sweep, target / "sweep.png")
@@ -120,13 +120,13 @@ def compare(
 
     Where R, dR or E* differ, they are compared in dimensionless form, too.
     """
-    from archord.results import comparison_tables as tables
-    from archord.results.comparison import compare_runs
-    from archord.results.run_result import Run
+    from archord.postprocess import comparison_tables as tables
+    from archord.postprocess.comparison import compare_runs
+    from archord.postprocess.run_result import Run
 
     comparison = compare_runs([Run(folder) for folder in folders])
     if pictures:
-        from archord.results.comparison_picture import draw_comparison
+        from archord.postprocess.comparison_picture import draw_comparison
 
         draw_comparison(comparison.runs, comparison.names, output, absolute=bool(comparison.absolute),
                         dimensionless=bool(comparison.dimensionless))  # fmt: skip
@@ -164,20 +164,20 @@ def export(
     force: Annotated[bool, typer.Option("--force", help="overwrite files that are there")] = False,
 ) -> int:
     """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything else."""
-    from archord.results.run_result import Run
-    from archord.solver.scene import SceneError
+    from archord.postprocess.run_result import Run
+    from archord.scene.errors import InputError
 
     if vtk is None and csv is None:
-        raise SceneError("export: give --vtk DIR, --csv DIR or both.")
+        raise InputError("export: give --vtk DIR, --csv DIR or both.")
     run = Run(folder)
     files: list[Path] = []
     left_out: list[str] = []
     if vtk is not None:
-        from archord.results.vtk_export import export_vtk
+        from archord.postprocess.vtk_export import export_vtk
 
         files += export_vtk(run, vtk, step, force=force)
     if csv is not None:
-        from archord.results.csv_export import export_csv
+        from archord.postprocess.csv_export import export_csv
 
         tables, left_out = export_csv(run, csv, step, force=force)
         files += tables

@@ -39,10 +39,10 @@ def sweep(
     begun = perf_counter()
     from mpi4py import MPI
 
-    from archord.solver.ranks import agreed
-    from archord.solver.scene import SceneError
-    from archord.sweep.cases import read_sweep
-    from archord.sweep.run import FILE, Share, check_ranks, claim, default_folder, gather, open_jobs
+    from archord.output.ranks import agreed
+    from archord.scene.errors import InputError
+    from archord.studies.cases import read_sweep
+    from archord.studies.sweep import FILE, Share, check_ranks, claim, default_folder, gather, open_jobs
     from archord.sweep_progress import SweepProgress, say
 
     comm = MPI.COMM_WORLD
@@ -50,7 +50,7 @@ def sweep(
     check_ranks(comm.size, ranks_per_case)
     source = file / FILE if file.is_dir() else file
     if file.is_dir() and not source.is_file():
-        raise SceneError(f"{file}: is not the folder of a sweep: {FILE} is missing.")
+        raise InputError(f"{file}: is not the folder of a sweep: {FILE} is missing.")
     folder = output or (file if file.is_dir() else default_folder(file))
     show = comm.rank == 0 and not quiet
 
@@ -61,7 +61,7 @@ def sweep(
         if dry_run:
             return design, ([], [])
         if gather_only and not (folder / FILE).exists():
-            raise SceneError(f"{folder}: holds no sweep to gather.")
+            raise InputError(f"{folder}: holds no sweep to gather.")
         claim(design, folder)
         return design, ([], []) if gather_only else open_jobs(design, folder, share, retry=retry)
 
@@ -74,7 +74,7 @@ def sweep(
         return 0
     received, results = 0, []
     if comm.bcast(bool(jobs)):
-        from archord.sweep.farm import Farm  # imports PETSc, on all ranks together
+        from archord.studies.farm import Farm  # imports PETSc, on all ranks together
 
         farm = Farm(comm, ranks_per_case)
         with SweepProgress(jobs, ended, farm.workers, begun, silent=not show) as progress:
@@ -95,7 +95,7 @@ def sweep(
 
 
 def _announced(design) -> str:
-    from archord.sweep.cost import expected_seconds
+    from archord.studies.cost import expected_seconds
 
     n, distinct = len(design.cases), len(design.distinct)
     seconds = sum(expected_seconds(case.scene) for case in design.distinct)
@@ -114,8 +114,8 @@ def _print_cases(design) -> None:
     from rich.table import Column, Table
 
     from archord.ranks import on_terminal
-    from archord.sweep.cost import expected_dofs, expected_seconds
-    from archord.sweep.tables import entry, heading
+    from archord.studies.cost import expected_dofs, expected_seconds
+    from archord.studies.tables import entry, heading
 
     keys = [heading(key, design.cases[0].scene) for key in design.keys]
     names = ["case", "run", *keys, "steps", "dofs", "seconds"]

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from archord.ranks import on_terminal
 
 if TYPE_CHECKING:
-    from archord.sweep.case_run import Result
-    from archord.sweep.farm import Job
+    from archord.studies.case_run import Result
+    from archord.studies.farm import Job
 
 
 def say(text: str) -> None:

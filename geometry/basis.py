@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import basix
@@ -87,14 +88,10 @@ def strain_matrix(gradient: Array) -> Array:
     return B
 
 
-_STRAINS = """void strains(int32_t n, int32_t q, int32_t a, const double *gradient, const int32_t *dofs,
-    const double *u, double *strain);"""
-
-
 def strain(gradient: Array, dofs: npt.NDArray[np.int32], u: Array) -> Array:
     """Strain ``(n, q, 3)`` from gradients ``(n, q, a, 2)``, nodes ``(n, a)`` and nodal displacements ``(nodes, 2)``."""
     n, q, a, _ = gradient.shape
     result = np.empty((n, q, 3))
     arguments = map(pointer, (gradient, dofs, u, result))
-    library("strain", _STRAINS).strains(n, q, a, *arguments)
+    library(Path(__file__).with_name("strain.c")).strains(n, q, a, *arguments)
     return result

@@ -7,6 +7,7 @@ A curve is a chain of facets; facet ``k`` has nodes ``k p .. (k + 1) p`` of a po
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +20,6 @@ Index = npt.NDArray[np.integer]
 _END_MARGIN = 0.05  # a polynomial facet may be continued by this much beyond a free end of its curve
 _CONTINUED = 0.5  # and a facet by this much where points are to stay on theirs
 _NEWTON_STEPS = 30
-_PROTOTYPE = """int32_t closest_points(int32_t m, const double *x, const double *outward, int32_t n_facets, int32_t p,
-    const double *X, const double *coefficients, const int32_t *home, int32_t reach, double margin, double end_margin,
-    int32_t steps, int32_t *facet, double *xi, double *point, double *normal, double *tangent, double *bend,
-    double *shape, double *slope, uint8_t *slides, uint8_t *found, int32_t *lost);"""
 
 
 class ProjectionError(RuntimeError):
@@ -135,7 +132,7 @@ class Curve:
         x, outward, home = np.ascontiguousarray(x), np.ascontiguousarray(outward), home.astype(np.int32, copy=False)
         curve = (displaced, self._coefficients, home)
         results = (facet, xi, point, normal, tangent, bend, shape, slope, slides, found, lost)
-        n_lost = library("closest_point", _PROTOTYPE).closest_points(
+        n_lost = library(Path(__file__).with_name("closest_point.c")).closest_points(
             m, pointer(x), pointer(outward), self.n_facets, self.degree, *map(pointer, curve), reach, margin,
             _END_MARGIN, _NEWTON_STEPS, *map(pointer, results),
         )  # fmt: skip

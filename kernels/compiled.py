@@ -1,5 +1,5 @@
-"""C sources of this folder as functions on numpy arrays: compiled once, by the compiler that dolfinx needs for its
-forms, and kept in the user's cache.
+"""C sources as functions on numpy arrays, declared by a header beside them: compiled once, by the compiler that dolfinx
+needs for its forms, and kept in the user's cache.
 
 Why not numba: dolfinx imports it wherever it is installed, 0.4 s of every run.
 """
@@ -29,29 +29,29 @@ class CompilerError(RuntimeError):
     """The C compiler is missing or failed."""
 
 
-def library(name: str, prototypes: str, libraries: tuple[str, ...] = ()) -> Any:
-    """The functions of ``name``.c that ``prototypes`` declares, which needs other ``libraries``. Raises
+def library(source: Path, libraries: tuple[str, ...] = ()) -> Any:
+    """The functions of the C file ``source`` that the header beside it declares; they need other ``libraries``. Raises
     `CompilerError`."""
-    return _loaded(name, prototypes, libraries)[1]
+    return _loaded(source, libraries)[1]
 
 
-def structure(name: str, prototypes: str, kind: str, members: Sequence[int | float | np.ndarray]) -> Any:
-    """A pointer to a structure of the type ``kind``, declared in ``prototypes``, with numbers and pointers to arrays,
-    which have to live as long as it is used. Raises `CompilerError`."""
+def structure(source: Path, kind: str, members: Sequence[int | float | np.ndarray]) -> Any:
+    """A pointer to a structure of the type ``kind``, declared in the header of ``source``, with numbers and pointers to
+    arrays, which have to live as long as it is used. Raises `CompilerError`."""
     values = [pointer(m) if isinstance(m, np.ndarray) else m for m in members]
-    return _loaded(name, prototypes, ())[0].new(f"{kind} *", values)
+    return _loaded(source, ())[0].new(f"{kind} *", values)
 
 
 @cache
-def _loaded(name: str, prototypes: str, libraries: tuple[str, ...]) -> tuple[cffi.FFI, Any]:
-    source = Path(__file__).with_name(f"{name}.c")
+def _loaded(source: Path, libraries: tuple[str, ...]) -> tuple[cffi.FFI, Any]:
     compiler = shlex.split(os.environ.get("CC", "cc"))
-    key = "\0".join([*compiler, *_FLAGS, platform.machine()]).encode() + source.read_bytes()
-    path = _cache() / f"{name}-{hashlib.sha256(key).hexdigest()[:16]}.so"
+    header = source.with_suffix(".h").read_text(encoding="utf-8")
+    key = "\0".join([*compiler, *_FLAGS, platform.machine(), header]).encode() + source.read_bytes()
+    path = _cache() / f"{source.stem}-{hashlib.sha256(key).hexdigest()[:16]}.so"
     if not path.exists():
         _compile([*compiler, *_FLAGS], source, path, libraries)
     ffi = cffi.FFI()
-    ffi.cdef(prototypes)
+    ffi.cdef("".join(line for line in header.splitlines(keepends=True) if not line.startswith("#")))
     return ffi, ffi.dlopen(str(path))
 
 

@@ -9,6 +9,7 @@ positive. Everything is a pure function: a step is taken back by dropping the ne
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -64,11 +65,6 @@ class J2Material:
         return self.yield_stress * peeq + 0.5 * self.hardening * peeq**2
 
 
-_PROTOTYPE = """int32_t radial_return(int32_t n, const double *strain, const double *old_plastic,
-    const double *old_peeq, double lam, double mu, double yield_stress, double hardening, const double *elastic,
-    double *stress, double *moduli, double *plastic, double *peeq);"""
-
-
 def _radial_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Array, Array, PlasticState]:
     """Plane strain: ``d_peeq = (q - sigma_y) / (3 mu + H)`` scales the trial deviator by ``1 - 3 mu d_peeq / q``."""
     n, strain = len(strain), np.ascontiguousarray(strain, dtype=float)
@@ -77,7 +73,7 @@ def _radial_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Arr
     inputs = map(pointer, (strain, old.plastic_strain, old.peeq))
     outputs = map(pointer, (stress, tangent, new.plastic_strain, new.peeq))
     elastic, moduli = elastic_tangent(m.E, m.nu, "strain"), lame(m.E, m.nu)
-    radial_return = library("radial_return", _PROTOTYPE).radial_return
+    radial_return = library(Path(__file__).with_name("radial_return.c")).radial_return
     yielding = radial_return(n, *inputs, *moduli, m.yield_stress, m.hardening, pointer(elastic), *outputs)
     return stress, tangent, new if yielding else old
 

@@ -9,9 +9,10 @@ import h5py
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.output.step_file import step_name
 from archord.postprocess.run_curve import RunCurve
-from archord.solver.scene import Scene, SceneError
-from archord.solver.step_file import step_name
+from archord.scene.errors import InputError
+from archord.scene.scene import Scene
 
 SIDES = ("pin", "hole")
 
@@ -51,22 +52,22 @@ class ArcContact(ArcPressure):
 
 
 def read_arcs(run: RunCurve, step: int) -> dict[str, ArcContact]:
-    """The sides of ``run`` at ``step`` (from 1); a side whose arc was not integrated is absent. Raises `SceneError`."""
+    """The sides of ``run`` at ``step`` (from 1); a side whose arc was not integrated is absent. Raises `InputError`."""
     if run.folder is None:
-        raise SceneError(f"{run.name}: is not a run folder: contact.h5 is missing.")
+        raise InputError(f"{run.name}: is not a run folder: contact.h5 is missing.")
     return read_contact(run.folder, run.scene, step, len(run.delta))
 
 
 def read_contact(folder: str | Path, scene: Scene, step: int, steps: int) -> dict[str, ArcContact]:
     """The sides at ``step`` (from 1) of the run of ``scene`` in ``folder``, which has so many accepted ``steps``.
 
-    Raises `SceneError` if contact.h5 is missing, damaged or does not hold the step.
+    Raises `InputError` if contact.h5 is missing, damaged or does not hold the step.
     """
     path = Path(folder) / "contact.h5"
     if not path.is_file():
-        raise SceneError(f"{folder}: is not a run folder: contact.h5 is missing.")
+        raise InputError(f"{folder}: is not a run folder: contact.h5 is missing.")
     if not 1 <= step <= steps:
-        raise SceneError(f"{folder}: has no step {step}; its accepted steps are 1 to {steps}.")
+        raise InputError(f"{folder}: has no step {step}; its accepted steps are 1 to {steps}.")
     geometry, at = scene.joint, step_name(step)
     radius = {"pin": geometry.radius, "hole": geometry.radius + geometry.dR}
     try:
@@ -88,7 +89,7 @@ def read_contact(folder: str | Path, scene: Scene, step: int, steps: int) -> dic
                 if side in file
             }
     except (OSError, KeyError, RuntimeError, TypeError, ValueError):
-        raise SceneError(f"{path}: cannot be read as the contact of a run.") from None
+        raise InputError(f"{path}: cannot be read as the contact of a run.") from None
 
 
 def undeformed(arc: ArcPressure, side: str, scene: Scene) -> Array:

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from archord.geometry.basis import Array
 from archord.postprocess.arc_pressure import read_arcs
 from archord.postprocess.run_curve import read_run
-from archord.solver.scene import SceneError
+from archord.scene.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -108,18 +108,18 @@ def read_chord_pressure(folder: str | Path, step: int | None = None, side: str |
     """Chord pressure on one ``side`` ("pin" or "hole"; the hole, if both are there) at a ``step`` of a run (the last).
 
     ``R`` is the side's own radius (that of the hole is R + dR) and ``eps`` the step's in history.csv. Raises
-    `SceneError` where there is no run, no such step or side, no contact angle, or one beyond pi/2 (a ring).
+    `InputError` where there is no run, no such step or side, no contact angle, or one beyond pi/2 (a ring).
     """
     run = read_run(folder)
     number = len(run.delta) if step is None else step
     arcs = read_arcs(run, number)
     chosen = side or list(arcs)[-1]
     if chosen not in arcs:
-        raise SceneError(f"{folder}: has no side {chosen!r}; its sides are {', '.join(arcs)}.")
+        raise InputError(f"{folder}: has no side {chosen!r}; its sides are {', '.join(arcs)}.")
     arc, eps = arcs[chosen], float(run.eps[number - 1])
     if not eps > 0:
-        raise SceneError(f"{folder}: has no contact angle at step {number}.")
+        raise InputError(f"{folder}: has no contact angle at step {number}.")
     try:
         return chord_projection(arc.angle, arc.pressure, eps, arc.radius, arc.weight)
     except ValueError as error:  # a ring whose contact goes round, or a file that is not a run's
-        raise SceneError(f"{folder}: step {number} cannot be projected: {error}") from None
+        raise InputError(f"{folder}: step {number} cannot be projected: {error}") from None

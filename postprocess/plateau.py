@@ -6,8 +6,8 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.postprocess.arc_pressure import ArcPressure, read_arcs
-from archord.postprocess.curve_fit import CurveFit, Residual, selected
-from archord.postprocess.least_squares import fit
+from archord.postprocess.laws.curve_fit import CurveFit, Residual, selected
+from archord.postprocess.laws.least_squares import fit
 from archord.postprocess.refinement import Refined
 from archord.postprocess.run_curve import RunCurve
 
@@ -38,7 +38,7 @@ def peak_facet_pressure(arc: ArcPressure) -> float:
 def plateau_pressure(run: RunCurve) -> tuple[Array, Array]:
     """Median pressure and its ratio to the largest (1: flat; parabola: 3/4), each ``(n steps,)``, mean of the sides.
 
-    Raises `SceneError` if contact.h5 cannot be read.
+    Raises `InputError` if contact.h5 cannot be read.
     """
     rows = []
     for step in range(1, len(run.delta) + 1):

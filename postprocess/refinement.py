@@ -11,7 +11,8 @@ from scipy.optimize import brentq
 
 from archord.geometry.basis import Array
 from archord.postprocess.run_curve import RunCurve
-from archord.solver.scene import Scene, SceneError
+from archord.scene.errors import InputError
+from archord.scene.scene import Scene
 
 _ASSUMED = 1.0  # P converges faster, but peak pressures and perfect plasticity do not for certain
 _LOWEST, _HIGHEST = 0.5, 2.0  # below, extrapolation multiplies noise; above, the error would be told too small
@@ -87,7 +88,7 @@ class Refined:
 def group(runs: list[RunCurve]) -> list[Refined]:
     """Runs of one scene that differ only in element size, together; in the order of the first of each.
 
-    Raises `SceneError` for two runs of the same scene on the same mesh.
+    Raises `InputError` for two runs of the same scene on the same mesh.
     """
     scenes: dict[tuple, list[RunCurve]] = {}
     for run in runs:
@@ -97,7 +98,7 @@ def group(runs: list[RunCurve]) -> list[Refined]:
         same.sort(key=lambda run: run.scene.joint.h)
         for a, b in pairwise(same):
             if np.isclose(a.scene.joint.h, b.scene.joint.h, rtol=1e-9, atol=0):
-                raise SceneError(f"{b.name}: is the same scene on the same mesh as {a.name}; give one of them.")
+                raise InputError(f"{b.name}: is the same scene on the same mesh as {a.name}; give one of them.")
         groups.append(Refined(same[0], tuple(same[1:])))
     return groups
 

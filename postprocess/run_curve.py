@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.postprocess.law_joint import LawJoint
-from archord.solver.history import read_history
-from archord.solver.run_folder import no_run
-from archord.solver.scene import Scene, SceneError
-from archord.solver.scene_file import load_scene
+from archord.output.folder import no_run
+from archord.output.history import read_history
+from archord.postprocess.laws.law_joint import LawJoint
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene
+from archord.scene.scene import Scene
 
 _SAME = 1e-6  # relative difference of two forces that are the same but for what Newton leaves
 
@@ -77,7 +78,7 @@ class RunCurve:
 
 
 def read_run(folder: str | Path) -> RunCurve:
-    """The curves in the run folder ``folder``. Raises `SceneError` if it is not one, or holds no accepted step."""
+    """The curves in the run folder ``folder``. Raises `InputError` if it is not one, or holds no accepted step."""
     folder = Path(folder)
     for name in ("scene.toml", "history.csv"):
         if not (folder / name).is_file():
@@ -87,9 +88,9 @@ def read_run(folder: str | Path) -> RunCurve:
         history = read_history(folder / "history.csv")
         delta, P, p0, eps, peeq = [np.array(history[name]) for name in ("delta", "P", "p0", "eps", "peeq_max")]
     except (ValueError, IndexError, KeyError, OSError):
-        raise SceneError(f"{folder / 'history.csv'}: cannot be read as the history of a run.") from None
+        raise InputError(f"{folder / 'history.csv'}: cannot be read as the history of a run.") from None
     if not np.isfinite([delta, P, p0, eps, peeq]).all():
-        raise SceneError(f"{folder / 'history.csv'}: holds numbers that are not finite.")
+        raise InputError(f"{folder / 'history.csv'}: holds numbers that are not finite.")
     if not len(delta):
-        raise SceneError(f"{folder}: holds no accepted step.")
+        raise InputError(f"{folder}: holds no accepted step.")
     return RunCurve(str(folder), scene, delta, P, p0, eps, peeq, folder)

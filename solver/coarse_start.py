@@ -12,10 +12,10 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.geometry.interpolation import Interpolation
-from archord.solver.joint import Joint
+from archord.presets.joint import Joint
+from archord.scene.scene import Scene
+from archord.solver.load_path import Walk
 from archord.solver.mesh_order import MeshOrder
-from archord.solver.scene import Scene
-from archord.solver.walk import Walk
 
 RATIO = 3.0  # element size over that of the next finer mesh
 _FEWEST_DOFS = 8_000  # of a joint that is worth a coarse start

@@ -19,12 +19,12 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.geometry.fenicsx import create_vector
 from archord.materials.elasticity import elastic_tangent
-from archord.solver.bordered import Bordered
 from archord.solver.bulk import Bulk
-from archord.solver.contact import Contact
+from archord.solver.contact.contact import Contact
 from archord.solver.interrupt import Interrupt, Interrupted
+from archord.solver.linear.bordered import Bordered
+from archord.solver.linear.tangent_matrix import TangentMatrix
 from archord.solver.points import PlasticPoints
-from archord.solver.tangent_matrix import TangentMatrix
 from archord.solver.timer import Timer
 
 

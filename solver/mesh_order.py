@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.solver.joint import Joint
+from archord.presets.joint import Joint
 from archord.solver.points import PlasticPoints
 
 Arrays = dict[str, np.ndarray]

@@ -12,9 +12,9 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
-from archord.solver.bordered import direct_solver
-from archord.solver.contact import GAMMA_FACTOR
+from archord.solver.contact.contact import GAMMA_FACTOR
 from archord.solver.equilibrium import Equilibrium
+from archord.solver.linear.bordered import direct_solver
 from archord.solver.timer import BEFORE_SOLVING
 
 _STIFF_CONTACT = 5.0  # gamma factor above which it is raised by and by where a solve fails

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from archord.scene.scene import Stepping
+from archord.solver.load_path import Position, Walk
 from archord.solver.newton import Newton
-from archord.solver.scene import Stepping
-from archord.solver.walk import Position, Walk
 
 _SLIVER = 1e-3  # of an output step: a step that would leave less than this goes to the target
 

@@ -25,7 +25,7 @@ SECTIONS = {
 def test_importing_archord_imports_nothing():
     """Names are there, but what they need is loaded when they are used."""
     code = (
-        "import sys, archord; print({'load', 'solve', 'Scene', 'SceneError', 'load_scene'} <= {*dir(archord)}, "
+        "import sys, archord; print({'load', 'solve', 'Scene', 'InputError', 'load_scene'} <= {*dir(archord)}, "
         "{'numpy', 'pydantic', 'mpi4py', 'pandas', 'h5py'} & {*sys.modules}); "
         "archord.load; print({'pandas', 'mpi4py', 'dolfinx', 'scipy', 'matplotlib'} & {*sys.modules})"
     )
@@ -63,8 +63,8 @@ def test_a_scene_from_python_is_that_of_the_file():
     ],
 )
 def test_faults_are_the_sentences_of_scene_files(change, said):
-    """One each, as a SceneError."""
-    with pytest.raises(archord.SceneError) as caught:
+    """One each, as a InputError."""
+    with pytest.raises(archord.InputError) as caught:
         archord.Scene(**(SECTIONS | change))
     assert str(caught.value).startswith(said)
     assert "\n" not in str(caught.value)
@@ -72,9 +72,9 @@ def test_faults_are_the_sentences_of_scene_files(change, said):
 
 def test_a_folder_without_results_is_a_sentence(tmp_path):
     """None there, or nothing in it."""
-    with pytest.raises(archord.SceneError, match=r"x: is not a folder; give the folder of a run or of a sweep\."):
+    with pytest.raises(archord.InputError, match=r"x: is not a folder; give the folder of a run or of a sweep\."):
         archord.load(tmp_path / "x")
-    with pytest.raises(archord.SceneError, match=r"is not a run folder: scene\.toml is missing\."):
+    with pytest.raises(archord.InputError, match=r"is not a run folder: scene\.toml is missing\."):
         archord.load(tmp_path)
 
 
@@ -86,7 +86,7 @@ def test_solve_gives_the_run_on_every_rank(tmp_path, comm):
     assert (run.status, run.steps) == ("done", 2)
     assert run.history.equals(archord.load(folder).history)
     assert run.fields().delta == pytest.approx(2 * 0.005, rel=1e-12)
-    with pytest.raises(archord.SceneError, match=r"is not empty; choose another folder, or overwrite .* force=True\."):
+    with pytest.raises(archord.InputError, match=r"is not empty; choose another folder, or overwrite .* force=True\."):
         archord.solve(SCENE, folder)
     comm.barrier()
 
@@ -109,7 +109,7 @@ def test_a_run_that_stops_is_given_back_with_a_warning(caplog):
     assert (run.status, run.steps, len(run.history)) == ("stopped", 0, 0)
     assert "no equilibrium at delta" in run.message
     assert run.message in caplog.text
-    with pytest.raises(archord.SceneError, match="holds no accepted step"):
+    with pytest.raises(archord.InputError, match="holds no accepted step"):
         run.pressure()
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import meshio
 import pytest
 
-from archord.solver.history import read_history
+from archord.output.history import read_history
 from tests import forked
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")

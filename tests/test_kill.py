@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests import forked
-from tests.solver.run_files import accepted_steps, same_run
+from tests.output.run_files import accepted_steps, same_run
 from tests.test_cli import SCENE
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from archord.cli import run
-from archord.postprocess.law_joint import LawJoint
-from archord.postprocess.laws import LAWS
+from archord.postprocess.laws.law_joint import LawJoint
+from archord.postprocess.laws.laws import LAWS
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]

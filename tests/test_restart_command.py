@@ -9,8 +9,8 @@ import tomllib
 
 import pytest
 
-from archord.solver.history import read_history
-from tests.solver.run_files import accepted_steps, same_run
+from archord.output.history import read_history
+from tests.output.run_files import accepted_steps, same_run
 from tests.test_cli import ENVIRONMENT, SCENE, archord
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
@@ -36,15 +36,15 @@ def killed(folder, after: int, ranks: int = 0) -> int:
 
 def _await_free(folder) -> None:
     """mpirun's ranks outlive it by a moment."""
-    from archord.solver.run_folder import occupied
-    from archord.solver.scene import SceneError
+    from archord.output.folder import occupied
+    from archord.scene.errors import InputError
 
     deadline = time.monotonic() + 30
     while time.monotonic() < deadline:
         try:
             with occupied(folder):
                 return
-        except SceneError:
+        except InputError:
             time.sleep(0.1)
 
 

@@ -1,6 +1,6 @@
 """The benchmark of asked, estimated and true errors."""
 
-from archord.benchmarks.accuracy import CASES, Case, markdown, run, write_report
+from archord.benchmarks.cost.accuracy import CASES, Case, markdown, run, write_report
 
 
 def test_a_case_is_solved_and_judged(tmp_path):

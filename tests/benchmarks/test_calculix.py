@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archord.benchmarks.calculix import (
+from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.peers.calculix import (
     axis_pressure,
     plastic_strain,
     read_contact_pressure,
@@ -19,11 +20,10 @@ from archord.benchmarks.calculix import (
     run_calculix,
     step_forces,
 )
-from archord.benchmarks.deck import contact_stiffness
-from archord.benchmarks.deck_mesh import deck_mesh
-from archord.benchmarks.paper_joint import paper_joint
+from archord.benchmarks.peers.deck import contact_stiffness
+from archord.benchmarks.peers.deck_mesh import deck_mesh
 from archord.geometry.joint_mesh import Facets
-from archord.solver.run import solve_scene
+from archord.output.run import solve_scene
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="CalculiX runs beside one rank")
 
@@ -108,7 +108,7 @@ def test_the_axis_pressure_of_an_even_parabola_is_its_top(mesh):
 def test_without_calculix_the_sentence_says_how_to_get_it(tmp_path):
     """Exit code 2, one line."""
     environment = os.environ | {"PATH": str(tmp_path)}
-    command = [sys.executable, "-m", "archord.benchmarks.peers"]
+    command = [sys.executable, "-m", "archord.benchmarks.peers.peers"]
     result = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert result.returncode == 2
     assert len(result.stderr.splitlines()) == 1

@@ -2,13 +2,13 @@
 
 import pytest
 
-from archord.benchmarks.counts import count, grown, kept, names
+from archord.benchmarks.cost.counts import count, grown, kept, names
 
 
 @pytest.mark.parametrize("name", names())
 def test_no_count_grows_by_more_than_a_tenth(name):
     now, before = count(name), kept()[name]
-    assert not grown(name, now, before), f"{now}, kept {before}: python3 -m archord.benchmarks.counts --write"
+    assert not grown(name, now, before), f"{now}, kept {before}: python3 -m archord.benchmarks.cost.counts --write"
 
 
 def test_more_than_a_tenth_is_noticed_and_less_is_not():

@@ -8,9 +8,9 @@ import os
 import numpy as np
 import pytest
 
-from archord.benchmarks.deck import contact_stiffness, deck
-from archord.benchmarks.deck_mesh import deck_mesh
-from archord.benchmarks.paper_joint import paper_joint
+from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.peers.deck import contact_stiffness, deck
+from archord.benchmarks.peers.deck_mesh import deck_mesh
 from archord.geometry.joint_mesh import Cells, Facets
 from tests.forked import archord
 

@@ -9,16 +9,16 @@ import tomllib
 
 import pytest
 
-from archord.benchmarks.fuzz import Case, faults, scene_of
-from archord.benchmarks.scene_mutations import KINDS, base_scenes
-from archord.solver.scene import SceneError
-from archord.solver.scene_file import load_scene, parse_scene, resolved
+from archord.benchmarks.stability.fuzz import Case, faults, scene_of
+from archord.benchmarks.stability.mutations import KINDS, base_scenes
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene, parse_scene, resolved
 
 ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_"))}
 
 
 def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
-    """Nothing but `SceneError`, in lines that end like sentences; a file that is accepted is resolved to itself."""
+    """Nothing but `InputError`, in lines that end like sentences; a file that is accepted is resolved to itself."""
     path, refused, kinds = tmp_path / "scene.toml", 0, set()
     for number in range(150):
         _, kind, content = scene_of(1, number)
@@ -26,7 +26,7 @@ def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
         path.write_bytes(content)
         try:
             scene = load_scene(path)
-        except SceneError as error:
+        except InputError as error:
             refused += 1
             lines = str(error).splitlines()
             assert lines, number
@@ -41,7 +41,17 @@ def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
 @pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
 def test_the_command_ends_in_order_on_mutated_files(tmp_path):
     """Exit codes 0, 2 and 3 only, no traceback, no number that is none, nothing left of a refused scene."""
-    command = [sys.executable, "-m", "archord.benchmarks.fuzz", "--seed", "1", "--cases", "12", "--keep", str(tmp_path)]
+    command = [
+        sys.executable,
+        "-m",
+        "archord.benchmarks.stability.fuzz",
+        "--seed",
+        "1",
+        "--cases",
+        "12",
+        "--keep",
+        str(tmp_path),
+    ]
     result = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, result.stdout
     assert "12 cases, seed 1" in result.stdout

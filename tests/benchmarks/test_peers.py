@@ -11,9 +11,9 @@ import sys
 import numpy as np
 import pytest
 
-from archord.benchmarks import peer_environment
-from archord.benchmarks.peer_list import CASES, PEERS, Peer, installed, probe
-from archord.benchmarks.peer_skfem import NU, E, return_map
+from archord.benchmarks.peers import environment as peer_environment
+from archord.benchmarks.peers.installed import CASES, PEERS, Peer, installed, probe
+from archord.benchmarks.peers.skfem_joint import NU, E, return_map
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="peers run beside one rank")
 

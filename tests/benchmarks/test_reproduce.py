@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks import paper_runs
-from archord.benchmarks.claims import FAIR, GOOD, _grade
-from archord.benchmarks.figures import Runs
-from archord.benchmarks.first_yield import first_yield
-from archord.benchmarks.paper_runs import PAIRS, Case, cases, plastic
-from archord.benchmarks.reproduce import FIGURES, chosen, reproduce
-from archord.solver.scene import SceneError
-from archord.solver.scene_file import load_scene
+from archord.benchmarks.paper import runs as paper_runs
+from archord.benchmarks.paper.claims import FAIR, GOOD, _grade
+from archord.benchmarks.paper.figures import Runs
+from archord.benchmarks.paper.first_yield import first_yield
+from archord.benchmarks.paper.reproduce import FIGURES, chosen, reproduce
+from archord.benchmarks.paper.runs import PAIRS, Case, cases, plastic
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene
 
 STEPS = 8
 
@@ -93,7 +93,7 @@ def test_figures_are_chosen_by_name():
     """All, some in the paper's order, or a sentence."""
     assert chosen(["all"]) == list(FIGURES)
     assert chosen(["fig9", "fig2"]) == ["fig2", "fig9"]
-    with pytest.raises(SceneError, match="fig6: is not a figure of the paper; figures are fig2, "):
+    with pytest.raises(InputError, match="fig6: is not a figure of the paper; figures are fig2, "):
         chosen(["fig6"])
 
 

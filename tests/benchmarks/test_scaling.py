@@ -7,13 +7,13 @@ from functools import cache
 
 import pytest
 
-from archord.benchmarks import scaling, scaling_cases
-from archord.benchmarks.scaling import Costs, exponent, extrapolated, goals, serial_fraction
-from archord.benchmarks.scaling_cases import ELASTIC, Case, cases, refined
-from archord.benchmarks.scaling_report import markdown
-from archord.benchmarks.scaling_run import PARTS, Cost, middle, read_cost, solve
+from archord.benchmarks.cost import scaling, scaling_cases
+from archord.benchmarks.cost.scaling import Costs, exponent, extrapolated, goals, serial_fraction
+from archord.benchmarks.cost.scaling_cases import ELASTIC, Case, cases, refined
+from archord.benchmarks.cost.scaling_report import markdown
+from archord.benchmarks.cost.scaling_run import PARTS, Cost, middle, read_cost, solve
 from archord.cli import run
-from archord.solver.scene import SceneError
+from archord.scene.errors import InputError
 
 
 def cost(dofs: int, ranks: int = 1, *, solve: float = 10.0, contact: float = 0.5, **options) -> Cost:
@@ -72,7 +72,7 @@ def test_every_size_runs_on_every_number_of_ranks_and_doubled_ones_on_two():
 @pytest.mark.parametrize(("largest", "ranks", "said"), [(100, [1], "--largest 100"), (1e6, [2], "--ranks 2"),
                                                          (1e6, [1, 1], "--ranks 1,1")])  # fmt: skip
 def test_what_cannot_be_compared_is_refused(largest, ranks, said):
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(InputError, match=said):
         cases(largest, ranks)
 
 

@@ -9,10 +9,10 @@ from dataclasses import replace
 import h5py
 import pytest
 
-from archord.benchmarks.stability import chosen, judge, with_references
-from archord.benchmarks.stability_cases import FINE, cases, same_as
-from archord.benchmarks.stability_fine import fine_scene, read_fine
-from archord.benchmarks.stability_run import Result, not_finite, slug, solve_case
+from archord.benchmarks.stability.cases import FINE, cases, same_as
+from archord.benchmarks.stability.fine import fine_scene, read_fine
+from archord.benchmarks.stability.run import Result, not_finite, slug, solve_case
+from archord.benchmarks.stability.stability import chosen, judge, with_references
 from archord.cli import run
 
 alone = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="only rank 0 prints")

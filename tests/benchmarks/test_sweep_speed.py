@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from archord.benchmarks.sweep_speed import Pair, measure, table, timed
-from tests.sweep.parts import written
+from archord.benchmarks.cost.sweep_speed import Pair, measure, table, timed
+from tests.studies.parts import written
 
 TWO = "[grid]\npin.E = [1.0, 1.82]\n"
 

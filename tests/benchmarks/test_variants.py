@@ -2,8 +2,8 @@
 
 import pytest
 
-from archord.benchmarks import variants
-from archord.benchmarks.variants import VARIANTS, WATCHED, Use, markdown, use, write_report
+from archord.benchmarks.cost import variants
+from archord.benchmarks.cost.variants import VARIANTS, WATCHED, Use, markdown, use, write_report
 
 CHOSEN = ("elastic, rigid pin", "elastic, no fields", "plastic", "picture of plastic")
 
@@ -33,7 +33,7 @@ def test_nothing_unused_is_loaded(uses, name):
 
 def test_what_is_used_is_loaded(uses):
     """So that its absence elsewhere says something."""
-    assert {"archord.materials.j2", "kernel radial_return", "archord.solver.fields", "kernel closest_point",
+    assert {"archord.materials.j2", "kernel radial_return", "archord.output.fields", "kernel closest_point",
             "dolfinx"} <= set(uses["plastic"].loaded)  # fmt: skip
     assert {"kernel closest_point"} <= set(uses["elastic, no fields"].loaded)
     assert "matplotlib" in uses["picture of plastic"].loaded

@@ -10,20 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archord.benchmarks import work_precision_codes as codes
-from archord.benchmarks import work_precision_reference
-from archord.benchmarks.envelope import envelope, lasting, seconds_at
-from archord.benchmarks.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
-from archord.benchmarks.richardson import extrapolated
-from archord.benchmarks.work_precision import Line, chosen, envelopes, judge, own_limit
-from archord.benchmarks.work_precision_cases import CASES, DECKS, SERIES, Series, chosen_cases, families, scaled
-from archord.benchmarks.work_precision_reference import combined, read_reference, smooth_profile
-from archord.benchmarks.work_precision_report import markdown, ratio_table, reference_table, row
-from archord.benchmarks.work_precision_run import Point, RunFailure, Task, Values, run_all, run_once
-from archord.benchmarks.work_precision_warm import curves, warm_seconds
+from archord.benchmarks.cost import work_precision_codes as codes
+from archord.benchmarks.cost import work_precision_reference
+from archord.benchmarks.cost.envelope import envelope, lasting, seconds_at
+from archord.benchmarks.cost.work_precision import Line, chosen, envelopes, judge, own_limit
+from archord.benchmarks.cost.work_precision_cases import CASES, DECKS, SERIES, Series, chosen_cases, families, scaled
+from archord.benchmarks.cost.work_precision_reference import combined, read_reference, smooth_profile
+from archord.benchmarks.cost.work_precision_report import markdown, ratio_table, reference_table, row
+from archord.benchmarks.cost.work_precision_run import Point, RunFailure, Task, Values, run_all, run_once
+from archord.benchmarks.cost.work_precision_warm import curves, warm_seconds
+from archord.benchmarks.paper.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
+from archord.benchmarks.verification.richardson import extrapolated
 from archord.cli import run
 from archord.postprocess.arc_pressure import ArcPressure
-from archord.solver.scene import SceneError
+from archord.scene.errors import InputError
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="it starts processes of one rank")
 
@@ -168,7 +168,7 @@ def test_references_are_there():
     profile = read_reference("elastic").profile
     force = 2 * np.trapezoid(profile["pin"] * np.cos(ANGLES), ANGLES)
     assert force == pytest.approx(read_reference("elastic").values["P"], rel=0.01)
-    with pytest.raises(SceneError, match="holds no values of the soft case"):
+    with pytest.raises(InputError, match="holds no values of the soft case"):
         read_reference("soft")
 
 

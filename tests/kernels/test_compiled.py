@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 
-from archord.kernels import compiled
 from archord.kernels.compiled import CompilerError, _loaded, library, pointer, structure
-
-PROTOTYPE = "double twice(double x);"
 
 
 @pytest.fixture
 def source(tmp_path, monkeypatch):
     """A folder of kernels and a cache of their own."""
-    monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled.py"))
+    (tmp_path / "doubling.h").write_text("double twice(double x);\n")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     _loaded.cache_clear()
     yield tmp_path / "doubling.c"
@@ -21,32 +18,32 @@ def source(tmp_path, monkeypatch):
 
 def test_a_kernel_is_compiled_once_and_anew_when_its_source_changes(source):
     source.write_text("double twice(double x) { return 2 * x; }\n")
-    assert library("doubling", PROTOTYPE).twice(1.5) == 3.0
+    assert library(source).twice(1.5) == 3.0
     (first,) = (source.parent / "cache" / "archord").iterdir()
     made = first.stat().st_mtime_ns
     _loaded.cache_clear()
-    library("doubling", PROTOTYPE)
+    library(source)
     assert first.stat().st_mtime_ns == made
     source.write_text("double twice(double x) { return x + x + 1; }\n")
     _loaded.cache_clear()
-    assert library("doubling", PROTOTYPE).twice(1.5) == 4.0
+    assert library(source).twice(1.5) == 4.0
     assert len(list((source.parent / "cache" / "archord").iterdir())) == 2
 
 
 def test_a_failing_or_missing_compiler_is_one_sentence_and_leaves_nothing(source, monkeypatch):
     source.write_text("double twice(double x) { return nonsense; }\n")
     with pytest.raises(CompilerError, match=r"doubling\.c could not be compiled: .*nonsense"):
-        library("doubling", PROTOTYPE)
+        library(source)
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(CompilerError, match=r"no C compiler .*install gcc, or set CC"):
-        library("doubling", PROTOTYPE)
+        library(source)
     assert not list((source.parent / "cache" / "archord").iterdir())
 
 
 def test_a_cache_that_cannot_be_written_is_no_hindrance(source, monkeypatch):
     source.write_text("double twice(double x) { return 2 * x; }\n")
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/nowhere")
-    assert library("doubling", PROTOTYPE).twice(2.0) == 4.0
+    assert library(source).twice(2.0) == 4.0
 
 
 def test_a_structure_has_numbers_and_pointers(source):
@@ -56,10 +53,12 @@ def test_a_structure_has_numbers_and_pointers(source):
     body = (
         "double total(const Sum *s) { double t = 0; for (int i = 0; i < s->n; i++) t += s->by * s->x[i]; return t; }\n"
     )
-    source.with_name("summing.c").write_text(f"#include <stdint.h>\n{kind}\n{body}")
+    summing = source.with_name("summing.c")
+    summing.write_text(f'#include "summing.h"\n{body}')
+    summing.with_suffix(".h").write_text(f"#include <stdint.h>\n{prototypes}\n")
     x = np.array([1.0, 2.0, 4.0])
-    total = structure("summing", prototypes, "Sum", [3, x, 0.5])
-    assert library("summing", prototypes).total(total) == 3.5
+    total = structure(summing, "Sum", [3, x, 0.5])
+    assert library(summing).total(total) == 3.5
 
 
 @pytest.mark.parametrize("array", [np.zeros((4, 4)).T[1:], np.zeros(4)[::2]], ids=["transposed", "strided"])

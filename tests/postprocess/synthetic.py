@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from archord.benchmarks.paper_joint import E, paper_joint
-from archord.postprocess.chord_laws import plastic_force, plastic_peak
-from archord.postprocess.law_joint import LawJoint
+from archord.benchmarks.paper.joint import E, paper_joint
+from archord.postprocess.laws.chord_laws import plastic_force, plastic_peak
+from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.run_curve import RunCurve
 
 LOADS = np.linspace(0.1, 2.0, 20)

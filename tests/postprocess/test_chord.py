@@ -7,7 +7,7 @@ from scipy.integrate import quad
 from archord.postprocess.arc_pressure import read_arcs
 from archord.postprocess.chord import arc_angle, chord_coordinate, chord_projection, read_chord_pressure
 from archord.postprocess.run_curve import read_run
-from archord.solver.scene import SceneError
+from archord.scene.errors import InputError
 
 
 @pytest.mark.parametrize("eps", [0.01, 0.5, 1.2, np.pi / 2])
@@ -119,7 +119,7 @@ def test_the_last_step_of_the_hole_is_the_default(runs):
     ],
 )
 def test_what_a_run_does_not_have(runs, step, side, said):
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(InputError, match=said):
         read_chord_pressure(runs["elastic"], step, side)
 
 

@@ -18,8 +18,8 @@ from archord.geometry.quarter_joint import quarter_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.j2 import J2Material
 from archord.solver.bulk import Body, Bulk
-from archord.solver.contact import Contact
-from archord.solver.contact_side import ContactSide
+from archord.solver.contact.contact import Contact
+from archord.solver.contact.surface import ContactSide
 from archord.solver.equilibrium import Equilibrium, Support
 from archord.solver.newton import NewtonSolver
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 from mpi4py import MPI
 
-from archord.benchmarks.paper_joint import E, paper_joint
+from archord.benchmarks.paper.joint import E, paper_joint
+from archord.output.measures import Measures, Work, arc_profiles, measure
+from archord.presets.arc import ArcProfile
+from archord.presets.joint import Joint
+from archord.scene.scene import Scene
 from archord.solver.coarse_start import coarse_start
-from archord.solver.contact_profile import ArcProfile
-from archord.solver.joint import Joint
-from archord.solver.measures import Measures, Work, arc_profiles, measure
-from archord.solver.scene import Scene
 from archord.solver.stepping import march
 
 __all__ = ["SEVERAL", "E", "Solution", "scene", "solve"]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.paper_joint import paper_joint
+from archord.benchmarks.paper.joint import paper_joint
 from archord.geometry.curve import ProjectionError
+from archord.output.run import solve_scene
+from archord.scene.scene import Stepping
 from archord.solver import coarse_start
-from archord.solver.run import solve_scene
-from archord.solver.scene import Stepping
 from tests.solver.solving import SEVERAL
 
 SOFT = {"rigid": True}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.solver.scene import SceneError
-from archord.solver.scene_file import load_scene
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene
 from archord.solver.stepping import StepFailure
 from tests.solver.solving import scene, solve
 
@@ -171,7 +171,7 @@ def test_a_bad_path_is_refused_with_a_sentence(tmp_path, content, said):
     """The file and what is wrong with it."""
     if content is not None:
         (tmp_path / "cycle.csv").write_text(content, encoding="utf-8")
-    with pytest.raises(SceneError, match=said.replace("[", r"\[")):
+    with pytest.raises(InputError, match=said.replace("[", r"\[")):
         load_scene(write(tmp_path, 'path = "cycle.csv"\n'))
 
 
@@ -190,6 +190,6 @@ def test_a_bad_path_is_refused_with_a_sentence(tmp_path, content, said):
 )
 def test_a_bad_load_is_refused_with_one_sentence(tmp_path, load, said):
     """One sentence, whatever number of types a key may have."""
-    with pytest.raises(SceneError, match=said) as refusal:
+    with pytest.raises(InputError, match=said) as refusal:
         load_scene(write(tmp_path, load + "\n"))
     assert len(str(refusal.value).splitlines()) == 1

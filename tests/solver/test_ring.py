@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.persson import DR, UNLIKE, persson_joint, theory, unlike
-from archord.postprocess.law_joint import LawJoint
-from archord.postprocess.persson_law import persson_pressure
-from archord.solver.report import energy_balance
+from archord.benchmarks.verification.persson import DR, UNLIKE, persson_joint, theory, unlike
+from archord.output.report import energy_balance
+from archord.postprocess.laws.law_joint import LawJoint
+from archord.postprocess.laws.persson_law import persson_pressure
 from tests.solver.solving import solve
 
 LIKE = LawJoint(1.0, DR, 1.0)

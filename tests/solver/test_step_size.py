@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from archord.scene.scene import Stepping
+from archord.solver.load_path import Walk
 from archord.solver.newton import Newton
-from archord.solver.scene import Stepping
 from archord.solver.stepping import StepFailure, StepSize, march
-from archord.solver.walk import Walk
 
 
 class Spring:

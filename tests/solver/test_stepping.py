@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from archord.solver.scene import Stepping
+from archord.scene.scene import Stepping
 from archord.solver.stepping import StepFailure, march
 from tests.solver.solving import scene, solve
 
@@ -40,7 +40,7 @@ def test_a_failed_step_leaves_no_trace():
 def test_a_solve_that_cannot_go_on_says_where_and_why():
     """The message holds delta, the reason, the residual and its place; accepted steps were reported before."""
     problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6})
-    from archord.solver.joint import Joint
+    from archord.presets.joint import Joint
     from tests.solver.solving import MPI
 
     joint, accepted = Joint(problem, MPI.COMM_SELF), []

@@ -1,0 +1,1 @@
+"""What a digit costs: error against run time, scaling, counts."""

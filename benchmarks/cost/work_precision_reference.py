@@ -1,0 +1,217 @@
+"""The values that errors are measured against: ``archord benchmark work-precision --reference``.
+
+For each case and kinematics two families of meshes (`archord.benchmarks.cost.work_precision_cases.families`), which
+refine near and far elements in different shares, are extrapolated, each by itself. The value is their mean; the stated
+error is what the two differ by or, if that is more, how far an extrapolation moves when one of its meshes is left out.
+
+The pressures on single facets scatter with how the facets of both sides meet, by 0.5 %, on fine meshes as on coarse
+ones: so the profile is the mean of the finest meshes, smoothed; its error is the largest L2 difference between the two
+families, each smoothed by itself, and between this and twice as many terms.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from archord.benchmarks.cost.work_precision_cases import CASES, Case, Kinematics, Series, families
+from archord.benchmarks.paper.pressure_profile import ANGLES, profile_error, sampled, smoothed
+from archord.benchmarks.verification.richardson import extrapolated
+from archord.geometry.basis import Array
+from archord.output.folder import claim_folder
+from archord.output.history import read_history
+from archord.output.run import solve_scene
+from archord.postprocess.arc_pressure import SIDES, read_arcs
+from archord.postprocess.run_curve import read_run
+from archord.scene.errors import InputError
+from archord.scene.file import resolved
+from archord.scene.scene import Scene
+
+FILE = Path(__file__).with_name("work_precision_reference.json")
+COLUMNS = {
+    "P": "P/(E* R)",
+    "p0": "p0/E*",
+    "eps": "eps",
+    "dissipation": "plastic_dissipation/(E* R2)",
+}  # of history.csv
+_FINEST = 3  # meshes of each family whose profiles are taken
+_TERMS = {"elastic": 6, "plastic": 10}  # of the smoothed profile
+# Fixed pairs can be chosen with either side's normals, which is a difference of the order of (dR/R)^2: another code's
+# choice tells how much of the value depends on that. GetFEM's value is good to 1e-5 only.
+_INDEPENDENT: dict[tuple[str, str], dict[str, Any]] = {
+    ("elastic", "reference"): {
+        "P": 0.012759596231085768,
+        "source": "NGSolve 6.2, fourth order elements, fixed pairs in the touching configuration, linear gap",
+        "another choice of pairs": True,
+    },
+    ("elastic", "current"): {
+        "P": 0.012778525299802898,
+        "source": "GetFEM 5.4, Q2 elements of 0.5 %R, closest points on the deformed curves, digits to 1e-5",
+        "another choice of pairs": False,
+    },
+}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Values of a case and their relative errors by quantity; ``profile`` by side, ``(401,)`` at `ANGLES`."""
+
+    values: dict[str, float]
+    errors: dict[str, float]
+    profile: dict[str, Array]
+
+    def error(self, quantity: str, value: float | None) -> float | None:
+        """Relative error of ``value``; None if it is unknown, or the quantity has no reference."""
+        if value is None or not self.values.get(quantity):
+            return None
+        return abs(value / self.values[quantity] - 1)
+
+
+def read_reference(case: str, kinematics: Kinematics = "current") -> Reference:
+    """The stored values. Raises `InputError` if there are none."""
+    data = stored(case, kinematics)
+    values = {name: entry["value"] for name, entry in data["quantities"].items()}
+    errors = {name: entry["error"] for name, entry in data["quantities"].items()}
+    profile = {side: np.array(p) for side, p in data.get("profile", {}).items()}
+    return Reference(values, errors, profile | {"both": _mean(profile)} if profile else {})
+
+
+def stored(case: str, kinematics: Kinematics) -> dict[str, Any]:
+    """All that is known of the reference: quantities, extrapolations, runs. Raises `InputError` if there is nothing."""
+    data = _stored().get(case, {}).get(kinematics)
+    if data is None:
+        raise InputError(
+            f"{FILE.name}: holds no values of the {case} case with {kinematics} kinematics; compute them with "
+            "archord benchmark work-precision --reference."
+        )
+    return data
+
+
+def _mean(profile: dict[str, Array]) -> Array:
+    """The pressure at an angle, of which the unbiased contact integrates one half on either side."""
+    return np.mean(list(profile.values()), axis=0)
+
+
+def values_of(folder: Path) -> dict[str, float]:
+    """The quantities of a run's last step."""
+    history = read_history(folder / "history.csv")
+    return {name: history[column][-1] for name, column in COLUMNS.items()}
+
+
+def profile_of(folder: Path) -> dict[str, Array]:
+    """The pressure ``(401,)`` at `ANGLES` by side, and of "both", at a run's last step."""
+    run = read_run(folder)
+    arcs = read_arcs(run, len(run.delta))
+    sides = {side: sampled(arcs[side]) for side in SIDES if side in arcs}
+    return sides | {"both": _mean(sides)}
+
+
+def compute(
+    case: Case, kinematics: Kinematics, folder: Path, said: Callable[[str], None] = lambda sentence: None
+) -> dict[str, Any]:
+    """Solve both families of ``case`` below ``folder`` (what is done there already is taken) and store the result.
+
+    Raises RuntimeError if a run does not get to its end.
+    """
+    chosen = families(case)
+    runs = [_solve(case, kinematics, series, folder, said) for series in chosen]
+    entry: dict[str, Any] = {"quantities": {}, "families": []}
+    for series, found in zip(chosen, runs, strict=True):
+        entry["families"].append({"name": series.name, "runs": [r | {"folder": r["folder"].name} for r in found]})
+    for quantity in COLUMNS:
+        if quantity in case.quantities:
+            entry["quantities"][quantity] = combined(
+                [[(r["element_size"], r[quantity]) for r in found] for found in runs]
+            )
+    samples = [[profile_of(r["folder"]) for r in found[-_FINEST:]] for found in runs]
+    profile, apart = smooth_profile(samples, _TERMS[case.name])
+    entry["quantities"]["profile"] = {"value": 0.0, "error": apart}
+    if kinematics == "current":
+        entry["profile"] = {side: [float(f"{p:.7g}") for p in values] for side, values in profile.items()}
+    if (case.name, kinematics) in _INDEPENDENT:
+        entry["independent"] = independent = _INDEPENDENT[case.name, kinematics]
+        force = entry["quantities"]["P"]
+        if independent["another choice of pairs"]:
+            force["error"] = max(force["error"], abs(independent["P"] / force["value"] - 1))
+    everything = _stored()
+    everything.setdefault(case.name, {})[kinematics] = entry
+    ordered = {name: everything[name] for name in CASES if name in everything}
+    FILE.write_text(_json({"angles": f"{len(ANGLES)} equal ones from 0 to pi/2", "cases": ordered}), encoding="utf-8")
+    return entry
+
+
+def smooth_profile(families: list[list[dict[str, Array]]], terms: int) -> tuple[dict[str, Array], float]:
+    """The profile by side and its relative L2 error from the profiles of each family's meshes."""
+    profile, apart = {}, 0.0
+    for side in families[0][0]:
+        means = [np.mean([sample[side] for sample in family], axis=0) for family in families]
+        everything = np.mean(means, axis=0)
+        profile[side] = smoothed(everything, terms)
+        first, second = (smoothed(mean, terms) for mean in means)
+        rougher = smoothed(everything, 2 * terms)
+        apart = max(apart, profile_error(first, second), profile_error(rougher, profile[side]))
+    return profile, apart
+
+
+def combined(found: list[list[tuple[float, float]]]) -> dict[str, Any]:
+    """Value and relative error from the pairs (element size, value) of each family."""
+    limits = [extrapolated(*zip(*pairs, strict=True)) for pairs in found]
+    value = float(np.mean([limit.value for limit in limits]))
+    error = max([float(np.ptp([limit.value for limit in limits])), *(limit.error for limit in limits)])
+    extrapolations = [{"value": limit.value, "order": limit.order, "moves by": limit.error} for limit in limits]
+    return {"value": value, "error": error / abs(value), "extrapolations": extrapolations}
+
+
+def _solve(
+    case: Case, kinematics: Kinematics, series: Series, folder: Path, said: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    found = []
+    for mesh in series.meshes:
+        scene = case.scene(mesh, kinematics)
+        run = folder / f"{case.name}_{kinematics}_{scene.joint.h:g}_{scene.joint.growth:g}"
+        if not _finished(run, scene):
+            claim_folder(run, force=True)
+            outcome = solve_scene(scene, run)
+            if outcome.status == "interrupted":
+                raise KeyboardInterrupt
+            if outcome.status != "done":
+                raise RuntimeError(f"{run.name}: {outcome.message}")
+        report = json.loads((run / "run.json").read_text(encoding="utf-8"))
+        values = {name: value for name, value in values_of(run).items() if name in case.quantities}
+        found.append(
+            {
+                "element_size": scene.joint.h,
+                "growth": scene.joint.growth,
+                "dofs": report["mesh"]["dofs"],
+                **values,
+                "folder": run,
+            }
+        )
+        said(f"{run.name}: {report['mesh']['dofs']} dofs, {values}, {report['seconds']['total']:.0f} s")
+    return found
+
+
+def _finished(run: Path, scene: Scene) -> bool:
+    if not (run / "run.json").is_file() or not (run / "scene.toml").is_file():
+        return False
+    done = json.loads((run / "run.json").read_text(encoding="utf-8"))["status"] == "done"
+    return done and (run / "scene.toml").read_text(encoding="utf-8") == resolved(scene)
+
+
+def _stored() -> dict[str, dict[str, Any]]:
+    return json.loads(FILE.read_text(encoding="utf-8"))["cases"] if FILE.exists() else {}
+
+
+def _json(data: dict[str, Any]) -> str:
+    """Indented, but for the profiles, which would be a line a number."""
+    text = json.dumps(data, indent=1)
+    for case in data["cases"].values():
+        for entry in case.values():
+            for values in entry.get("profile", {}).values():
+                text = text.replace(json.dumps(values, indent=1).replace("\n", "\n" + " " * 5), json.dumps(values))
+    return text + "\n"

@@ -1,0 +1,1 @@
+"""The same joint by other codes."""

@@ -1,0 +1,213 @@
+"""The paper's quarter joint by NGSolve: ``python3 ngsolve_joint.py --case elastic --order 4 --output r.json``.
+
+Needs NGSolve (of PyPI) and nothing of archord. Units: R = 1, E* = 1.
+
+- Bodies: Netgen's triangles, curved to the order of the displacements (2 to 4), small strains, plane strain. Edges
+  have the size h on the arcs and grow by 0.25 times the distance from there, below h = 0.04 by 6.25 h times. With
+  Netgen's grading that large P2 elements are coarser than gmsh's and four times as wrong: 0.6 of it makes about as
+  many.
+- Contact: kinematics "reference", NGSolve's ContactBoundary paired once, in the touching configuration: a linear gap
+  along the pin's normal, and the energy k/2 <-g>^2 with k = 1e5 E*/R (penalty).
+- Plasticity: J2, perfect, backward Euler. A step minimises the incremental energy, which for the elastic trial
+  deviator e is mu |e|^2 up to |e| = r/(2 mu), r = sqrt(2/3) sigY, and r |e| - r^2/(4 mu) beyond (the radial return;
+  Simo and Hughes 1998, box 3.2, integrated); NGSolve differentiates it. The plastic strain lives in the integration
+  points.
+- Newton's method with full steps, inner unknowns condensed, NGSolve's sparse Cholesky; where it fails, the step is
+  cut. Residual: 1e-8 of the reaction.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+R, DR, WIDTH, NU = 1.0, 0.005, 100.0, 0.3
+E = 2 * (1 - NU**2)
+MU, LAME = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
+SIGY, PENALTY = 0.002, 1e5
+TOLERANCE, FAR, ITERATIONS, CUTS = 1e-8, 1e3, 25, 6  # residuals over the reaction
+
+
+def mesh_joint(size: float, growth: float, order: int):
+    """Pin and block, their edges named "arc", "top" and "axis" behind the body's name."""
+
+    def body(name: str, y: float, radius: float, outer: list):
+        place = [occ.gp_Pnt(*p, 0) for p in ((0, y - radius), (radius, y), *outer)]
+        half = occ.gp_Pnt(radius * math.sqrt(0.5), y - radius * math.sqrt(0.5), 0)
+        lines = [occ.Segment(a, b) for a, b in zip(place[1:], place[2:] + place[:1], strict=True)]
+        face = occ.Face(occ.Wire([occ.ArcOfCircle(place[0], half, place[1]), *lines]))
+        face.name = name
+        for edge in face.edges:
+            x, centre = edge.center.x, edge.center.y
+            if abs(math.hypot(x, centre - y) - radius) < 0.2 and abs(centre - y) > 1e-9 and x > 1e-9:
+                edge.name, edge.maxh = f"{name}_arc", size
+            elif abs(centre - y) < 1e-9:
+                edge.name = f"{name}_top"
+            elif x < 1e-9:
+                edge.name = f"{name}_axis"
+        return face
+
+    pin = body("pin", -DR, R, [(0, -DR)])
+    block = body("block", 0.0, R + DR, [(WIDTH, 0), (WIDTH, -WIDTH), (0, -WIDTH)])
+    geometry = occ.OCCGeometry(occ.Compound([pin, block]), dim=2)
+    grading = growth if order > 2 else 0.6 * growth
+    mesh = ng.Mesh(geometry.GenerateMesh(maxh=WIDTH, grading=grading, segmentsperedge=1, curvaturesafety=0.1))
+    return mesh.Curve(order)
+
+
+class NoConvergence(RuntimeError):
+    """Newton's method found no equilibrium."""
+
+
+class Joint:
+    """Half of the joint below the pin's diameter, discretised."""
+
+    def __init__(self, size: float, growth: float, order: int, plastic: bool) -> None:
+        mesh = mesh_joint(size, growth, order)
+        held = {"dirichletx": "pin_axis|block_axis|block_top", "dirichlety": "pin_top|block_top"}
+        self.space = space = ng.VectorH1(mesh, order=order, **held)
+        self.u, self.top, self.rigid = (ng.GridFunction(space) for _ in range(3))
+        # Up by 1: of the pin's top what weighs the reactions, of the whole pin what the first step starts from.
+        self.top.components[1].Set(1, definedon=mesh.Boundaries("pin_top"))
+        self.rigid.components[1].Set(1, definedon=mesh.Materials("pin"))
+        self.dofs, self.plastic, self.inverse = space.ndof, plastic, None
+
+        points = ng.comp.IntegrationRuleSpace(mesh, order=2 * order - 2)
+        dx = ng.dx(intrules=points.GetIntegrationRules())
+        self.strain = ng.GridFunction(points**4)  # plastic strain xx, yy, zz, sqrt(2) xy
+        self.next = ng.GridFunction(points**4)
+        self.yielding = ng.Parameter(0.0)  # 1 where the yield stress holds, 0 for an elastic joint
+        u, v = space.TnT()
+        self.form = ng.BilinearForm(space, symmetric=True, condense=order > 2)
+        if plastic:
+            self.form += ng.Variation(self._energy(u).Compile() * dx)
+            self.returned = self._returned()
+        else:
+            (a, e), (b, f) = self._trial(u), self._trial(v)
+            self.form += ((LAME + 2 * MU / 3) * a * b + 2 * MU * e * f) * dx
+        self.contact = ng.ContactBoundary(mesh.Boundaries("pin_arc"), mesh.Boundaries("block_arc"))
+        place = ng.CF((ng.x, ng.y))
+        depth = (place + u - place.Other() - u.Other()) * self.contact.normal
+        self.contact.AddEnergy(ng.IfPos(depth, PENALTY / 2 * depth * depth, 0))
+        self.contact.Update(self.u, self.form, intorder=2 * order - 2, maxdist=20 * DR)
+
+    def _trial(self, u):
+        """Trace of the strain and its deviator (xx, yy, zz, sqrt(2) xy), less the plastic strain if there is any."""
+        grad = ng.Grad(u)
+        trace = grad[0, 0] + grad[1, 1]
+        shear = (grad[0, 1] + grad[1, 0]) / math.sqrt(2)
+        deviator = ng.CF((grad[0, 0] - trace / 3, grad[1, 1] - trace / 3, -trace / 3, shear))
+        return trace, deviator - self.strain if self.plastic else deviator
+
+    def _energy(self, u):
+        """Incremental energy, quadratic within the yield surface and linear beyond."""
+        trace, e = self._trial(u)
+        r = math.sqrt(2 / 3) * SIGY
+        norm = ng.sqrt(e * e + 1e-30)  # differentiable at zero
+        beyond = r * norm - r * r / (4 * MU)
+        return (LAME / 2 + MU / 3) * trace * trace + ng.IfPos(self.yielding * norm - r / (2 * MU), beyond, MU * e * e)
+
+    def _returned(self):
+        """Plastic strain of the present displacement. Compiled: Interpolate takes 18 times as long without."""
+        _, e = self._trial(self.u)
+        norm = ng.sqrt(e * e + 1e-30)
+        ratio = math.sqrt(2 / 3) * SIGY / (2 * MU) / norm
+        return (self.strain + ng.IfPos(1 - ratio, 1 - ratio, 0) * e).Compile()
+
+    def commit(self) -> None:
+        """Take over the plastic strain of the present displacement."""
+        if self.plastic:
+            self.next.Interpolate(self.returned)
+            self.strain.vec.data = self.next.vec
+
+    def newton(self) -> int:
+        """Equilibrium from the present displacement on, whose prescribed values stay; returns the iterations."""
+        form, residual, step = self.form, self.u.vec.CreateVector(), self.u.vec.CreateVector()
+        free = ng.Projector(self.space.FreeDofs(), True)
+        for iteration in range(ITERATIONS):
+            form.Apply(self.u.vec, residual)
+            self.reaction = -ng.InnerProduct(residual, self.top.vec)
+            residual.data = free * residual
+            error = residual.Norm() / abs(self.reaction)
+            if iteration and error < TOLERANCE:
+                return iteration
+            if iteration and not error < FAR:
+                break
+            form.AssembleLinearization(self.u.vec)
+            if self.inverse is None:
+                self.inverse = form.mat.Inverse(self.space.FreeDofs(form.condense), inverse="sparsecholesky")
+            else:
+                self.inverse.Update()  # keeps the ordering of the unknowns
+            if form.condense:
+                residual.data += form.harmonic_extension_trans * residual
+            step.data = self.inverse * residual
+            if form.condense:
+                step.data += form.harmonic_extension * step
+                step.data += form.inner_solve * residual
+            self.u.vec.data -= step
+        raise NoConvergence
+
+
+def load(joint: Joint, steps: int, delta: float) -> int:
+    """Press the pin down by ``delta`` in equal steps, cut where need be; returns the iterations."""
+    u = joint.u.vec
+    u.data = -delta / steps * joint.rigid.vec
+    joint.newton()
+    rate, old = u.CreateVector(), u.CreateVector()
+    rate.data, old[:] = steps * u, 0.0  # du/dt, at first that of the elastic joint
+    joint.yielding.Set(1.0)
+    t, iterations, cut = 0.0, 0, 0
+    for step in range(1, steps + 1):
+        while t < step / steps - 1e-12:
+            dt = min(step / steps - t, 0.5**cut / steps)
+            u.data = old + dt * rate
+            try:
+                iterations += joint.newton()
+            except NoConvergence:
+                cut, iterations = cut + 1, iterations + ITERATIONS
+                if cut > CUTS:
+                    raise NoConvergence(f"no equilibrium beyond {t * delta / DR:.3f} dR") from None
+                continue
+            joint.commit()
+            rate.data = 1 / dt * (u - old)
+            old.data, t, cut = u, t + dt, max(cut - 1, 0)
+    return iterations
+
+
+def main() -> int:
+    """Solve what the command line says; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--case", choices=["elastic", "plastic"], default="elastic")
+    parser.add_argument("--size", type=float, default=0.04, help="edge length on the arcs over R")
+    parser.add_argument("--growth", type=float, help="growth of the edges per distance; min(0.25, 6.25 size) if absent")
+    parser.add_argument("--order", type=int, choices=[2, 3, 4], default=2)
+    parser.add_argument("--steps", type=int, default=2, help="equal steps to delta = 2 dR")
+    parser.add_argument("--output", type=Path, default=Path("result.json"))
+    parser.add_argument("--probe", action="store_true", help="print the version if installed, else exit with 1")
+    options = parser.parse_args()
+    if options.probe:
+        print(version("ngsolve"))
+        return 0
+    growth = options.growth or min(0.25, 6.25 * options.size)
+    result: dict = {"kinematics": "reference", "P": None, "p0": None, "eps": None, "iterations": 0, "failed": None}
+    joint = Joint(options.size, growth, options.order, options.case == "plastic")
+    try:
+        result["iterations"] = load(joint, options.steps, 2 * DR)
+        result["P"] = 2 * joint.reaction
+    except NoConvergence as error:
+        result["failed"] = str(error)
+    options.output.write_text(json.dumps(result | {"dofs": joint.dofs}), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        import ngsolve as ng
+        from netgen import occ
+    except ImportError as missing:
+        sys.exit(f"NGSolve cannot run here: {missing}")
+    sys.exit(main())

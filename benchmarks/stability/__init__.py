@@ -1,0 +1,1 @@
+"""Extreme scenes: where does it break?"""

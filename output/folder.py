@@ -1,0 +1,70 @@
+"""The folder of a run: what lies in it, and whether a run may be written there."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from archord.output.disk import new_name
+from archord.scene.errors import InputError
+
+FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
+DEBUG = ("debug.xdmf", "debug.h5")
+CHECKPOINT = "checkpoint.h5"
+# drawn later, from a run's files
+PICTURES = ("picture.png", "force.png", "pressure.png", "field.png", "iterations.png")
+
+
+def clear(folder: Path) -> None:
+    """Remove an old run's files, and what a kill left half done of them. Raises `OSError`."""
+    for name in (CHECKPOINT, *FILES, *DEBUG, *PICTURES):
+        (folder / name).unlink(missing_ok=True)
+        new_name(folder / name).unlink(missing_ok=True)
+
+
+@contextmanager
+def occupied(folder: Path) -> Iterator[None]:
+    """Keep other processes from writing to ``folder``; a kill ends that, too. Raises `InputError` if one does."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(f"{folder}: another archord is solving into it.") from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def claim_folder(folder: Path, force: bool) -> None:
+    """Make ``folder`` ready for a run. Raises `InputError` if it cannot be, or holds something already without
+    ``force``."""
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"{folder}: is a file, not a run folder.")
+        if folder.exists() and any(folder.iterdir()) and not force:
+            raise InputError(
+                f"{folder}: is not empty; choose another folder with -o, or overwrite a run in it with --force."
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise InputError(f"{folder}: cannot be used as run folder: Permission denied.")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be used as run folder: {error.strerror}.") from None
+
+
+def is_sweep(folder: str | Path) -> bool:
+    """Whether ``folder`` is that of a sweep."""
+    return (Path(folder) / "sweep.toml").is_file()
+
+
+def no_run(folder: Path, missing: str) -> InputError:
+    """What to say of a ``folder`` that is no run folder, as a file is ``missing``."""
+    if is_sweep(folder):
+        return InputError(f"{folder}: is a sweep, not a run; its runs are the folders in {folder / 'cases'}.")
+    return InputError(f"{folder}: is not a run folder: {missing} is missing.")

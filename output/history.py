@@ -1,0 +1,86 @@
+"""history.csv: one row per accepted output step, in the scene's units with the dimensionless forms beside them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from archord.output.disk import replace_text
+from archord.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from archord.output.measures import Measures
+
+
+@dataclass(frozen=True)
+class _Column:
+    heading: str
+    attribute: str
+    divisor: float | int = 1
+
+    def of(self, m: Measures) -> str:
+        """The entry of a step; whole numbers stay whole."""
+        value = getattr(m, self.attribute)
+        return str(value) if isinstance(value, int) else f"{value / self.divisor:.12g}"
+
+
+def _columns(scene: Scene) -> list[_Column]:
+    units, R, dR, E = scene.units, scene.joint.radius, scene.joint.dR, scene.E_star
+    table: list[tuple[str, str, str, float]] = [
+        # name, unit, dimensionless form, its divisor
+        ("delta", units.length, "delta/dR", dR),
+        ("P", units.force, "P/(E* R)", E * R),
+        ("p0", units.stress, "p0/E*", E),
+        ("eps", "rad", "", 1.0),
+        ("contact_area", units.length, "contact_area/R", R),
+        ("peeq_max", "", "", 1.0),
+        ("peeq_integral", f"{units.length}2", "peeq_integral/R2", R * R),
+        ("elastic_energy", units.energy, "elastic_energy/(E* R2)", E * R * R),
+        ("plastic_dissipation", units.energy, "plastic_dissipation/(E* R2)", E * R * R),
+        ("work", units.energy, "work/(E* R2)", E * R * R),
+        ("force_balance", "", "", 1.0),
+        ("iterations", "", "", 1.0),
+        ("cutbacks", "", "", 1.0),
+        ("seconds", "s", "", 1.0),
+    ]
+    columns = [_Column("step", "step")]
+    for name, unit, dimensionless, divisor in table:
+        columns.append(_Column(f"{name} [{unit}]" if unit else name, name))
+        if dimensionless:
+            columns.append(_Column(dimensionless, name, divisor))
+    return columns
+
+
+class History:
+    """Writes history.csv; ``done`` are the steps that a run which goes on has behind it."""
+
+    def __init__(self, path: Path, scene: Scene, done: Sequence[Measures] = ()) -> None:
+        self.path = path
+        self._columns = _columns(scene)
+        self._rows = [[c.heading for c in self._columns]] + [[c.of(m) for c in self._columns] for m in done]
+
+    def add(self, m: Measures) -> None:
+        """Append one step. Raises `OSError`."""
+        self._rows.append([c.of(m) for c in self._columns])
+        self.write()
+
+    def write(self) -> None:
+        """Replace the file in one move, so that a reader never sees half a row. Raises `OSError`."""
+        text = io.StringIO(newline="")
+        csv.writer(text).writerows(self._rows)
+        replace_text(self.path, text.getvalue())
+
+
+def read_history(path: str | Path) -> dict[str, list[float]]:
+    """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E* R)"]``, ...
+
+    A last row that does not end in a line break (a copy cut short) is ignored.
+    """
+    text = Path(path).read_bytes().decode()
+    heading, *rows = csv.reader(io.StringIO(text[: text.rfind("\n") + 1], newline=""))
+    names = [h.split(" [")[0] for h in heading]
+    return {name: [float(row[i]) for row in rows] for i, name in enumerate(names)}

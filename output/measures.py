@@ -1,0 +1,102 @@
+"""What a step is summed up in: force, peak pressure, contact angle, plastic strain and energies of the whole joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.presets.arc import ArcProfile, arc_profile, peak_pressure, semi_angle
+from archord.presets.joint import Joint
+from archord.solver.stepping import Step
+
+
+@dataclass(frozen=True)
+class Measures:
+    """One accepted output step of the whole joint (both symmetric halves), per unit thickness, in the scene's units.
+
+    ``contact_area`` is the arc length in contact, the mean of both sides; ``peeq_max`` the largest value at a
+    quadrature point, which grows without bound under mesh refinement where perfect plasticity localises. ``work`` is
+    the integral of ``P`` over ``delta`` by the trapezoidal rule. ``force_balance`` is the largest difference between
+    the forces at pin, contact and block, over the largest ``P`` so far, or over ``E* delta``, about what it would be in
+    contact, where nothing touches: what is left there is round-off.
+    """
+
+    step: int
+    delta: float
+    P: float
+    p0: float
+    eps: float
+    contact_area: float
+    peeq_max: float
+    peeq_integral: float
+    elastic_energy: float
+    plastic_dissipation: float
+    work: float
+    force_balance: float
+    iterations: int
+    cutbacks: int
+    seconds: float
+
+
+class Work:
+    """Work of the load: the trapezoidal rule over every accepted step."""
+
+    def __init__(self) -> None:
+        self.delta = self.force = self.total = 0.0
+
+    def add(self, delta: float, force: float) -> None:
+        """Add the step from the last ``delta`` to this one, where the load is ``force``."""
+        self.total += 0.5 * (force + self.force) * (delta - self.delta)
+        self.delta, self.force = delta, force
+
+
+def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
+    """Contact state along the integrated arcs, by side, at the last evaluation. Collective."""
+    geometry = joint.scene.joint
+    hole = geometry.radius + geometry.dR
+    radius = {"pin": geometry.radius, "hole": hole}
+    lowest, u = np.array([0.0, -hole]), joint.equilibrium.displacement()
+    profiles = {name: arc_profile(joint.contact, side, radius[name], lowest, u) for name, side in joint.sides.items()}
+    return {name: p for name, p in profiles.items() if p is not None}
+
+
+def measure(
+    joint: Joint,
+    number: int,
+    step: Step,
+    profiles: dict[str, ArcProfile],
+    work: Work,
+    seconds: float,
+    largest_force: float = 0.0,
+) -> Measures:
+    """Sum up the last accepted state of ``joint``; ``largest_force`` is that of the steps before. Collective."""
+    comm, arcs = joint.comm, list(profiles.values())
+    u = joint.equilibrium.displacement()
+    largest, integral = joint.bulk.peeq()
+    stored, dissipated = joint.bulk.energies(u)
+    total = np.array([integral, stored, dissipated])
+    comm.Allreduce(MPI.IN_PLACE, total)
+    forces = joint.forces()
+    P = forces["pin"]
+    area = 2 * float(np.mean([(p.weight * (p.raw_pressure > 0)).sum() for p in arcs]))
+    scale = max(abs(P), largest_force, 0.0 if area else joint.scene.E_star * abs(joint.delta()))
+    eps = float(np.mean([semi_angle(p) for p in arcs]))
+    return Measures(
+        step=number,
+        delta=joint.delta(),
+        P=P,
+        p0=peak_pressure(arcs, eps),
+        eps=eps,
+        contact_area=area,
+        peeq_max=comm.allreduce(largest, op=MPI.MAX),
+        peeq_integral=2 * total[0],
+        elastic_energy=2 * total[1],
+        plastic_dissipation=2 * total[2],
+        work=work.total,
+        force_balance=max(abs(f - P) for f in forces.values()) / scale if scale else 0.0,
+        iterations=step.iterations,
+        cutbacks=step.cutbacks,
+        seconds=seconds,
+    )

@@ -1,0 +1,46 @@
+"""What one rank does for all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import sleep
+from typing import TypeVar
+
+from mpi4py import MPI
+
+from archord.scene.errors import InputError
+
+Result = TypeVar("Result")
+_PAUSE = 0.01  # seconds between two looks
+
+
+def agreed(comm: MPI.Comm, function: Callable[[], Result]) -> Result:
+    """Call ``function`` on rank 0 alone; its result, or the `InputError` that it raised, is that of all ranks.
+
+    The other ranks sleep meanwhile, which leaves their cores to rank 0. ``function`` must not call or import anything
+    collective; importing petsc4py is. Collective.
+    """
+    answer: list = [None, None]
+    if comm.rank == 0:
+        try:
+            answer[0] = function()
+        except InputError as error:
+            answer[1] = str(error)
+    if comm.size > 1:
+        arrived_before(comm)
+        answer = comm.bcast(answer)
+    result, fault = answer
+    if fault is not None:
+        raise InputError(fault)
+    return result
+
+
+def arrived_before(comm: MPI.Comm, seconds: float = float("inf")) -> bool:
+    """Wait, asleep, for all ranks to come here; False if they have not after so many ``seconds``. Collective."""
+    request = comm.Ibarrier()
+    while not request.Test():
+        if seconds <= 0:
+            return False
+        sleep(_PAUSE)
+        seconds -= _PAUSE
+    return True

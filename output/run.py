@@ -1,0 +1,261 @@
+"""A scene solved into a run folder: scene.toml, history.csv, fields.xdmf/.h5, contact.h5, checkpoint.h5, run.json."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from mpi4py import MPI
+
+from archord.output.checkpoint import write as write_checkpoint
+from archord.output.contact import ContactWriter
+from archord.output.disk import WriteError, naming, on_root, replace_text
+from archord.output.folder import CHECKPOINT, clear, occupied
+from archord.output.history import History
+from archord.output.measures import Measures, Work, arc_profiles, measure
+from archord.output.memory import peak_memory
+from archord.output.report import Report
+from archord.output.restart import Start
+from archord.output.run_state import Standing, halt, resume
+from archord.output.stale_jit import forget_half_compiled
+from archord.presets.arc import ArcProfile
+from archord.presets.joint import Joint
+from archord.scene.file import resolved
+from archord.scene.scene import Scene
+from archord.solver.coarse_start import coarse_start
+from archord.solver.interrupt import Interrupt, Interrupted
+from archord.solver.load_path import Position
+from archord.solver.mesh_order import MeshOrder
+from archord.solver.stepping import Step, StepFailure, march
+from archord.solver.timer import Timer
+
+if TYPE_CHECKING:
+    from archord.output.fields import FieldWriter
+    from archord.studies.accuracy import Accuracy
+
+_UNSEEN = (
+    "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
+    "reduce joint.element_size or increase the load"
+)
+
+
+@dataclass
+class Outcome:
+    """How a run ended: ``status`` is "done", "stopped" or "interrupted" (``message`` says why), and its steps.
+
+    ``signal`` interrupted it. ``warnings`` are known on rank 0 only. ``unseen`` says that the mesh was too coarse to
+    notice the contact, ``accuracy`` how accurate a run is that was asked for it.
+    """
+
+    folder: Path
+    status: str
+    message: str
+    steps: list[Measures]
+    warnings: list[str]
+    signal: int = 0
+    unseen: bool = False
+    accuracy: Accuracy | None = None
+
+
+def solve_scene(
+    scene: Scene,
+    folder: Path,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    *,
+    start: Start | None = None,
+    debug: bool = False,
+    timer: Timer | None = None,
+    begun: float | None = None,
+    interrupt: Interrupt | None = None,
+    on_start: Callable[[Joint], None] = lambda joint: None,
+    on_step: Callable[[Measures], None] = lambda measures: None,
+    on_attempt: Callable[[float, int], None] = lambda load, iterations: None,
+) -> Outcome:
+    """Solve ``scene`` and write everything to the existing ``folder`` (see `run_folder.claim_folder`). Collective.
+
+    ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``, ``on_step`` and
+    ``on_attempt(load, Newton iterations)`` report progress on every rank. ``begun`` is the ``perf_counter`` from which
+    the seconds count. ``debug`` writes the fields of a step that cannot be solved to debug.xdmf. A step that cannot be
+    solved, or a file that cannot be written, ends the run with status
+    "stopped", Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was accepted before stays. ``interrupt``, if given,
+    is one that the caller heeds, too. Raises `InputError` if another process solves into ``folder``, what is there
+    cannot be continued, or the scene leaves the mesh to `accuracy.solve_to_accuracy`.
+    """
+    begun = perf_counter() if begun is None else begun
+    with ExitStack() as stack:
+        on_root(comm, lambda: stack.enter_context(occupied(folder)) or True)
+        joint = _joint(scene, comm, timer)
+        on_start(joint)
+        output = _Output(folder, joint, begun)
+        status, message, failed, received = "done", "", None, 0
+        try:
+            with nullcontext(interrupt) if interrupt else Interrupt() as joint.equilibrium.interrupt:
+                position, work = output.begin(start)
+                # what a coarse mesh went through before a halt is not kept
+                coarse = coarse_start(joint) if position is None else None
+
+                def target_done(step: Step, position: Position) -> None:
+                    on_step(output.add(step, position, work))
+
+                march(
+                    joint.walk(position, coarse),
+                    scene.targets,
+                    rules=scene.stepping,
+                    substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
+                    target_done=target_done,
+                    attempted=on_attempt,
+                    gave_up=output.debug if debug else lambda load: None,
+                )
+        except StepFailure as failure:
+            status, message, failed = "stopped", str(failure), failure.attempt
+        except WriteError as error:
+            status, message = "stopped", str(error)
+        except Interrupted as interrupted:
+            status, message = "interrupted", f"{interrupted} after step {len(output.steps)}"
+            received = interrupted.number
+        unseen = status == "done" and output.unseen()
+        if unseen:
+            status, message = "stopped", _UNSEEN
+        try:
+            warnings = output.finish(status, message, failed)
+        except WriteError as error:
+            status, message, warnings = "stopped", message if status == "stopped" else str(error), []
+        return Outcome(folder, status, message, output.steps, warnings, received, unseen)
+
+
+def solve_as_asked(
+    scene: Scene, folder: Path, comm: MPI.Comm, *, start: Start | None = None, **options: Any
+) -> Outcome:
+    """`solve_scene`, or `accuracy.solve_to_accuracy` where ``scene`` asks for an accuracy. Collective."""
+    if scene.analysis.accuracy is None or start is not None:
+        return solve_scene(scene, folder, comm, start=start, **options)
+    from archord.studies.accuracy import solve_to_accuracy
+
+    return solve_to_accuracy(scene, folder, comm, **options)
+
+
+def _joint(scene: Scene, comm: MPI.Comm, timer: Timer | None) -> Joint:
+    """The joint of ``scene``, though a kill may have left its forms half compiled. Collective."""
+    try:
+        return Joint(scene, comm, timer=timer)
+    except (TimeoutError, RuntimeError) as error:
+        if not forget_half_compiled(str(error)):
+            raise
+    return Joint(scene, comm, timer=timer)
+
+
+class _Output:
+    """Everything that a run writes; rank 0 writes, all ranks take part. Raises `WriteError` on all of them.
+
+    A step counts once the checkpoint has it: the other files follow, and a run that goes on writes what they lack.
+    """
+
+    def __init__(self, folder: Path, joint: Joint, begun: float) -> None:
+        self.folder, self.joint = folder, joint
+        self.steps: list[Measures] = []
+        self._begun = self._last = begun
+        self._report: Report | None = None
+
+    def begin(self, start: Start | None) -> tuple[Position | None, Work]:
+        """Make the files, or open those of the run that goes on from ``start`` (known on rank 0) and give its state to
+        the joint. Collective."""
+        joint, comm = self.joint, self.joint.comm
+        with joint.timer("output"):
+            self._order = MeshOrder(joint)
+            self.steps = comm.bcast(start.done if start else [])
+            on_root(comm, lambda: self._prepare(start))
+            self._fields: FieldWriter | None = None
+            if joint.scene.output.fields:
+                from archord.output.fields import FieldWriter
+
+                self._fields = FieldWriter(self.folder, self._order, len(joint.scene.targets), after=len(self.steps))
+            on_root(comm, self._write_scene)
+        self._last = perf_counter()
+        if not comm.bcast(start is not None):
+            on_root(comm, self._write_tables)
+            return None, Work()
+        with joint.timer("checkpoint"):
+            at = resume(self._order, self.folder / CHECKPOINT, start.checkpoint if start else None)
+        self._write(at.measures, at.step, arc_profiles(joint), again=True)
+        return at.position, at.work
+
+    def _prepare(self, start: Start | None) -> None:
+        scene = self.joint.scene
+        if start is None:
+            with naming(self.folder):
+                clear(self.folder)
+            self._write_scene()
+        before = start.report if start else None
+        self._history = History(self.folder / "history.csv", scene, self.steps)
+        self._report = Report(self.folder / "run.json", self.joint, self._begun, self.steps, before)
+        self._contact = ContactWriter(self.folder, len(scene.targets))
+
+    def _write_scene(self) -> None:
+        replace_text(self.folder / "scene.toml", resolved(self.joint.scene))
+
+    def _write_tables(self) -> None:
+        assert self._report is not None
+        self._history.write()
+        self._report.write()
+
+    def add(self, step: Step, position: Position, work: Work) -> Measures:
+        """Write an accepted output step, and return its measures. Collective."""
+        joint = self.joint
+        with joint.timer("output"):
+            profiles = arc_profiles(joint)
+            seconds, self._last = perf_counter() - self._last, perf_counter()
+            largest = max((abs(m.P) for m in self.steps), default=0.0)
+            m = measure(joint, len(self.steps) + 1, step, profiles, work, seconds, largest)
+        with joint.timer("checkpoint"):
+            checkpoint = halt(self._order, Standing(m, step, position, work))
+            on_root(joint.comm, lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
+        self._write(m, step, profiles)
+        return m
+
+    def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile], *, again: bool = False) -> None:
+        """Make ``m`` the last step of all files but the checkpoint, ``again`` after a halt. Collective."""
+
+        def add() -> None:
+            assert self._report is not None
+            self._contact.write(m.step, m.delta, profiles, again=again)
+            self._history.add(m)
+            self._report.add(m, step, profiles)
+
+        with self.joint.timer("output"):
+            if self._fields is not None:
+                self._fields.write(m.step, m.delta, again=again)
+            self._note_memory()
+            on_root(self.joint.comm, add)
+        self.steps.append(m)
+
+    def _note_memory(self) -> None:
+        memory = self.joint.comm.gather(peak_memory())
+        if self._report is not None:
+            self._report.peak_memory = memory or []
+
+    def debug(self, load: float) -> None:
+        """Write the state that the last solve left, without success at ``load``. Collective."""
+        from archord.output.fields import FieldWriter
+
+        FieldWriter(self.folder, self._order, 1, debug=True).write(1, load)
+
+    def unseen(self) -> bool:
+        """Whether the pin was pressed into the hole but no contact point ever noticed."""
+        return max(m.delta for m in self.steps) > 0 and not any(m.contact_area for m in self.steps)
+
+    def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
+        """Note how the run ended; returns the warnings on rank 0. Collective."""
+
+        self._note_memory()
+
+        def note() -> list[str]:
+            if self._report is None:
+                return []
+            self._report.finish(status, message, failed)
+            return self._report.content["warnings"]
+
+        return on_root(self.joint.comm, note) or []

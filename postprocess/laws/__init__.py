@@ -1,0 +1,1 @@
+"""P(delta) as formulas and fits: closed forms, calibration, the calibrated law."""

@@ -1,0 +1,137 @@
+"""Calibration of the plastic-Winkler law on runs, each alone and all together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from archord.postprocess.laws.curve_fit import CurveFit, fit_curve
+from archord.postprocess.laws.fitted_law import FittedLaw
+from archord.postprocess.plateau import fit_plateau
+from archord.postprocess.refinement import Refined, group
+from archord.postprocess.run_curve import RunCurve
+from archord.scene.errors import InputError
+
+
+@dataclass(frozen=True)
+class Fits:
+    """All fits to one run, or to several together; ``plateau`` is None where nothing has yielded far enough."""
+
+    runs: tuple[RunCurve, ...]
+    P: CurveFit
+    p0: CurveFit
+    plateau: CurveFit | None
+    finer: str | None = None  # name of the run of the same scene that the joint fit takes instead
+
+    @property
+    def curves(self) -> list[CurveFit]:
+        """P, p0 and, if there is one, the plateau."""
+        return [self.P, self.p0, *([self.plateau] if self.plateau else [])]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Fits to each run, and the one to all scenes together, each on its finest mesh."""
+
+    each: tuple[Fits, ...]
+    joint: Fits
+    load_range: tuple[float, float]
+    confidence: float
+    hold_k: float | None = None
+
+    def law(self, run: RunCurve | None = None) -> FittedLaw:
+        """The law for the joint of ``run`` (by default the first), with k and c from P(delta) of all scenes."""
+        run = run or self.joint.runs[0]
+        k, c = self.joint.P.k, self.joint.P.c
+        if k is None:
+            raise InputError(f"{run.name}: P(delta) does not determine k; widen --range.")
+        plastic = c is not None and run.sigY is not None
+        loads = np.concatenate([r.load for r in self.joint.P.residuals])
+        return FittedLaw(
+            k=k.value,
+            E_star=run.E_star,
+            R=run.R,
+            dR=run.dR,
+            k_error=k.error,
+            c=c.value if c and plastic else None,
+            sigY=run.sigY if plastic else None,
+            c_error=c.error if c and plastic else None,
+            fitted_range=(float(loads.min()), float(loads.max())),
+            plane=run.plane,
+            length_unit=run.scene.units.length,
+            force_unit=run.scene.units.force,
+            fitted_to=tuple(r.name for r in self.joint.runs),
+        )
+
+
+def calibrate(
+    runs: list[RunCurve],
+    load_range: tuple[float, float] = (0.0, np.inf),
+    confidence: float = 0.95,
+    hold_k: float | None = None,
+) -> Calibration:
+    """Fit the law to each of ``runs`` and to all scenes together, over ``load_range`` of ``delta/dR``.
+
+    Runs of one scene on several meshes give the error of the mesh; the finest of them enters the joint fit. With
+    ``hold_k`` only c is fitted. Raises `InputError` where the range, the steps or the runs do not allow a fit.
+    """
+    low, high = load_range
+    if not 0 <= low < high:
+        raise InputError(f"--range {low:g} {high:g}: must be two displacements in clearances, 0 or more and rising.")
+    if not 0.5 <= confidence < 1:
+        raise InputError(f"--confidence {confidence:g}: must be at least 0.5 and below 1.")
+    if hold_k is not None and not 0 < hold_k < np.inf:
+        raise InputError(f"--hold-k {hold_k:g}: must be a number greater than 0.")
+    _check_compatible(runs)
+    groups = group(runs)
+    of = {id(r): g for g in groups for r in (g.run, *g.coarser)}
+    each = []
+    for run in runs:
+        g = of[id(run)]
+        alone = g if g.run is run else Refined(run)
+        each.append(_fits([alone], load_range, confidence, hold_k, None if g.run is run else g.run.name))
+    one = [f for f in each if f.finer is None]
+    together = _fits(groups, load_range, confidence, hold_k) if len(groups) > 1 else one[0]
+    if hold_k is not None and together.P.c is None:
+        raise InputError(f"--hold-k {hold_k:g}: leaves nothing to fit: no two steps of the range are past yield.")
+    return Calibration(tuple(each), together, load_range, confidence, hold_k)
+
+
+def _check_compatible(runs: list[RunCurve]) -> None:
+    if not runs:
+        raise InputError("no run to fit.")
+    first = runs[0]
+    for run in runs:
+        if run.scene.joint.model != "block":
+            raise InputError(
+                f'{run.name}: joint.model = "{run.scene.joint.model}" has no law to fit; only "block" has.'
+            )
+        for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
+            if solid.hardening > 0:
+                raise InputError(f"{run.name}: {body}.hardening = {solid.hardening:g} does not fit: the law is for "
+                                 "perfect plasticity, hardening = 0.")  # fmt: skip
+        if run.plane != first.plane:
+            raise InputError(f"{run.name}: analysis.plane = {run.plane!r} does not fit: {first.name} is in plane "
+                             f"{first.plane}; fit the planes separately.")  # fmt: skip
+        if not np.allclose(_elastic_pair(run), _elastic_pair(first), rtol=1e-6, atol=1e-9):
+            raise InputError(f"{run.name}: the Poisson's ratios or the ratio of the moduli are not those of "
+                             f"{first.name}; one k is for one pair of materials, fit them separately.")  # fmt: skip
+
+
+def _elastic_pair(run: RunCurve) -> tuple[float, float, float]:
+    """Poisson's ratios, and the pin's share of the compliance (0: rigid)."""
+    pin, block = run.scene.pin, run.scene.block
+    return (0.0, block.nu, 0.0) if pin.E is None else (pin.nu or 0.0, block.nu, 1 / (1 + pin.E / block.E))
+
+
+def _fits(
+    groups: list[Refined],
+    load_range: tuple[float, float],
+    confidence: float,
+    hold_k: float | None,
+    finer: str | None = None,
+) -> Fits:
+    force, peak = (fit_curve(curve, groups, load_range, confidence, hold_k) for curve in ("P", "p0"))
+    plateau = fit_plateau(force, groups, load_range, confidence)
+    return Fits(tuple(g.run for g in groups), force, peak, plateau, finer)

@@ -1,0 +1,213 @@
+"""Least-squares fit of the plastic-Winkler law to P(delta) or p0(delta) of one or more runs.
+
+Every curve is fitted in the form that depends on ``delta/dR`` alone where the joint is elastic, ``P/(E* dR)`` and ``p0
+R/(E* dR)``, so runs of different clearance weigh alike and units do not matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from archord.geometry.basis import Array
+from archord.postprocess.laws.chord_laws import plastic_force, plastic_peak
+from archord.postprocess.laws.least_squares import Estimate, LeastSquares, fit
+from archord.postprocess.refinement import Order, Refined
+from archord.postprocess.run_curve import RunCurve
+from archord.scene.errors import InputError
+
+_STARTS_OF_C = (0.7, 1.0, 1.5, 2.5)  # p0 has a kink at the onset: one start may miss the best side of it
+
+
+@dataclass(frozen=True)
+class Residual:
+    """A run's part of a fit, arrays ``(n,)``: ``delta/dR``, the dimensionless data and what the law makes of them."""
+
+    name: str
+    load: Array
+    data: Array
+    law: Array
+
+    @property
+    def relative(self) -> Array:
+        """``law/data - 1`` ``(n,)``."""
+        return self.law / self.data - 1
+
+
+@dataclass(frozen=True)
+class CurveFit:
+    """A fit to one curve of one or more runs; ``k`` or ``c`` is None where the curve does not determine it.
+
+    ``orders`` are the orders of convergence taken for the runs that have a second mesh.
+    """
+
+    quantity: str
+    k: Estimate | None
+    c: Estimate | None
+    r2: float
+    dof: int
+    residuals: tuple[Residual, ...]
+    refined: int  # of the scenes, how many have a second mesh
+    flatness: tuple[float, float] | None = None  # plateau only: smallest and largest median over peak pressure
+    orders: tuple[tuple[str, Order], ...] = ()
+    k_held: bool = False
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the relative residuals."""
+        return float(np.sqrt(np.mean(np.concatenate([r.relative for r in self.residuals]) ** 2)))
+
+    @property
+    def largest(self) -> float:
+        """The largest relative residual, with its sign."""
+        every = np.concatenate([r.relative for r in self.residuals])
+        return float(every[np.abs(every).argmax()])
+
+    @property
+    def serial_correlation(self) -> float:
+        """Correlation of residuals of neighbouring steps: about 0 for noise, near 1 where the law has another shape."""
+        rows = [part.law - part.data for part in self.residuals]
+        squares = sum(float(r @ r) for r in rows)
+        return sum(float(r[1:] @ r[:-1]) for r in rows) / squares if squares else 0.0
+
+
+def fit_curve(
+    quantity: str,
+    groups: list[Refined],
+    load_range: tuple[float, float] = (0.0, np.inf),
+    confidence: float = 0.95,
+    hold_k: float | None = None,
+) -> CurveFit:
+    """Fit the law to the curve "P" or "p0" of all ``groups``.
+
+    ``c`` is fitted where two steps or more lie on the plateau. Where fewer than two have not yielded, p0 tells nothing
+    of ``k``, and ``c`` alone is fitted to those that have. ``hold_k`` is ``k`` where it is given, without an error.
+    Where some scenes have a second mesh, the fit is repeated with their data extrapolated to vanishing element size;
+    the change of a parameter is its discretisation error.
+    Raises `InputError` where too few steps are in the range.
+    """
+    runs = tuple(g.run for g in groups)
+    chosen = tuple(selected(run, load_range) for run in runs)
+    yielded = tuple(rows & (run.peeq_max > 0) for run, rows in zip(runs, chosen, strict=True))
+    plateau_alone = (
+        hold_k is None and quantity == "p0" and any(map(np.any, yielded)) and _count(chosen) - _count(yielded) < 2
+    )
+    problem = _Problem(quantity, runs, yielded if plateau_alone else chosen, hold_k)
+    data = [getattr(g.run, quantity) for g in groups]
+    free, best = (("c",), problem.solve(("c",), data)) if plateau_alone else problem.solve_best(data)
+    mesh: dict[str, float] = {}
+    refined = sum(bool(g.coarser) for g in groups)
+    curves = [[getattr(run, quantity) for run in g.runs] for g in groups]
+    if refined and free:
+        finer = [y[0] + g.shift(y) if g.coarser else y[0] for g, y in zip(groups, curves, strict=True)]
+        moved = problem.solve(free, finer).parameters - best.parameters
+        mesh = dict(zip(free, np.abs(moved).tolist(), strict=True))
+    found = {name: best.estimate(i, confidence, mesh.get(name)) for i, name in enumerate(free)}
+    if hold_k is not None:
+        found["k"] = Estimate(hold_k, 0.0, 0.0, 0.0, hold_k, hold_k)
+    law = problem.predict(free, best.parameters)
+    loads = [run.delta[rows] / run.dR for run, rows in zip(problem.runs, problem.chosen, strict=True)]
+    residuals = tuple(
+        Residual(run.name, *arrays)
+        for run, *arrays in zip(problem.runs, loads, problem.dimensionless(data), law, strict=True)
+    )
+    orders = tuple((g.run.name, g.order(y)) for g, y in zip(groups, curves, strict=True) if g.coarser)
+    k, c = found.get("k"), found.get("c")
+    return CurveFit(quantity, k, c, best.r2, best.dof, residuals, refined, None, orders, hold_k is not None)
+
+
+def _count(rows: tuple[Array, ...]) -> int:
+    return sum(int(r.sum()) for r in rows)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A curve of some runs at their chosen steps, and the law's fit to it with some parameters free.
+
+    ``held`` is k where it is not free.
+    """
+
+    quantity: str
+    runs: tuple[RunCurve, ...]
+    chosen: tuple[Array, ...]
+    held: float | None = None
+
+    def dimensionless(self, data: list[Array]) -> list[Array]:
+        """The chosen steps of each run's ``data``, over the run's scale."""
+        parts = zip(self.runs, self.chosen, data, strict=True)
+        return [y[rows] / _scale(self.quantity, run) for run, rows, y in parts]
+
+    def predict(self, free: tuple[str, ...], values: Array) -> list[Array]:
+        """The law for each run; without ``c`` it is elastic, without ``k`` rigid up to the plateau."""
+        given = dict(zip(free, values, strict=True))
+        k, c = given.get("k", self.held), given.get("c")
+        parts = zip(self.runs, self.chosen, strict=True)
+        return [dimensionless_law(self.quantity, run, run.delta[rows], k, c) for run, rows in parts]
+
+    def solve(self, free: tuple[str, ...], data: list[Array]) -> LeastSquares:
+        """Fit the ``free`` parameters. Raises `InputError` where the steps do not determine them."""
+        parts = self.dimensionless(data)
+        slopes: list[float] = [
+            y[0] / unit[0] for y, unit in zip(parts, self.predict(("k",), np.ones(1)), strict=True) if len(y)
+        ]
+        starts = [
+            [{"k": float(np.median(slopes)), "c": c}[name] for name in free]
+            for c in (_STARTS_OF_C if "c" in free else _STARTS_OF_C[:1])
+        ]
+        try:
+            return fit(lambda v: np.concatenate(self.predict(free, v)), starts, np.concatenate(parts))
+        except ValueError as error:
+            names, what = ", ".join(run.name for run in self.runs), " and ".join(free)
+            raise InputError(f"{names}: {what} cannot be fitted to {self.quantity}: {error}; widen --range.") from None
+
+    def solve_best(self, data: list[Array]) -> tuple[tuple[str, ...], LeastSquares]:
+        """The parameters that the steps can tell, and their fit."""
+        elastic = ("k",) if self.held is None else ()
+        if any(run.sigY for run in self.runs):
+            plastic = (*elastic, "c")
+            best = self.solve(plastic, data)
+            k, c = best.parameters if self.held is None else (self.held, best.parameters[0])
+            if np.isfinite(best.standard_errors).all() and self._on_plateau(k, c) >= 2:
+                return plastic, best
+        return elastic, self.solve(elastic, data)
+
+    def _on_plateau(self, k: float, c: float) -> int:
+        """Number of steps past the onset of the plateau that have yielded indeed.
+
+        A falling slope alone is no plateau: that of an elastic p0(delta) falls too.
+        """
+        return sum(
+            int(((r.delta > r.joint(k, c).first_yield) & (r.peeq_max > 0))[rows].sum())
+            for r, rows in zip(self.runs, self.chosen, strict=True)
+            if r.sigY
+        )
+
+
+def dimensionless_law(quantity: str, run: RunCurve, delta: Array, k: float | None, c: float | None) -> Array:
+    """``P/(E* dR)`` or ``p0 R/(E* dR)`` of ``run``'s joint ``(n,)``; elastic if ``c`` or its yield stress is None.
+
+    Without ``k`` p0 is at the plateau everywhere.
+    """
+    if k is None:
+        return np.full(delta.shape, (c or np.nan) * (run.sigY or np.nan)) / _scale(quantity, run)
+    law = plastic_force if quantity == "P" else plastic_peak
+    return law(run.joint(k, c), delta) / _scale(quantity, run)
+
+
+def selected(run: RunCurve, load_range: tuple[float, float]) -> Array:
+    """Which steps ``(n,)`` of ``run`` lie in the range of ``delta/dR``, ends included. Raises `InputError` if none."""
+    load, slack = run.delta / run.dR, 1e-9
+    chosen = (load >= load_range[0] * (1 - slack)) & (load <= load_range[1] * (1 + slack))
+    chosen &= (run.P > 0) & (run.p0 > 0)
+    if not chosen.any():
+        raise InputError(
+            f"{run.name}: has no step with contact from {load_range[0]:g} to {load_range[1]:g} clearances; "
+            f"its {len(load)} steps are from {load.min():g} to {load.max():g}."
+        )
+    return chosen
+
+
+def _scale(quantity: str, run: RunCurve) -> float:
+    """What makes a quantity dimensionless."""
+    return {"P": run.E_star * run.dR, "p0": run.E_star * run.dR / run.R}[quantity]

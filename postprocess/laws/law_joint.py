@@ -1,0 +1,134 @@
+"""What the closed-form laws know of a joint, and how they say that they are asked beyond their range."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from archord.materials.elasticity import Plane, contact_modulus
+from archord.scene.errors import InputError
+from archord.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+
+YIELDING = ("both", "block", "pin", "unlike")
+
+
+class LawRangeWarning(UserWarning):
+    """A law was asked outside its range; the message tells the range."""
+
+
+class LawRangeError(InputError):
+    """As `LawRangeWarning`, where the caller asked for an error."""
+
+
+@dataclass(frozen=True)
+class LawJoint:
+    """A pin of radius ``radius`` (R1) in a hole of radius R2 = R1 + ``clearance``, in any consistent units.
+
+    ``E_star`` is the contact modulus of the plane, ``yield_stress`` that of the weaker body, ``k`` Winkler's
+    coefficient (0.85: Hu et al., eq. 6), ``c`` the plateau of the pressure over the yield stress (1: Hu et al., eq.
+    10), ``length`` the length of the joint along its axis. ``dundurs_alpha`` =
+    (E1' - E2')/(E1' + E2') is positive where the pin is the stiffer body, ``dundurs_beta`` goes with it; both are zero
+    for like bodies. Only the calibrated law asks for the rest: ``plane`` ("strain" or "stress"), ``nu`` of the block,
+    ``pin_nu`` of the pin (None: the block's, or rigid), and which bodies have the yield stress, ``yielding``: "both",
+    "block", "pin", or "unlike" where each has its own. Raises `InputError` for values that make no joint.
+    """
+
+    radius: float
+    clearance: float
+    E_star: float
+    yield_stress: float | None = None
+    k: float = 0.85
+    c: float = 1.0
+    length: float | None = None
+    dundurs_alpha: float = 0.0
+    dundurs_beta: float = 0.0
+    plane: str | None = None
+    nu: float | None = None
+    pin_nu: float | None = None
+    yielding: str = "both"
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for name in ("radius", "clearance", "E_star", "k", "c", "yield_stress", "length"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InputError(f"{name} = {value:g} must be a positive number.")
+        if not -1 <= self.dundurs_alpha <= 1:
+            raise InputError(f"dundurs_alpha = {self.dundurs_alpha:g} must be between -1 and 1.")
+        if self.plane not in (None, "strain", "stress"):
+            raise InputError(f'plane = {self.plane!r} must be "strain" or "stress".')
+        if self.yielding not in YIELDING:
+            raise InputError(f"yielding = {self.yielding!r} must be one of {', '.join(YIELDING)}.")
+        for name in ("nu", "pin_nu"):
+            value = getattr(self, name)
+            if value is not None and not -1 < value < 0.5:
+                raise InputError(f"{name} = {value:g} must be between -1 and 0.5.")
+        if not -0.5 <= self.dundurs_beta <= 0.5:
+            raise InputError(f"dundurs_beta = {self.dundurs_beta:g} must be between -0.5 and 0.5.")
+
+    @classmethod
+    def from_scene(cls, scene: Scene, length: float | None = None, k: float = 0.85) -> LawJoint:
+        """The joint of ``scene``; of two yield stresses the lower one, hardening is left out."""
+        plane = scene.analysis.plane
+        pin = scene.pin.solid
+        solids = [scene.block] if pin is None else [pin, scene.block]
+        yields = [s.yield_stress for s in solids if s.yield_stress is not None]
+        stiff = [math.inf if pin is None else contact_modulus(pin.E, pin.nu, plane)]
+        stiff.append(contact_modulus(scene.block.E, scene.block.nu, plane))
+        alpha = (stiff[0] / stiff[1] - 1) / (stiff[0] / stiff[1] + 1) if math.isfinite(stiff[0]) else 1.0
+        second = _transverse(scene.block.nu, plane)
+        first = 0.0 if pin is None else _transverse(pin.nu, plane)
+        # beta in the compliances 1/E1' = (1 - alpha)/(2 E*), 1/E2' = (1 + alpha)/(2 E*)
+        beta = ((1 + alpha) * second - (1 - alpha) * first) / 2
+        return cls(
+            scene.joint.radius,
+            scene.joint.dR,
+            scene.E_star,
+            yield_stress=min(yields, default=None),
+            k=k,
+            length=length,
+            dundurs_alpha=alpha,
+            dundurs_beta=beta,
+            plane=plane,
+            nu=scene.block.nu,
+            pin_nu=None if pin is None else pin.nu,
+            yielding=_yielding(None if pin is None else pin.yield_stress, scene.block.yield_stress),
+        )
+
+    @property
+    def hole_radius(self) -> float:
+        """R2 = R1 + dR."""
+        return self.radius + self.clearance
+
+    @property
+    def relative_radius(self) -> float:
+        """Relative radius of curvature ``R* = R1 R2 / dR``."""
+        return self.radius * self.hole_radius / self.clearance
+
+    @property
+    def first_yield(self) -> float:
+        """Critical displacement ``delta0 = c sigY R/(k E*)`` (Hu et al.: c = 1); infinite without a yield stress."""
+        return self.radius * self.threshold / (self.k * self.E_star)
+
+    @property
+    def threshold(self) -> float:
+        """Largest pressure of the foundation, ``c sigY``; infinite without a yield stress."""
+        return math.inf if self.yield_stress is None else self.c * self.yield_stress
+
+
+def _yielding(pin: float | None, block: float | None) -> str:
+    if pin is not None and block is not None:
+        return "both" if math.isclose(pin, block, rel_tol=1e-6) else "unlike"
+    return "pin" if pin is not None else "block" if block is not None else "both"
+
+
+def _transverse(nu: float, plane: Plane) -> float:
+    """``(kappa - 1)/(kappa + 1)`` with Kolosov's constant: the part of Dundurs' beta that a body brings."""
+    kappa = 3 - 4 * nu if plane == "strain" else (3 - nu) / (1 + nu)
+    return (kappa - 1) / (kappa + 1)

@@ -1,0 +1,155 @@
+"""A run folder as an object: scene, status, history, contact pressure and fields. It reads, and never solves.
+
+Arrays and tables are read when they are asked for, and pandas is imported only for tables.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from archord.output.folder import no_run
+from archord.output.history import read_history
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene
+from archord.scene.scene import Scene
+
+_NEEDED = {"step", "delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "iterations", "cutbacks",
+           "seconds"}  # fmt: skip
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from archord.postprocess.arc_pressure import ArcContact
+    from archord.postprocess.run_curve import RunCurve
+    from archord.postprocess.run_fields import Fields
+
+
+class Run:
+    """The run in ``folder``, as it was when this was made; a run that still goes on is loaded again to see more.
+
+    Raises `InputError` if it is no run folder, or its scene, report or history cannot be read.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        for name in ("scene.toml", "history.csv", "run.json"):
+            if not (self.folder / name).is_file():
+                raise no_run(self.folder, name)
+        self._columns = read_columns(self.folder / "history.csv")
+        self.scene: Scene = load_scene(self.folder / "scene.toml")
+        self.summary: dict[str, Any] = _read_report(self.folder / "run.json")
+
+    def __repr__(self) -> str:
+        """Folder, status and how far it came."""
+        end = f", delta/dR = {self.columns['delta/dR'][-1]:g}" if self.steps else ""
+        return f"<Run {self.folder}: {self.status}, {self.steps} step{'s' if self.steps != 1 else ''}{end}>"
+
+    @property
+    def status(self) -> str:
+        """How the run ended: "done", "stopped" (`message` says why) or "interrupted"; "running" if it has not.
+
+        A run that was killed says "running", too.
+        """
+        return str(self.summary["status"])
+
+    @property
+    def message(self) -> str:
+        """Why the run stopped, in words; empty if it is done."""
+        return str(self.summary["message"])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the run warned about."""
+        return list(self.summary["warnings"])
+
+    @property
+    def steps(self) -> int:
+        """Number of accepted steps; they are counted from 1."""
+        return len(self._columns["step"])
+
+    @property
+    def columns(self) -> dict[str, list[float]]:
+        """The columns of history.csv by name without unit, as plain lists."""
+        return self._columns
+
+    @cached_property
+    def history(self) -> pd.DataFrame:
+        """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of every column."""
+        from archord.postprocess.frames import history_frame
+
+        return history_frame(self.folder / "history.csv")
+
+    @cached_property
+    def curve(self) -> RunCurve:
+        """P, p0 and eps over delta as arrays, for laws and fits. Raises `InputError` without an accepted step."""
+        from archord.postprocess.run_curve import read_run
+
+        return read_run(self.folder)
+
+    def contact(self, step: int | None = None) -> dict[str, ArcContact]:
+        """The contact along the arcs at ``step`` (the last), arrays by side: "pin", "hole".
+
+        A side whose arc is not integrated is absent. Raises `InputError` without such a step.
+        """
+        from archord.postprocess.arc_pressure import read_contact
+
+        return read_contact(self.folder, self.scene, self.number(step), self.steps)
+
+    def pressure(self, step: int | None = None, side: str | None = None) -> pd.DataFrame:
+        """`contact` as a table with a row for each point, sorted by side and angle; of one ``side`` if given.
+
+        Raises `InputError` without such a step or side.
+        """
+        from archord.postprocess.frames import contact_frame
+
+        arcs = self.contact(step)
+        if side is not None and side not in arcs:
+            raise InputError(f"{self.folder}: has no side {side!r}; its sides are {', '.join(arcs)}.")
+        return contact_frame({name: arc for name, arc in arcs.items() if side in (None, name)}, self.scene)
+
+    def fields(self, step: int | None = None) -> Fields:
+        """Mesh, displacement, stress and plastic strain at ``step`` (the last).
+
+        Raises `InputError` without such a step, and if the run wrote no fields.
+        """
+        from archord.postprocess.run_fields import read_fields
+
+        return read_fields(self.folder, self.scene, self.number(step))
+
+    def number(self, step: int | None) -> int:
+        """``step``, or that of the last accepted one. Raises `InputError` if the run has none such."""
+        if not self.steps:
+            raise InputError(f"{self.folder}: holds no accepted step.")
+        if step is None:
+            return self.steps
+        if not 1 <= step <= self.steps:
+            raise InputError(f"{self.folder}: has no step {step}; its accepted steps are 1 to {self.steps}.")
+        return int(step)
+
+
+def read_columns(path: Path) -> dict[str, list[float]]:
+    """The columns of the history.csv ``path`` by name without unit. Raises `InputError` if it is none."""
+    try:
+        columns = read_history(path)
+        finite = all(math.isfinite(value) for name in _NEEDED & columns.keys() for value in columns[name])
+        if finite and not columns.keys() >= _NEEDED:
+            raise KeyError("columns")
+    except (ValueError, IndexError, KeyError, OSError):
+        raise InputError(f"{path}: cannot be read as the history of a run.") from None
+    if not finite:
+        raise InputError(f"{path}: holds numbers that are not finite.")
+    return columns
+
+
+def _read_report(path: Path) -> dict[str, Any]:
+    try:
+        report = json.loads(path.read_text(encoding="utf-8"))
+        if not {"status", "message", "warnings", "versions", "seconds", "totals", "steps"} <= report.keys():
+            raise KeyError("keys")
+    except (OSError, ValueError, KeyError, AttributeError):
+        raise InputError(f"{path}: cannot be read as the report of a run.") from None
+    return report

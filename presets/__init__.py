@@ -1,0 +1,1 @@
+"""Scenes of known joints as problems to solve."""

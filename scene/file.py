@@ -1,0 +1,269 @@
+"""Scene files: TOML to a checked scene and back, and one sentence for every fault."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from archord.scene.errors import InputError
+from archord.scene.reference import key_names, limits_in_words, toml_value
+from archord.scene.scene import CHOSEN, FORMAT, LOADS, Scene
+
+ALTERNATIVES = {
+    "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
+    "load": [(*LOADS, "path")],
+}
+_LARGEST_FILE = 10**6  # bytes
+_DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_CHAIN = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}")
+_MOST_SENTENCES = 20
+
+
+def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) -> Scene:
+    """Read and check the scene file ``path``, with ``overrides`` like ``"joint.clearance=0.01"`` on top.
+
+    Raises `InputError` with one sentence per fault: file, key, value, and what is allowed.
+    """
+    data = read_toml(path)
+    if "base" in data and "joint" not in data:
+        raise InputError(f"{path}: is a sweep, not a scene; archord sweep solves it.")
+    origin = {}
+    _give_way(data, overrides)
+    for override in overrides:
+        origin[override_key(data, override)] = f"--set {override}"
+    read_targets(data, Path(path))
+    return parse_scene(data, str(path), origin)
+
+
+def _give_way(data: dict[str, Any], overrides: list[str] | tuple[str, ...]) -> None:
+    """Drop from the file's ``data`` a mesh and steps if an accuracy is given instead, and the other way round."""
+    given = {key.strip() for key, _, value in (o.partition("=") for o in overrides) if value.strip()}
+    chosen = {f"{section}.{name}" for section, name in CHOSEN}
+    dropped = chosen if "analysis.accuracy" in given else {"analysis.accuracy"} if given & chosen else set()
+    for section, name in (key.split(".") for key in dropped):
+        if isinstance(data.get(section), dict):
+            data[section].pop(name, None)
+
+
+def read_targets(data: dict[str, Any], scene: Path) -> None:
+    """Put the targets of the file ``load.path``, beside the file ``scene``, into ``data``; each is one step by default.
+
+    Raises `InputError`.
+    """
+    load = data.get("load")
+    if not isinstance(load, dict) or not isinstance(load.get("path"), str):
+        return
+    both = next((name for name in LOADS if name in load), None)
+    if both:
+        raise InputError(f"{scene}: load.path must not be given together with {both}.")
+    file = scene.parent / load.pop("path")
+    try:
+        heading, *rows = [row for row in csv.reader(file.open(newline="", encoding="utf-8-sig")) if row] or [[]]
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}.") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise InputError(f"{file}: is not a CSV file of text in UTF-8.") from None
+    name = heading[0].strip() if len(heading) == 1 else None
+    if name not in LOADS:
+        raise InputError(f"{file}: must have one column, headed by {', '.join(LOADS[:-1])} or {LOADS[-1]}.")
+    try:
+        load[name] = [float(row[0]) for row in rows]
+    except ValueError as error:
+        raise InputError(f"{file}: {error}; every row below the heading must be a number.") from None
+    load.setdefault("steps", 1)
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """What the TOML file ``path`` holds. Raises `InputError`."""
+    try:
+        with Path(path).open("rb") as file:
+            raw = file.read(_LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}.") from None
+    if len(raw) > _LARGEST_FILE:
+        raise InputError(f"{path}: cannot be read: it is larger than {_LARGEST_FILE // 10**6} MB.")
+    try:
+        text = raw.decode("utf-8-sig").replace("\r\n", "\n")
+        if _LONG_CHAIN.search(text):
+            raise InputError(f"{path}: is not a scene: it has a key of more than {_DEEPEST} dotted parts.")
+        return tomllib.loads(text)
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: cannot be read: it is not UTF-8 text.") from None
+    except RecursionError:
+        raise InputError(f"{path}: is not a scene: its arrays or tables are nested too deeply.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: is not valid TOML: {_shortened(str(error))}.") from None
+    except InputError:
+        raise
+    except ValueError as error:  # whole numbers of thousands of digits, dates like 0000-00-00
+        raise InputError(f"{path}: is not valid TOML: {_shortened(str(error))}.") from None
+
+
+def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, str] | None = None) -> Scene:
+    """Check scene ``data`` as read from ``source``; ``origin`` names another source of some keys. Raises
+    `InputError`."""
+    _check_format(data, source)
+    try:
+        return Scene.model_validate(data)
+    except ValidationError as error:
+        faults = _meant(error.errors(), data)
+        sentences = [_sentence(e, data, source, origin or {}) for e in faults[:_MOST_SENTENCES]]
+        if len(faults) > _MOST_SENTENCES:
+            sentences.append(f"{source}: has {len(faults) - _MOST_SENTENCES} more faults like these.")
+        raise InputError("\n".join(sentences)) from None
+
+
+def _check_format(data: dict[str, Any], source: str) -> None:
+    """Look at the version first: a newer scene may hold anything else that is unknown here. Raises `InputError`."""
+    given = data.get("format", FORMAT)
+    shown = _shortened(toml_value(given))
+    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+        raise InputError(
+            f"{source}: format = {shown} must be a whole number, the version of the scene format: {FORMAT}."
+        )
+    if given > FORMAT:
+        raise InputError(
+            f"{source}: format = {shown} is newer than this archord, which reads format {FORMAT}; use a newer archord."
+        )
+
+
+def _shortened(text: str, length: int = 80) -> str:
+    """``text`` with its middle left out if it is long."""
+    return text if len(text) <= length else f"{text[: length - 20]} ... {text[-15:]}"
+
+
+def _key_shown(part: str) -> str:
+    """One part of a key as TOML writes it, without what would break a line."""
+    return (
+        part if re.fullmatch(r"[\w-]+", part) and len(part) <= 80 else _shortened(json.dumps(part, ensure_ascii=True))
+    )
+
+
+def override_key(data: dict[str, Any], override: str) -> str:
+    """Set one ``a.b=value`` in ``data`` (value: TOML, a number, else text; nothing: drop it); returns the dotted
+    key."""
+    key, sign, text = override.partition("=")
+    if "\n" in text or "\n" in key:
+        raise InputError(f"--set {override!r}: must be one line.")
+    key = key.strip()
+    section, dot, name = key.partition(".")
+    if not (sign and dot and section and name and "." not in name):
+        raise InputError(f"--set {override}: must read section.key=value, like joint.clearance=0.01.")
+    put(data, section, name, _value(text.strip()) if text.strip() else None, f"--set {override}")
+    return key
+
+
+def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) -> None:
+    """Set a key of scene ``data``, or drop it if ``value`` is None; what it is an alternative to goes, too.
+
+    Raises `InputError`, beginning with ``said``, if there can be no such section.
+    """
+    table = data.setdefault(section, {})
+    if not isinstance(table, dict):
+        raise InputError(f"{said}: {section} is not a section of the scene.")
+    for pair in ALTERNATIVES.get(section, []):
+        if name in pair:
+            for other in pair:
+                table.pop(other, None)
+    if value is None:
+        table.pop(name, None)
+        return
+    if (section, name, value) == ("pin", "rigid", True):
+        table.clear()
+    table[name] = value
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        pass
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _meant(errors: list[Any], data: dict[str, Any]) -> list[Any]:
+    """The errors, less those of the kind that was not given where a key may be one number or a list."""
+    out: dict[tuple, Any] = {}
+    for error in errors:
+        section, key, *rest = [*error["loc"], None, None][: max(2, len(error["loc"]))]
+        if not rest:
+            out[error["loc"]] = error
+            continue
+        listed = isinstance(data[section][key], list)
+        if str(rest[0]).startswith("list") == listed:
+            error = {**error, "loc": (section, key), "entry": rest[1] if len(rest) > 1 else None}
+            if error["type"] in ("float_type", "int_type") and not listed:
+                error["type"] = f"{error['type']}_or_list"
+            out.setdefault((section, key), error)
+    return list(out.values())
+
+
+def _sentence(error: Any, data: dict[str, Any], source: str, origin: dict[str, str]) -> str:
+    """One sentence for one fault that pydantic found."""
+    location, kind, context = [str(part) for part in error["loc"]], error["type"], error.get("ctx", {})
+    said = None
+    if kind == "value_error":
+        name, said = str(context["error"]).split("|", 1)
+        location += name.split(".")
+    key = ".".join(map(_key_shown, location))
+    given: Any = data
+    for part in location:
+        given = given.get(part) if isinstance(given, dict) else None
+    where = next((said_in for name, said_in in origin.items() if name == key or name.startswith(f"{key}.")), source)
+    shown = "" if given is None or isinstance(given, dict) or where != source else f" = {_shortened(toml_value(given))}"
+    if error.get("entry") is not None:
+        shown += f": entry {error['entry'] + 1}"
+    rules = {
+        "float_type_or_list": "must be a number or a list of numbers",
+        "int_type_or_list": "must be a whole number or a list of them",
+        "too_short": "must not be empty",
+        "too_long": "must not have more than {max_length} entries",
+        "literal_error": "must be {expected}",
+        "float_type": "must be a number",
+        "int_type": "must be a whole number",
+        "bool_type": "must be true or false",
+        "string_type": "must be text",
+        "string_too_short": "must not be empty",
+        "string_pattern_mismatch": "must be one line of text",
+        "finite_number": "must be a finite number",
+        "missing": "is missing",
+        "model_type": "must be a section, [{name}]",
+    }
+    if said is None and kind == "extra_forbidden":
+        allowed = key_names(location[:-1])
+        near = difflib.get_close_matches(location[-1], allowed, 1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        said = f"is not a known key; {hint}{'Sections' if len(location) == 1 else 'Keys'} are {', '.join(allowed)}"
+    elif said is None and kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+        said = f"must be {limits_in_words(*location)}"
+    elif said is None:
+        said = rules.get(kind, error["msg"]).format(**{**context, "name": key})
+    return f"{where}: {key}{shown} {said}."
+
+
+def resolved(scene: Scene) -> str:
+    """The scene as TOML, with every default filled in but for what an accuracy chooses; it loads as the same scene."""
+    import tomli_w
+
+    data = scene.model_dump(exclude_none=True)
+    joint = data["joint"]
+    joint["block_size"] = scene.joint.W
+    if scene.analysis.accuracy is not None:
+        for section, key in CHOSEN:
+            data[section].pop(key, None)
+    elif "element_size" not in joint:
+        joint.setdefault("relative_element_size", 0.04)
+    if scene.pin.rigid:
+        data["pin"] = {"rigid": True}
+    return tomli_w.dumps(data)

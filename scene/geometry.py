@@ -1,0 +1,118 @@
+"""The section ``joint`` of a scene: the geometry of pin and hole, and how finely they are meshed."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import model_validator
+
+from archord.scene.keys import Positive, Section, key, one_of
+
+_WIDEST = 1e6  # block_size over R
+_MOST_CELLS = 1e6  # triangles: some 10 GB, and minutes for a mesh generator that is not parallel
+Model = Literal["block", "ring"]
+
+
+class JointGeometry(Section):
+    """The pin of radius ``R`` in a hole of radius ``R + dR``, and the mesh of both."""
+
+    model: Model = key(
+        "block: the paper's quarter joint, pressed at the pin's horizontal diameter; ring: half a whole pin in a ring "
+        "held at its outer edge, loaded by a force at the pin's core (Persson's joint)",
+        default="block",
+    )
+
+    radius: float = key("radius R of the pin", "length", gt=0, example=10.0)
+    clearance: float | None = key(
+        "radial clearance dR = hole radius - pin radius, 1e-6 to 0.5 times R; in a ring also negative (interference)",
+        "length",
+        default=None,
+    )
+    relative_clearance: float | None = key("dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005)
+    block_size: Positive | None = key(
+        "width and depth of the block or radius of the ring, at least the hole's diameter, at most 1e6 R; 100 R "
+        "if absent",
+        "length",
+        default=None,
+    )
+    element_size: Positive | None = key(
+        "edge length of the elements on the arcs, 1e-4 to 0.5 times R", "length", default=None
+    )
+    relative_element_size: Positive | None = key(
+        "element_size / R, instead of element_size: 1e-4 to 0.5; 0.04 if both are absent", default=None, example=0.04
+    )
+    size_ratio: float = key(
+        "element size on the pin's arc over that on the hole's, which then is element_size",
+        default=1.0,
+        ge=0.01,
+        le=100,
+    )
+    edge_angle: float | None = key(
+        "semi-angle [rad] at which the contact is to end: elements on the arcs shrink toward it; not in a ring",
+        default=None,
+        gt=0,
+        lt=math.pi / 2,
+    )
+    edge_ratio: float = key("element size at edge_angle over element_size", default=0.25, ge=0.01, le=1)
+    growth: float = key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
+
+    @model_validator(mode="after")
+    def _geometry(self) -> JointGeometry:
+        if (self.clearance is None) == (self.relative_clearance is None):
+            raise ValueError("clearance|" + one_of("relative_clearance", self.clearance))
+        name = "clearance" if self.relative_clearance is None else "relative_clearance"
+        if self.model == "block" and not 1e-6 <= self.dR / self.radius <= 0.5:
+            raise ValueError(f"{name}|must be a clearance: between 1e-6 and 0.5 times the radius")
+        if not 1e-6 <= abs(self.dR) / self.radius <= 0.5:
+            raise ValueError(f"{name}|must be between 1e-6 and 0.5 times the radius, or minus that")
+        if self.element_size is not None and self.relative_element_size is not None:
+            raise ValueError("element_size|must not be given together with relative_element_size")
+        if not 1e-4 <= self.h / self.radius <= 0.5:
+            name = "element_size" if self.element_size is not None else "relative_element_size"
+            raise ValueError(f"{name}|must be between 1e-4 and 0.5 times the radius")
+        if not 1e-4 <= self.size_ratio * self.h / self.radius <= 0.5:
+            raise ValueError("size_ratio|must leave the pin's elements between 1e-4 and 0.5 times the radius")
+        if self.edge_angle is not None and self.model == "ring":
+            raise ValueError("edge_angle|is only for the model block")
+        if self.edge_angle is not None and self.edge_ratio * self.h / self.radius < 1e-4:
+            raise ValueError("edge_ratio|must leave elements of at least 1e-4 times the radius")
+        if 2 * (self.radius + self.dR) > self.W:
+            raise ValueError("block_size|must be at least twice the radius of the hole")
+        if self.W / self.radius > _WIDEST:
+            raise ValueError(f"block_size|must not exceed {_WIDEST:g} times the radius")
+        if self.expected_cells > _MOST_CELLS:
+            name = "relative_element_size" if self.element_size is None else "element_size"
+            raise ValueError(
+                f"{name}|with growth = {self.growth:g} would make about {self.expected_cells:.0e} triangles, and "
+                f"{_MOST_CELLS:.0e} are allowed; choose larger elements or a larger growth"
+            )
+        return self
+
+    @property
+    def expected_cells(self) -> float:
+        """About how many triangles the mesh will have: the bodies' area over that of equilateral triangles of the size
+        ``t = h + growth |r - R|`` at radius r, integrated in closed form (lengths in R)."""
+        h, g, width = self.h / self.radius, self.growth, self.W / self.radius
+
+        def ring(sign: int, depth: float) -> float:  # integral of r dr / t^2 from the arc outward (1) or inward (-1)
+            t = h + g * depth
+            return (1 - sign * h / g) / g * (1 / h - 1 / t) + sign * math.log(t / h) / g**2
+
+        angle = math.pi if self.model == "ring" else math.pi / 2
+        return angle * (ring(-1, 1.0) + ring(1, width - 1)) / (math.sqrt(3) / 4)
+
+    @property
+    def dR(self) -> float:
+        """Clearance."""
+        return self.clearance if self.clearance is not None else (self.relative_clearance or 0.0) * self.radius
+
+    @property
+    def W(self) -> float:
+        """Width of the block."""
+        return 100 * self.radius if self.block_size is None else self.block_size
+
+    @property
+    def h(self) -> float:
+        """Element size on the arcs, or on the hole's alone (see `size_ratio`)."""
+        return (self.relative_element_size or 0.04) * self.radius if self.element_size is None else self.element_size

@@ -1,0 +1,1 @@
+"""Contact of two surfaces by Nitsche's method."""

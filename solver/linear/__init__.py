@@ -1,0 +1,1 @@
+"""How a Newton system is solved."""

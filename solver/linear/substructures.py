@@ -1,0 +1,198 @@
+"""Sparse systems on several ranks, each of which eliminates its own unknowns (direct substructuring).
+
+The interface are the unknowns on cells of several ranks, and few more where pairs in contact lie on two. Without it the
+ranks' blocks do not know of each other: every rank orders and factorises its own by itself, and what is left of the
+interface is the sum of the Schur complements (Smith, Bjorstad and Gropp 1996, 4.2)
+
+    S = sum over ranks of A_GG - A_GI A_II^-1 A_IG,
+
+a dense matrix on all ranks. Bodies that are cut in sectors have short interfaces. MUMPS does the same within one tree,
+but orders the whole matrix on one rank, and waits where fronts span the ranks.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from archord.kernels.compiled import CompilerError, library, pointer
+from archord.solver.linear.elimination_order import available, before_corners, corners
+
+_LARGEST_INTERFACE = 4000  # unknowns: every rank factorises a dense matrix of that size
+
+
+def substructures(A: PETSc.Mat, V: fem.FunctionSpace) -> Substructures | None:
+    """Substructures for matrices with the pattern of ``A``, of the displacements ``V``. Collective.
+
+    None on one rank, where the interface is too large, where a rank has no unknowns of its own, and where MUMPS's
+    headers or METIS are not installed.
+    """
+    comm = A.comm.tompi4py()
+    if comm.size == 1 or not comm.allreduce(_available(), op=MPI.LAND):
+        return None
+    interface = _interface(A, comm)
+    start, end = A.getOwnershipRange()
+    alone = end - start > ((interface >= start) & (interface < end)).sum()  # whether this rank has unknowns of its own
+    if not 0 < len(interface) <= _LARGEST_INTERFACE or not comm.allreduce(bool(alone), op=MPI.LAND):
+        return None
+    return Substructures(A, interface, corners(V))
+
+
+def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
+    """Dofs without which the ranks' blocks of ``A`` are not coupled: those on cells of several ranks, and of any others
+    that are, as the contact's, the ones of the higher rank."""
+    start, end = A.getOwnershipRange()
+    local = np.asarray(A.getLGMap()[0].indices)
+    shared = _union(comm, local[(local < start) | (local >= end)])
+    offsets, columns, _ = A.getValuesCSR()
+    across = np.flatnonzero((columns < start) | (columns >= end))
+    rows, columns = start - 1 + np.searchsorted(offsets, across, side="right"), columns[across]
+    across = np.flatnonzero(~_within(rows, shared) & ~_within(columns, shared))
+    rows, columns = rows[across], columns[across]
+    size = A.getBlockSize()
+    blocks = np.unique(np.union1d(shared, _union(comm, np.maximum(rows, columns))) // size)
+    return (size * blocks[:, None] + np.arange(size)).ravel()
+
+
+def _union(comm: MPI.Comm, dofs: np.ndarray) -> np.ndarray:
+    return np.unique(np.concatenate(comm.allgather(np.unique(dofs))))
+
+
+def _within(dofs: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """Which of ``dofs`` are among ``some``, sorted."""
+    at = np.searchsorted(some, dofs)
+    return some[np.minimum(at, len(some) - 1)] == dofs if len(some) else np.zeros(len(dofs), dtype=bool)
+
+
+def schur_kernels() -> Any:
+    """The functions of kernels/schur.c. Raises `CompilerError` where MUMPS's headers are not installed."""
+    return library(Path(__file__).with_name("schur.c"), libraries=("dmumps",))
+
+
+def _available() -> bool:
+    try:
+        schur_kernels()
+    except CompilerError:
+        return False
+    return available()
+
+
+class Substructures:
+    """Python context of a preconditioner that solves with matrices of the pattern of ``A``, whose dofs ``interface``
+    ``(m,)``, sorted, separate the ranks, and whose nodes have ``corner`` as in `corners`. Collective."""
+
+    def __init__(self, A: PETSc.Mat, interface: np.ndarray, corner: np.ndarray) -> None:
+        self.comm = A.comm.tompi4py()
+        self._kernels = schur_kernels()
+        start, end = A.getOwnershipRange()
+        local = np.union1d(np.arange(start, end), interface)
+        first = int(np.searchsorted(local, start))
+        self._own = slice(first, first + end - start)  # among the local ones
+        kept = np.searchsorted(local, interface)
+        mine = (interface >= start) & (interface < end)
+        self._mine = np.flatnonzero(mine), interface[mine] - start
+        self._set = PETSc.IS().createGeneral(local.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        self._block = A.createSubMatrices(self._set)[0]
+        offsets, columns, _ = self._block.getValuesCSR()
+        on_interface = np.zeros(len(local), dtype=bool)
+        on_interface[kept] = True
+        entries = _ranges(offsets[kept], offsets[kept + 1])
+        self._shared = entries[on_interface[columns[entries]]]  # of the interface alone: all ranks have them
+        size = A.getBlockSize()
+        corner = np.searchsorted(local[::size] // size, corner)  # all are on cells of this rank
+        place = _places(offsets, columns, on_interface, corner, self._own.start // size, size)
+        rows = np.repeat(np.arange(1, len(local) + 1, dtype=np.int32), np.diff(offsets))
+        self._arrays = rows, columns.astype(np.int32, copy=False) + 1, kept.astype(np.int32) + 1, place + 1
+        self._b = np.zeros(len(local))
+        m = len(interface)
+        self._reduced, self._complement = np.zeros(m), np.zeros((m, m))
+        self._x, self._y = (PETSc.Vec().createSeq(m, comm=PETSc.COMM_SELF) for _ in range(2))
+        self._mumps: Any = None
+        self._dense = PETSc.KSP().create(PETSc.COMM_SELF)
+        self._dense.setType("preonly")
+        self._dense.getPC().setType("lu")
+        self.singular = False
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Factorise the matrix as it is now, called by PETSc."""
+        A = pc.getOperators()[1]
+        A.createSubMatrices(self._set, submats=[self._block])
+        values = self._block.getValuesCSR()[2]
+        values[self._shared] /= self.comm.size
+        status = np.zeros(1, dtype=np.int32)
+        if self._mumps is None:
+            rows, columns, kept, place = map(pointer, self._arrays)
+            sizes = len(self._b), len(rows)
+            self._mumps = self._kernels.schur_create(
+                MPI.COMM_SELF.py2f(), *sizes, rows, columns, len(kept), kept, place, pointer(status)
+            )
+        worst = int(status[0])
+        if worst >= 0:
+            worst = self._kernels.schur_factorise(self._mumps, pointer(values), pointer(self._complement))
+        self.singular = self.comm.allreduce(worst, op=MPI.MIN) < 0
+        if self.singular:
+            return
+        self.comm.Allreduce(MPI.IN_PLACE, self._complement)
+        S = PETSc.Mat().createDense(self._complement.shape, comm=PETSc.COMM_SELF)
+        S.getDenseArray()[:] = self._complement
+        S.assemble()
+        self._dense.setOperators(S)
+        self._dense.setUp()
+
+    def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
+        """``x = A^-1 r``, called by PETSc; not a number if a block is singular."""
+        if self._mumps is None:  # put in the place of another one
+            self.setUp(pc)
+        if self.singular:
+            x.set(np.nan)
+            return
+        self._b[:] = 0.0
+        self._b[self._own] = r.array_r
+        self._kernels.schur_condense(self._mumps, pointer(self._b), pointer(self._reduced))
+        self.comm.Allreduce(MPI.IN_PLACE, self._reduced)
+        self._x.array[:] = self._reduced
+        self._dense.solve(self._x, self._y)
+        self._reduced[:] = self._y.array_r
+        self._kernels.schur_expand(self._mumps, pointer(self._reduced), pointer(self._b))
+        x.array[:] = self._b[self._own]
+        among, own = self._mine
+        x.array[own] = self._y.array_r[among]
+
+    def destroy(self, pc: PETSc.PC) -> None:
+        """Free MUMPS's memory, called by PETSc."""
+        if self._mumps is not None:
+            self._kernels.schur_destroy(self._mumps)
+            self._mumps = None
+
+
+def _ranges(starts: np.ndarray, ends: np.ndarray, step: int = 1) -> np.ndarray:
+    """Every ``step``-th number from each of ``starts`` to that of ``ends``, without it, one after the other."""
+    counts = (ends - starts) // step
+    first = np.cumsum(counts) - counts
+    return step * np.arange(counts.sum()) + np.repeat(starts - step * first, counts)
+
+
+def _places(
+    offsets: np.ndarray, columns: np.ndarray, last: np.ndarray, corner: np.ndarray, start: int, size: int
+) -> np.ndarray:
+    """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)`` behind the others.
+
+    Rows from ``offsets`` have sorted ``columns``; dofs and entries come in blocks of ``size``. Block ``start + i`` has
+    the blocks ``corner[i]`` at its corners; all that are not last have some.
+    """
+    behind = last[::size]
+    inner = np.flatnonzero(~behind)
+    number = np.where(behind, -1, np.cumsum(~behind) - 1)
+    starts, ends = offsets[size * inner], offsets[size * inner + 1]
+    row, column = np.repeat(inner, (ends - starts) // size), columns[_ranges(starts, ends, size)] // size
+    both = ~behind[column]
+    row, column = number[row[both]], number[column[both]]
+    place = np.empty(len(behind), dtype=np.int32)
+    place[inner] = before_corners(len(inner), row, column, number[corner[inner - start]])
+    place[behind] = np.arange(len(inner), len(behind))
+    return (size * place[:, None] + np.arange(size, dtype=np.int32)).ravel()

@@ -1,0 +1,73 @@
+"""Meshes of a joint from coarse to fine, near and far elements alike, and the scene on each.
+
+Lengths are in the size of the contact that is to be expected: a small contact in a large pin is resolved as a wide one
+is, by elements that are as much smaller as it is and grow as fast.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import ValidationError
+
+from archord.scene.scene import JointGeometry, Scene, Stepping
+
+RATIO = 1.5  # of the element sizes from one mesh to the next
+_GROWTH = 6.25  # over the element size in R, for a wide contact
+_WIDE = 1.17  # semi-angle [rad] of the contact for which the constants below hold: the paper's joint at 2 dR
+_COARSEST = 0.2  # element size over R, for a wide contact
+_CONSTANTS = {2: 1.4, 3: 0.15}  # error of P over (h/R)^3 by degree (docs/accuracy.md)
+_MARGIN = 2.0  # an estimate over the error itself, where the order is 3 and the estimate assumes 2
+_SMALLEST = 1e-4  # element size over R that a scene may ask for
+_LEVELS = 3  # meshes that should do
+
+
+class MeshFamily:
+    """The meshes ``0, 1, 2, ...`` for ``scene`` (with ``analysis.accuracy``) that are to make the error of the mesh
+    fall below ``accuracy`` with the third, or with the second if that is coarse."""
+
+    def __init__(self, scene: Scene, accuracy: float) -> None:
+        self.scene = scene
+        g = scene.joint
+        finest = (accuracy / _MARGIN / _CONSTANTS[scene.analysis.degree]) ** (1 / 3)
+        self.first = min(_COARSEST, finest * RATIO ** (_LEVELS - 1))
+        self.scale = min(1.0, expected_angle(scene) / _WIDE) / max(1.0, g.size_ratio)
+        edge = g.edge_ratio if g.edge_angle is not None else 1.0
+        smallest = _SMALLEST * max(1.0, 1 / g.size_ratio, 1 / edge)
+        self.scale = max(self.scale, RATIO * smallest / self.first)
+
+    def scene_of(self, level: int, substeps: int) -> Scene | None:
+        """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would be too fine for the
+        limits of the keys."""
+        size = self.first / RATIO**level
+        joint = self.scene.joint.model_dump(exclude_none=True)
+        joint |= {"relative_element_size": _rounded(size * self.scale), "growth": _rounded(min(2.0, _GROWTH * size))}
+        rules = self.scene.stepping
+        length = 1 / substeps
+        stepping = {"initial": length, "maximum": length, "minimum": min(rules.minimum, length)}
+        try:
+            geometry = JointGeometry.model_validate(joint)
+        except ValidationError:
+            return None
+        return self.scene.model_copy(
+            update={
+                "joint": geometry,
+                "analysis": self.scene.analysis.model_copy(update={"accuracy": None}),
+                "stepping": Stepping.model_validate(rules.model_dump() | stepping),
+            }
+        )
+
+
+def expected_angle(scene: Scene) -> float:
+    """About the largest semi-angle [rad] of the contact, rather too large: where circles that go through each other
+    unchanged by the largest ``delta`` meet, ``cos(angle) = dR/(dR + delta)``. Under a force ``delta`` is ``P/E*``."""
+    dR = scene.joint.dR
+    if dR <= 0:
+        return math.pi
+    delta = max([0.0, *scene.targets]) / (scene.E_star if scene.force_controlled else 1.0)
+    return math.atan2(math.sqrt(delta * (2 * dR + delta)), dR) if delta else _WIDE
+
+
+def _rounded(value: float) -> float:
+    """Four digits, so that a scene can be read, and that round-off of its units does not matter."""
+    return float(f"{value:.4g}")

@@ -1,1 +1,0 @@
-"""Designs of many cases, solved side by side into one table."""

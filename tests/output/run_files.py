@@ -1,0 +1,96 @@
+"""What a run folder must be at any moment, whatever happened to the run."""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from archord.output import checkpoint
+from archord.output.history import read_history
+from archord.scene.file import load_scene
+
+
+def accepted_steps(folder: Path) -> int:
+    """Open every file that is there, in full; the number of steps from which the run would go on.
+
+    Of the other files none is ahead of the checkpoint, and none more than one step behind.
+    """
+    steps = checkpoint.read(folder / "checkpoint.h5").step if (folder / "checkpoint.h5").exists() else 0
+    found = {}
+    if (folder / "scene.toml").exists():
+        load_scene(folder / "scene.toml")
+    if (folder / "history.csv").exists():
+        history = read_history(folder / "history.csv")
+        found["history.csv"] = len(history["step"])
+        assert history["step"] == list(range(1, found["history.csv"] + 1))
+    if (folder / "run.json").exists():
+        report = json.loads((folder / "run.json").read_text())
+        found["run.json"] = len(report["steps"])
+    for name in ("fields.h5", "contact.h5"):
+        if (folder / name).exists():
+            found[name] = _step_file(folder / name)
+    if (folder / "fields.xdmf").exists():
+        found["fields.xdmf"] = _xdmf(folder / "fields.xdmf")
+    assert all(steps - 1 <= n <= steps for n in found.values()), (steps, found)
+    return steps
+
+
+def _step_file(path: Path) -> int:
+    with h5py.File(path) as file:
+        accepted = int(file["accepted"][()])
+        assert (np.diff(file["load"][:accepted]) != 0).all()
+        names: list[str] = []
+        file.visit(names.append)
+        for name in names:
+            if isinstance(file[name], h5py.Dataset):
+                last = name.rpartition("/")[2]
+                values = file[name][()]
+                if not last.isdigit() or int(last) <= accepted:
+                    assert np.isfinite(values).all(), name
+    return accepted
+
+
+def _xdmf(path: Path) -> int:
+    grids = ET.parse(path).getroot().findall(".//Grid[@GridType='Uniform']")
+    with h5py.File(path.with_suffix(".h5")) as file:
+        for item in (item for grid in grids for item in grid.iter("DataItem")):
+            name = str(item.text).partition(":")[2]
+            shape = tuple(int(n) for n in item.attrib["Dimensions"].split())
+            assert file[name].shape == shape, name
+    return len(grids)
+
+
+def same_run(one: Path, other: Path, tolerance: float, fields: float = 0.0) -> None:
+    """All numbers of two finished runs agree, relative to the largest of their kind: tables, fields and contact.
+
+    ``fields`` is the tolerance of values at points, if it is another one.
+    """
+    a, b = (read_history(folder / "history.csv") for folder in (one, other))
+    assert set(a) == set(b)
+    for name in set(a) - {"seconds", "force_balance"}:
+        _agree(name, np.array(a[name]), np.array(b[name]), max(tolerance, 1e-11))  # the table has 12 digits
+    reports = [json.loads((folder / "run.json").read_text()) for folder in (one, other)]
+    for name in ("delta", "P", "p0", "eps", "peeq_max", "peeq_integral", "elastic_energy", "work"):
+        _agree(name, *(np.array([step[name] for step in report["steps"]]) for report in reports), tolerance)
+    for name in ("fields.h5", "contact.h5"):
+        assert (one / name).exists() == (other / name).exists()
+        if not (one / name).exists():
+            continue
+        with h5py.File(one / name) as first, h5py.File(other / name) as second:
+            assert first["accepted"][()] == second["accepted"][()] == len(a["step"])
+            names: list[str] = []
+            first.visit(names.append)
+            for key in (n for n in names if isinstance(first[n], h5py.Dataset)):
+                last = key.rpartition("/")[2]
+                if key != "load" and (not last.isdigit() or int(last) <= len(a["step"])):
+                    _agree(f"{name}/{key}", first[key][()], second[key][()], fields or tolerance)
+
+
+def _agree(name: str, a: np.ndarray, b: np.ndarray, tolerance: float) -> None:
+    assert a.shape == b.shape, name
+    difference = np.abs(a.astype(float) - b).max(initial=0.0)
+    assert difference <= tolerance * np.abs(a).max(initial=0.0), (name, difference)

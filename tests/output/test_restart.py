@@ -1,0 +1,323 @@
+"""Runs that go on: the same numbers as if never halted, longer runs, and what cannot be continued."""
+
+import json
+import os
+import shutil
+import tomllib
+
+import pytest
+from mpi4py import MPI
+
+from archord.benchmarks.verification.persson import persson_joint
+from archord.output.folder import claim_folder, occupied
+from archord.output.history import read_history
+from archord.output.restart import plan_extension, plan_restart
+from archord.output.run import solve_scene
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene, parse_scene, resolved
+from tests.output.run_files import accepted_steps, same_run
+from tests.solver.solving import SEVERAL, scene
+
+PLASTIC = {"yield_stress": 0.002}
+UP_DOWN_UP = {"displacement": [1.5, 0.9, 1.8], "steps": [3, 3, 3]}
+
+
+def loaded(load: dict, **options):
+    """A joint whose section load is ``load``."""
+    return parse_scene(tomllib.loads(resolved(scene(**options))) | {"load": load})
+
+
+CASES = {
+    "elastic": (scene(0.2, 4), 2),
+    "plastic": (scene(0.2, 4, **PLASTIC), 3),
+    "plane stress, hardening": (scene(0.2, 3, **PLASTIC, pin={"hardening": 0.1}, analysis={"plane": "stress"}), 1),
+    "rigid pin": (scene(0.2, 4, **PLASTIC, pin={"rigid": True}), 2),
+    "one side": (scene(0.2, 3, **PLASTIC, analysis={"integration": "block"}), 2),
+    "unloading": (scene(0.2, **PLASTIC, load=UP_DOWN_UP), 4),
+    "turning": (scene(0.2, **PLASTIC, load=UP_DOWN_UP), 3),
+    "force": (loaded({"relative_force": [0.004, 0.002], "steps": 3}, element_size=0.2, **PLASTIC), 4),
+    "ring": (persson_joint(0.5, 0.2, 4, block={"yield_stress": 0.002}), 2),
+    "ring with an interference": (persson_joint(-2.0, 0.2, 3), 1),
+    "substeps": (scene(0.2, 2, **PLASTIC, stepping={"initial": 0.2, "growth": 1.5}), 1),
+    "no fields": (scene(0.2, 3, output={"fields": False}), 1),
+    "cutbacks": (scene(0.2, 2, **PLASTIC, analysis={"max_iterations": 6}), 1),
+}
+
+
+class Crashed(Exception):
+    """Stands for the end of a process that writes nothing more."""
+
+
+def crash_after(step: int):
+    def stop(measures) -> None:
+        if measures.step == step:
+            raise Crashed
+
+    return stop
+
+
+def run(problem, folder, comm=MPI.COMM_SELF, *, crash: int = 0, copies=None):
+    """Solve anew, up to a crash; ``copies`` are folders by step: what a kill after that step would leave."""
+
+    def copy(measures) -> None:
+        if comm.rank == 0 and measures.step in (copies or {}):
+            shutil.copytree(folder, copies[measures.step])
+
+    folder.mkdir(exist_ok=True)
+    if crash:
+        with pytest.raises(Crashed):
+            solve_scene(problem, folder, comm, on_step=crash_after(crash))
+    else:
+        assert solve_scene(problem, folder, comm, on_step=copy).status == "done"
+
+
+def go_on(problem, folder, comm=MPI.COMM_SELF):
+    """Continue the run in ``folder``, planned on rank 0."""
+    plan = plan_restart(folder, problem) if comm.rank == 0 else None
+    outcome = solve_scene(problem, folder, comm, start=plan.start if plan else None)
+    assert outcome.status == "done"
+    return outcome
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_restarted_run_equals_the_uninterrupted_one(tmp_path, name):
+    """Every number of every file, to 1e-12, on one rank."""
+    problem, step = CASES[name]
+    run(problem, tmp_path / "whole", copies={step: tmp_path / "halted"})
+    assert accepted_steps(tmp_path / "halted") == step < len(problem.targets)
+    outcome = go_on(problem, tmp_path / "halted")
+    assert [m.step for m in outcome.steps] == list(range(1, len(problem.targets) + 1))
+    same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
+    if name == "cutbacks":
+        assert sum(m.cutbacks for m in outcome.steps[step:]) > 0
+
+
+def test_a_restarted_run_remembers_that_a_large_gamma_is_raised_by_and_by(tmp_path):
+    """The rest takes the same iterations, and agrees to what such a gamma leaves of the digits."""
+    problem = scene(0.2, 3, **PLASTIC, analysis={"gamma_factor": 1e4})
+    run(problem, tmp_path / "whole", copies={2: tmp_path / "halted"})
+    go_on(problem, tmp_path / "halted")
+    whole, halted = (read_history(tmp_path / name / "history.csv") for name in ("whole", "halted"))
+    assert whole["iterations"] == halted["iterations"]
+    assert whole["iterations"][-1] > 25  # more than one solve's: it was raised
+    assert halted["P"] == pytest.approx(whole["P"], rel=1e-9)
+
+
+def test_a_run_may_be_halted_after_every_step(tmp_path):
+    """Restarted as often as it has steps; run.json notes each."""
+    problem = CASES["plastic"][0]
+    run(problem, tmp_path / "whole")
+    run(problem, tmp_path / "halted", crash=1)
+    for step in (2, 3, 4):
+        plan = plan_restart(tmp_path / "halted")
+        with pytest.raises(Crashed):
+            solve_scene(plan.scene, tmp_path / "halted", MPI.COMM_SELF, start=plan.start, on_step=crash_after(step))
+    go_on(problem, tmp_path / "halted")
+    same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
+    report = json.loads((tmp_path / "halted" / "run.json").read_text())
+    assert [r["after_step"] for r in report["restarts"]] == [1, 2, 3, 4]
+    assert report["totals"]["newton_iterations"] == sum(step["iterations"] for step in report["steps"])
+
+
+CHANGES = [("all", "all", 1e-12), ("one", "all", 1e-8), ("all", "one", 1e-8)]
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("before", "after", "tolerance"), CHANGES if SEVERAL else CHANGES[:1])
+@pytest.mark.parametrize("name", ["plastic", "rigid pin", "force"] if SEVERAL else ["force"])
+def test_ranks_may_change(tmp_path_factory, comm, name, before, after, tolerance):
+    """Halted on all ranks or one, continued on one or all.
+
+    The order in which MUMPS sums up what other ranks send is left to chance: values at points differ by 1e-12 between
+    any two runs.
+    """
+    problem, step = CASES[name]
+    folder = comm.bcast(tmp_path_factory.mktemp("ranks") if comm.rank == 0 else None)
+    on = {"all": comm, "one": MPI.COMM_SELF}
+    for ranks, work in (
+        (before, lambda: run(problem, folder / "whole", on[before])),
+        (before, lambda: run(problem, folder / "halted", on[before], crash=step)),
+        (after, lambda: go_on(problem, folder / "halted", on[after])),
+    ):
+        if ranks == "all" or comm.rank == 0:
+            work()
+        comm.barrier()
+    if comm.rank == 0:
+        same_run(folder / "whole", folder / "halted", tolerance, 30 * tolerance)
+
+
+def test_an_extended_run_equals_the_long_one(tmp_path):
+    """Two targets more: the resolved scene gives the same numbers from scratch, as does the scene asked for."""
+    short, long = (scene(0.2, n, **PLASTIC, load={"displacement": 0.5 * n}) for n in (2, 4))
+    run(short, tmp_path / "run")
+    plan = plan_extension(tmp_path / "run", long)
+    assert solve_scene(plan.scene, tmp_path / "run", MPI.COMM_SELF, start=plan.start).status == "done"
+    run(load_scene(tmp_path / "run" / "scene.toml"), tmp_path / "again")
+    same_run(tmp_path / "again", tmp_path / "run", 1e-12)
+    run(long, tmp_path / "long")
+    same_run(tmp_path / "long", tmp_path / "run", 1e-10)
+    load = tomllib.loads((tmp_path / "run" / "scene.toml").read_text())["load"]
+    assert (load["displacement"], load["steps"]) == ([1.0, 2.0], [2, 2])
+
+
+def test_a_path_is_extended_by_a_path(tmp_path):
+    """Unloading added to a run that grew; interrupted in the added part, it is restarted like any other."""
+    short = scene(0.2, **PLASTIC, load={"displacement": 1.5, "steps": 3})
+    run(short, tmp_path / "run")
+    plan = plan_extension(tmp_path / "run", CASES["unloading"][0])
+    assert plan.scene.targets == pytest.approx(CASES["unloading"][0].targets, rel=1e-14)
+    with pytest.raises(Crashed):
+        solve_scene(plan.scene, tmp_path / "run", MPI.COMM_SELF, start=plan.start, on_step=crash_after(5))
+    go_on(plan.scene, tmp_path / "run")
+    run(plan.scene, tmp_path / "whole")
+    same_run(tmp_path / "whole", tmp_path / "run", 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("load", "legs", "steps"),
+    [
+        ({"displacement": 4.0, "steps": 8}, [2.0, 4.0], [4, 4]),
+        ({"displacement": 4.0, "steps": 10}, [2.0, 4.0], [4, 5]),
+        ({"displacement": 3.0, "steps": 2}, [2.0, 3.0], [4, 1]),
+        ({"displacement": [1.0, 2.5, 4.0], "steps": [1, 1, 2]}, [2.0, 2.5, 4.0], [4, 1, 2]),
+        ({"displacement_absolute": [0.01, 0.005], "steps": [4, 1]}, [2.0, 1.0], [4, 1]),
+    ],
+)
+def test_targets_beyond_the_end_are_added(finished, load, legs, steps):
+    """Those of a growing path beyond the old end, or what follows the old path; in the words of the old scene."""
+    extended = plan_extension(finished, loaded(load, element_size=0.25)).scene.load
+    assert extended.displacement == pytest.approx(legs, rel=1e-14)
+    assert extended.steps == steps
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A finished run to delta = 2 dR in four steps."""
+    folder = tmp_path_factory.mktemp("finished")
+    run(scene(0.25, 4), folder)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("load", "said"),
+    [
+        ({"displacement": 2.0, "steps": 4}, "ends at 0.01 already"),
+        ({"displacement": 1.0, "steps": 4}, "ends at 0.01 already"),
+        ({"displacement": [1.0, 0.5, 4.0], "steps": 1}, "its path does not begin the new one"),
+        ({"relative_force": 0.1}, "load.relative_force cannot extend it"),
+    ],
+)
+def test_a_path_that_does_not_go_on_is_refused(finished, load, said):
+    """Shorter, the same, another one, another kind of load."""
+    with pytest.raises(InputError, match=said):
+        plan_extension(finished, loaded(load, element_size=0.25))
+
+
+def test_a_finished_run_is_left_alone(finished):
+    """Nothing to restart."""
+    before = {path: path.read_bytes() for path in finished.iterdir()}
+    plan = plan_restart(finished)
+    assert plan.finished
+    assert "finished" in plan.said
+    assert {path: path.read_bytes() for path in finished.iterdir()} == before
+
+
+@pytest.fixture(scope="module")
+def crashed(tmp_path_factory):
+    """An elastic run of three steps that crashed after the second."""
+    folder = tmp_path_factory.mktemp("crashed") / "run"
+    run(scene(0.25, 3), folder, crash=2)
+    return folder
+
+
+@pytest.fixture
+def halted(crashed, tmp_path):
+    """A copy of it to go on with, or to be damaged."""
+    return shutil.copytree(crashed, tmp_path / "run")
+
+
+def test_only_step_control_may_change(crashed, halted):
+    """Another key is named with both values; [stepping] and max_iterations are free, and the run goes on with them."""
+    folder = halted
+    own = tomllib.loads(resolved(scene(0.25, 3)))
+    for section, key, value in (("block", "nu", 0.29), ("analysis", "plane", "stress"), ("load", "steps", 4)):
+        other = parse_scene(own | {section: own[section] | {key: value}})
+        with pytest.raises(InputError, match=rf"was solved with {section}\.{key} = .*, the scene says") as error:
+            plan_restart(folder, other)
+        assert len(str(error.value).splitlines()) == 1
+    analysis = own["analysis"] | {"max_iterations": 12}
+    other = parse_scene(own | {"stepping": own["stepping"] | {"initial": 0.5}, "analysis": analysis})
+    go_on(other, folder)
+    assert load_scene(folder / "scene.toml").analysis.max_iterations == 12
+    with pytest.raises(InputError, match=r"is not finished \(2 of 3 steps\)"):
+        plan_extension(crashed, scene(0.25, 6, load={"displacement": 4.0}))
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda run: (run / "fields.h5").unlink(), r"fields\.h5: is missing"),
+        (lambda run: os.truncate(run / "fields.h5", 5000), r"fields\.h5: is damaged"),
+        (lambda run: (run / "contact.h5").unlink(), r"contact\.h5: is missing"),
+        (lambda run: (run / "run.json").unlink(), r"run\.json: is missing"),
+        (lambda run: (run / "run.json").write_text("{"), r"run\.json: does not hold the 1 step"),
+        (lambda run: os.truncate(run / "checkpoint.h5", 5000), r"checkpoint\.h5: is damaged"),
+        (lambda run: (run / "scene.toml").unlink(), r"scene\.toml"),
+    ],
+)
+def test_a_run_with_files_missing_is_refused(halted, damage, said):
+    """One sentence with the file's name; the checkpoint stays."""
+    folder = halted
+    damage(folder)
+    checkpoint = (folder / "checkpoint.h5").read_bytes()
+    with pytest.raises(InputError, match=said) as error:
+        go_on(scene(0.25, 3), folder)
+    assert len(str(error.value).splitlines()) == 1
+    assert (folder / "checkpoint.h5").read_bytes() == checkpoint
+
+
+def test_a_step_that_only_the_checkpoint_has_is_written(tmp_path):
+    """Killed after the checkpoint and before all other files: they get the step from the restored state."""
+    problem = CASES["plastic"][0]
+    run(problem, tmp_path / "whole", copies={2: tmp_path / "before", 3: tmp_path / "halted"})
+    shutil.copy(tmp_path / "halted" / "checkpoint.h5", tmp_path / "before")
+    assert accepted_steps(tmp_path / "before") == 3
+    assert len(json.loads((tmp_path / "before" / "run.json").read_text())["steps"]) == 2
+    go_on(problem, tmp_path / "before")
+    same_run(tmp_path / "whole", tmp_path / "before", 1e-12)
+
+
+def test_lost_tables_are_written_anew(halted, tmp_path):
+    """history.csv and fields.xdmf follow from the other files."""
+    run(scene(0.25, 3), tmp_path / "whole")
+    folder = halted
+    (folder / "history.csv").unlink()
+    (folder / "fields.xdmf").unlink()
+    go_on(scene(0.25, 3), folder)
+    same_run(tmp_path / "whole", folder, 1e-12)
+    assert (folder / "fields.xdmf").read_text() == (tmp_path / "whole" / "fields.xdmf").read_text()
+
+
+def test_what_never_began_starts_from_the_beginning(tmp_path):
+    """No folder, an empty one, one without an accepted step: said, and solved."""
+    problem = scene(0.25, 2)
+    for folder in (tmp_path / "none", tmp_path / "empty"):
+        plan = plan_restart(folder, problem)
+        assert plan.start is None
+        assert "holds no run yet: starting from the beginning" in plan.said
+        (tmp_path / "empty").mkdir(exist_ok=True)
+    (tmp_path / "begun").mkdir()
+    (tmp_path / "begun" / "scene.toml").write_text(resolved(problem))
+    plan = plan_restart(tmp_path / "begun")
+    assert plan.start is None
+    assert "holds no accepted step: starting from the beginning" in plan.said
+    go_on(problem, tmp_path / "begun")
+
+
+def test_two_processes_do_not_write_to_one_folder(tmp_path):
+    """The second one is refused, also with --force; the lock ends with its holder."""
+    problem = scene(0.25, 1)
+    claim_folder(tmp_path, True)
+    with occupied(tmp_path), pytest.raises(InputError, match="another archord is solving into it"):
+        solve_scene(problem, tmp_path, MPI.COMM_SELF)
+    assert solve_scene(problem, tmp_path, MPI.COMM_SELF).status == "done"

@@ -1,0 +1,300 @@
+"""What a run leaves on disk."""
+
+import json
+import os
+import time
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.output import run as run_module
+from archord.output.folder import CHECKPOINT, FILES, PICTURES, claim_folder
+from archord.output.history import read_history
+from archord.output.run import solve_scene
+from archord.postprocess.picture import draw
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene
+from tests.solver.solving import scene
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    outcome = solve_scene(scene(0.08, 4, yield_stress=0.002), folder, MPI.COMM_SELF)
+    return outcome
+
+
+def test_all_files_are_there_and_say_done(run):
+    """The run folder of a finished run."""
+    assert sorted(p.name for p in run.folder.iterdir()) == sorted((*FILES, CHECKPOINT))
+    report = json.loads((run.folder / "run.json").read_text())
+    assert report["status"] == "done"
+    assert report["totals"]["accepted_steps"] == 4
+    assert report["totals"]["newton_iterations"] == sum(m.iterations for m in run.steps)
+    assert report["error_estimates"]["force_balance"] < 1e-8
+    assert {"archord", "dolfinx", "petsc", "mpi", "numpy", "python"} <= report["versions"].keys()
+    assert sum(s for name, s in report["seconds"].items() if name != "total") <= report["seconds"]["total"] * 1.001
+
+
+def test_every_step_tells_what_it_cost(run):
+    """The steps' counts add up to the totals, and there is a peak of memory for each rank."""
+    report = json.loads((run.folder / "run.json").read_text())
+    steps, totals = report["steps"], report["totals"]
+    assert sum(s["factorisations"] for s in steps) == totals["factorisations"] <= totals["newton_iterations"]
+    assert sum(s["evaluations"] for s in steps) == totals["residual_evaluations"] > totals["newton_iterations"]
+    assert len(report["peak_memory"]) == report["ranks"] == 1
+    arrays = report["mesh"]["dofs"] * 8
+    assert arrays < report["peak_memory"][0] < 1e6 * arrays
+
+
+def test_a_run_without_fields_is_the_same_but_for_them(tmp_path):
+    """The same curves, byte for byte but for the clock; nothing to draw, in one sentence."""
+    for name, fields in (("with", True), ("without", False)):
+        (tmp_path / name).mkdir()
+        solve_scene(scene(0.2, 2, output={"fields": fields}), tmp_path / name, MPI.COMM_SELF)
+    curves = [read_history(tmp_path / name / "history.csv") for name in ("with", "without")]
+    for curve in curves:
+        curve.pop("seconds")
+    assert curves[0] == curves[1]
+    there, here = ({p.name for p in (tmp_path / name).iterdir()} for name in ("with", "without"))
+    assert there - here == {"fields.xdmf", "fields.h5"}
+    assert not here - there
+    with pytest.raises(
+        InputError, match=r"without: has no fields to draw: it was solved with output\.fields = false\."
+    ):
+        draw(tmp_path / "without")
+
+
+def test_history_holds_units_and_dimensionless_forms(run):
+    """One row a step; P [N/mm] next to P/(E* R), equal as E* R = 1 here."""
+    heading = (run.folder / "history.csv").read_text().splitlines()[0].split(",")
+    assert heading[:8] == ["step", "delta [mm]", "delta/dR", "P [N/mm]", "P/(E* R)", "p0 [MPa]", "p0/E*", "eps [rad]"]
+    history = read_history(run.folder / "history.csv")
+    assert history["delta/dR"] == pytest.approx([0.5, 1.0, 1.5, 2.0], rel=1e-11)
+    assert history["P"] == pytest.approx(history["P/(E* R)"], rel=1e-11)
+    assert history["P"] == pytest.approx([m.P for m in run.steps], rel=1e-11)
+    assert history["cutbacks"] == [0, 0, 0, 0]
+
+
+def test_fields_open_with_their_steps_in_order(run):
+    """Second-order triangles, nodal displacement and cell fields at the four loads; symmetry axis at rest in x."""
+    with meshio.xdmf.TimeSeriesReader(run.folder / "fields.xdmf") as reader:
+        points, cells = reader.read_points_cells()
+        assert [c.type for c in cells] == ["triangle6"]
+        data = [reader.read_data(k) for k in range(reader.num_steps)]
+    loads = [d[0] for d in data]
+    assert loads == pytest.approx([m.delta for m in run.steps], rel=1e-12)
+    u = data[-1][1]["displacement"]
+    axis = points[:, 0] == 0
+    assert axis.sum() > 5
+    assert np.abs(u[axis, 0]).max() == 0
+    last = {name: values[0] for name, values in data[-1][2].items()}
+    assert set(last) == {"von_mises", "peeq", "mean_stress", "contact_state", "contact_pressure", "body"}
+    assert last["von_mises"].max() <= 0.002 * (1 + 1e-9)
+    assert 0 < last["peeq"].max() <= run.steps[-1].peeq_max
+    assert set(np.unique(last["body"])) == {1, 2}
+    first = {name: values[0] for name, values in data[0][2].items()}
+    assert 0 < (first["contact_state"] > 0).sum() < (last["contact_state"] > 0).sum()
+    corner, middle = cells[0].data[:, :3], cells[0].data[:, 3:]
+    chord = (points[corner] + points[np.roll(corner, -1, axis=1)]) / 2
+    sides = np.linalg.norm(points[corner] - points[np.roll(corner, -1, axis=1)], axis=-1)
+    assert (np.linalg.norm(points[middle] - chord, axis=-1) < 0.1 * sides).all()
+
+
+def test_fields_open_in_pyvista(run):
+    """The arrays make a grid that pyvista can handle, with the area of block and pin."""
+    pyvista = pytest.importorskip("pyvista")
+    with h5py.File(run.folder / "fields.h5") as file:
+        points, cells = file["mesh/coordinates"][()], file["mesh/cells"][()]
+    kind = np.full(len(cells), pyvista.CellType.QUADRATIC_TRIANGLE)
+    grid = pyvista.UnstructuredGrid(np.insert(cells, 0, 6, axis=1).ravel(), kind, points)
+    assert grid.compute_cell_sizes()["Area"].sum() == pytest.approx(1e4 - np.pi / 4 * (1.005**2 - 1), rel=1e-4)
+
+
+def test_contact_file_integrates_to_the_force(run):
+    """The projected pressure of each side carries the raw pressure's force; gaps are closed where it acts."""
+    with h5py.File(run.folder / "contact.h5") as file:
+        assert file["accepted"][()] == 4
+        assert file["load"][()] == pytest.approx([m.delta for m in run.steps])
+        for k in range(1, 5):
+            for side in ("pin", "hole"):
+                s, w = file[f"{side}/s"][()], file[f"{side}/weight"][()]
+                p, raw, gap = (file[f"{side}/{name}/{k:04d}"][()] for name in ("pressure", "raw_pressure", "gap"))
+                assert (np.diff(s.ravel()) > 0).all()
+                assert (w * p).sum() == pytest.approx((w * raw).sum(), rel=1e-12)
+                assert file[f"{side}/coordinates/{k:04d}"].shape == (*s.shape, 2)
+                assert np.abs(gap[raw > 0]).max() < 0.05 * 0.005
+                assert gap[-1, -1] > 0
+            at = file["hole/coordinates/0001"][()]
+            angle = np.arctan2(at[..., 0], -at[..., 1])
+            assert angle == pytest.approx(file["hole/angle"][()], abs=0.003)
+
+
+def test_the_resolved_scene_gives_the_same_numbers(run, tmp_path):
+    """Solving runs/x/scene.toml again reproduces every row but the seconds."""
+    solve_scene(load_scene(run.folder / "scene.toml"), tmp_path, MPI.COMM_SELF)
+    a, b = (read_history(f / "history.csv") for f in (run.folder, tmp_path))
+    del a["seconds"], b["seconds"]
+    assert a == b
+
+
+def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
+    """Four of ten steps, then no convergence: all four readable, and run.json says why."""
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6}, stepping={"minimum": 1.0})
+    outcome = solve_scene(problem, tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "stopped"
+    assert len(read_history(tmp_path / "history.csv")["P"]) == 4
+    report = json.loads((tmp_path / "run.json").read_text())
+    assert report["status"] == "stopped"
+    assert "no equilibrium at delta = 0.005" in report["message"]
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "fields.xdmf") as reader:
+        assert reader.num_steps == 4
+    with h5py.File(tmp_path / "contact.h5") as file:
+        assert file["accepted"][()] == 4
+
+
+def test_a_failing_step_tells_where_and_why(tmp_path):
+    """Every attempt's residuals, flips and plastic increment in run.json; debug.xdmf holds the state they speak of."""
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6}, stepping={"minimum": 1.0})
+    assert solve_scene(problem, tmp_path, MPI.COMM_SELF, debug=True).status == "stopped"
+    failed = json.loads((tmp_path / "run.json").read_text())["failed_step"]
+    assert failed["cutbacks"] == len([a for a in failed["attempts"] if not a["converged"]]) == 1
+    last = failed["attempts"][-1]
+    assert len(last["flips"]) == len(last["residuals"]) > 3
+    assert sum(sum(a["flips"]) for a in failed["attempts"]) > 0
+    with meshio.xdmf.TimeSeriesReader(tmp_path / "debug.xdmf") as reader:
+        points, _ = reader.read_points_cells()
+        _, nodal, cells = reader.read_data(0)
+    worst = np.linalg.norm(nodal["residual"], axis=1).argmax()
+    assert points[worst, :2] == pytest.approx(last["worst"], abs=1e-12)
+    assert 0 < cells["peeq_increment"][0].max() <= last["plastic_increment"]
+
+
+def test_a_contact_that_no_point_sees_is_no_success(tmp_path):
+    """A load far below what the mesh resolves leaves no contact point pressed: stopped, not a joint without force."""
+    outcome = solve_scene(scene(0.08, steps=1, load={"displacement": 1e-8}), tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "stopped"
+    assert "the contact is smaller than the mesh can see" in outcome.message
+
+
+@pytest.mark.mpi
+def test_ranks_write_the_same_files(tmp_path_factory):
+    """fields.h5 and contact.h5 of all ranks together equal those of one rank, in the same order."""
+    comm = MPI.COMM_WORLD
+    folder = comm.bcast(tmp_path_factory.mktemp("ranks") if comm.rank == 0 else None)
+    problem = scene(0.1, 2, yield_stress=0.002)
+    if comm.rank == 0:
+        (folder / "one").mkdir()
+        (folder / "all").mkdir()
+        solve_scene(problem, folder / "one", MPI.COMM_SELF)
+    comm.barrier()
+    solve_scene(problem, folder / "all", comm)
+    if comm.rank == 0:
+        for name in ("fields.h5", "contact.h5"):
+            with h5py.File(folder / "one" / name) as one, h5py.File(folder / "all" / name) as together:
+                names: list[str] = []
+                one.visit(names.append)
+                for key in names:
+                    if isinstance(one[key], h5py.Dataset) and not key.startswith("mesh/cells"):
+                        a, b = one[key][()], together[key][()]
+                        assert a == pytest.approx(b, rel=1e-7, abs=1e-7 * np.abs(a).max()), key
+
+
+def test_an_elastic_run_carries_no_plastic_fields(tmp_path):
+    """No PEEQ on disk, no PEEQ field, zero dissipation; a rigid pin has no pin side."""
+    solve_scene(scene(0.1, 1, pin={"rigid": True}), tmp_path, MPI.COMM_SELF)
+    with h5py.File(tmp_path / "fields.h5") as file:
+        assert "peeq" not in file
+        assert set(np.unique(file["mesh/body"][()])) == {2}
+    with h5py.File(tmp_path / "contact.h5") as file:
+        assert set(file) == {"accepted", "load", "hole"}
+    assert read_history(tmp_path / "history.csv")["plastic_dissipation"] == [0]
+
+
+def test_results_are_not_overwritten_by_accident(tmp_path):
+    """An occupied folder needs force; a file is no folder."""
+    claim_folder(tmp_path / "new", False)
+    (tmp_path / "new" / "history.csv").write_text("kept")
+    with pytest.raises(InputError, match="--force"):
+        claim_folder(tmp_path / "new", False)
+    claim_folder(tmp_path / "new", True)
+    assert (tmp_path / "new" / "history.csv").read_text() == "kept"
+    with pytest.raises(InputError, match="is a file"):
+        claim_folder(tmp_path / "new" / "history.csv", True)
+
+
+def test_a_pin_that_touches_nothing_has_no_warnings(tmp_path):
+    """Lifted: what is left of P is round-off, and no reason to doubt the solution."""
+    outcome = solve_scene(scene(0.2, 2, load={"displacement": -1.0}), tmp_path, MPI.COMM_SELF)
+    assert (outcome.status, outcome.warnings) == ("done", [])
+    assert max(m.force_balance for m in outcome.steps) < 1e-8
+    assert json.loads((tmp_path / "run.json").read_text())["error_estimates"]["newton_residual"] < 1e-8
+
+
+def test_a_contact_smaller_than_the_mesh_can_see_stops_the_run(tmp_path):
+    """Pressed by less than the first contact point's gap: no force but round-off, and a sentence."""
+    outcome = solve_scene(scene(0.2, 2, load={"displacement": 1e-7}), tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "stopped"
+    assert "no contact point was ever pressed" in outcome.message
+
+
+def test_a_contact_that_reaches_the_end_of_the_arc_is_named(tmp_path):
+    """At 100 dR the whole arc touches; at 2 dR it does not."""
+    for load, said in ((2.0, False), (100.0, True)):
+        folder = tmp_path / str(load)
+        folder.mkdir()
+        thin = scene(0.2, 2, joint={"clearance": 0.001}, load={"displacement": load})
+        outcome = solve_scene(thin, folder, MPI.COMM_SELF)
+        assert any("contact reaches the end of the modelled quarter arc" in w for w in outcome.warnings) == said
+
+
+def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):
+    """Where the run says nothing, P of a rigid pin is within 3 % of that on elements half as long."""
+    force, said = [], []
+    for i, size in enumerate((0.16, 0.08, 0.04, 0.02)):
+        folder = tmp_path / str(i)
+        folder.mkdir()
+        thin = scene(size, 1, joint={"clearance": 1e-6}, pin={"rigid": True}, block={"E": 0.91, "nu": 0.3})
+        outcome = solve_scene(thin, folder, MPI.COMM_SELF)
+        force.append(outcome.steps[-1].P)
+        said.append(any("too long for the clearance" in w for w in outcome.warnings))
+    error = abs(np.array(force[:-1]) / force[-1] - 1)
+    assert said == [True, True, False, False]
+    assert error[0] > 0.1
+    assert error[2] < 0.01
+
+
+def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(tmp_path, monkeypatch):
+    """ffcx waits for a file that nobody will write, and names it: it is removed, if it is nobody's work any more."""
+    half = tmp_path / "libffcx_forms_0.c"
+    half.touch()
+    true_joint, tried = run_module.Joint, []
+
+    def joint(*arguments, **named):
+        tried.append(half.exists())
+        if half.exists():
+            raise TimeoutError(f"JIT compilation timed out, probably ... (e.g. remove {half}) or increase timeout.")
+        return true_joint(*arguments, **named)
+
+    monkeypatch.setattr(run_module, "Joint", joint)
+    for age, found in ((0, [True, True]), (1000, [True, False])):
+        tried.clear()
+        os.utime(half, (time.time() - age,) * 2)
+        folder = tmp_path / str(age)
+        folder.mkdir()
+        if age:
+            assert run_module.solve_scene(scene(0.3, 1), folder, MPI.COMM_SELF).status == "done"
+        else:
+            with pytest.raises(TimeoutError):
+                run_module.solve_scene(scene(0.3, 1), folder, MPI.COMM_SELF)
+        assert tried == found
+
+
+def test_a_new_run_removes_the_pictures_of_the_old_one(tmp_path):
+    for name in (*PICTURES, "notes.txt"):
+        (tmp_path / name).touch()
+    run_module.solve_scene(scene(0.3, 1), tmp_path, MPI.COMM_SELF)
+    assert [name for name in (*PICTURES, "notes.txt") if (tmp_path / name).exists()] == ["notes.txt"]

@@ -1,0 +1,203 @@
+"""The law that comes with archord is what its rows say, as good as it says, and silent elsewhere."""
+
+import math
+import warnings
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import curve_fit
+
+from archord.benchmarks.paper.finding import judged
+from archord.postprocess.laws.calibrated_law import ROWS, calibrated, joint_calibrated, shipped_model
+from archord.postprocess.laws.calibrated_study import study, usable
+from archord.postprocess.laws.chord_laws import plastic_force
+from archord.postprocess.laws.finding_rows import read_rows
+from archord.postprocess.laws.fitted_cases import read_cases
+from archord.postprocess.laws.law_joint import LawJoint, LawRangeError, LawRangeWarning
+from archord.postprocess.laws.laws import LAWS
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene
+from archord.studies.calibration_design import as_sweep, joints
+
+SCENES = Path(__file__).parents[3] / "scenes"
+CASES, NOTES = read_cases(ROWS)
+
+
+@cache
+def fresh():
+    """The study of the stored rows."""
+    return study(usable(CASES)[0])
+
+
+def test_the_rows_are_the_design():
+    """At least 200 cases, elastic and plastic, of both planes, out of a sweep file that its command prints."""
+    assert (SCENES / "calibration.sweep.toml").read_text() == as_sweep()
+    design = joints()
+    assert len(CASES) == len(design) >= 200
+    assert {case.kind for case in CASES} == {(p, y) for p in ("strain", "stress") for y in ("none", "both", "block")}
+    for case, joint in zip(CASES, design, strict=True):
+        assert case.kind == (joint.plane, joint.yielding)
+        pin_nu = math.nan if joint.alpha == 1 else joint.pin_nu
+        found, meant = (case.alpha, case.nu, case.pin_nu, case.s), (joint.alpha, joint.nu, pin_nu, joint.s)
+        assert found == pytest.approx(meant, rel=1e-4, abs=1e-5, nan_ok=True)
+
+
+def test_the_shipped_model_is_that_of_the_shipped_rows():
+    """Fitted anew: coefficients, ranges, errors, and how many cases are behind them."""
+    model, shipped = fresh().model, shipped_model()
+    assert model.form == shipped.form
+    assert model.elastic == pytest.approx(shipped.elastic, rel=1e-4)
+    for part, other in zip(model.plastic, shipped.plastic, strict=True):
+        assert (part.plane, part.yielding, part.cases) == (other.plane, other.yielding, other.cases)
+        numbers = [[p.rate, *p.late, *p.threshold] for p in (part, other)]
+        assert numbers[0] == pytest.approx(numbers[1], rel=1e-3, abs=1e-5)
+    assert model.bounds == shipped.bounds
+    for what, kinds in shipped.errors.items():
+        for kind, found in kinds.items():
+            for name in ("k", "c", "P"):
+                if name in found:
+                    assert model.errors[what][kind][name]["rms"] == pytest.approx(found[name]["rms"], abs=3e-5)
+    assert shipped.provenance["sweep"] == NOTES["sweep"]
+    assert shipped.provenance["fitted"] + shipped.provenance["held out"] <= len(CASES)
+
+
+@pytest.mark.parametrize("case", CASES[::15], ids=lambda case: case.run)
+def test_k_and_c_of_a_row_are_those_of_its_curve(case):
+    """An independent least squares fit to the stored forces."""
+
+    def law(x, k, c=math.nan):
+        return plastic_force(case.joint(k, c), x * case.clearance) / case.clearance
+
+    start = [0.9 * case.k] if math.isnan(case.c) else [0.98 * case.k, 1.02 * case.c]
+    found, _ = curve_fit(law, case.load, case.P, p0=start, bounds=(0, np.inf), ftol=1e-14, xtol=1e-14)
+    assert found == pytest.approx([case.k, case.c][: len(start)], rel=1e-4)
+
+
+def test_held_out_cases_are_met_as_well_as_foretold():
+    """Through the law as users ask it; the model is better than one k, and hardly worse than each joint's own k, c."""
+    held = fresh().held
+    off = []
+    for case in held:
+        delta = case.load * case.clearance
+        force = LAWS["calibrated"].force(case.joint(0.85, case.strength), delta, "raise")
+        off.append((force / case.clearance / case.P - 1)[case.load > 0.45])
+    rms = np.sqrt((np.array(off) ** 2).mean())
+    stated = shipped_model().errors
+    assert rms == pytest.approx(stated["held out"]["both all"]["P"]["rms"], abs=1e-4)
+    assert rms < 1.5 * stated["cross-validated"]["both all"]["P"]["rms"]
+    by_form = {name: found["P"]["rms"] for name, _, _, found in fresh().simpler}
+    assert by_form["own k and c"] < by_form["calibrated"] < 0.5 * by_form["constants"]
+    assert by_form["constants"] < by_form["k = 0.85, c = 1"]
+
+
+def test_joints_of_another_study_are_met():
+    """Those of the finding, solved apart and on another mesh: P hardly worse than with each joint's own k and c."""
+    found = judged(read_rows())
+    assert sum(number for _, _, number, *_ in found) > 80
+    for plane, kind, _, rms, _, own in found:
+        assert rms < own + 0.015, (plane, kind)
+
+
+def test_a_scene_has_the_coefficients_of_its_numbers():
+    """From the scene's joint or from numbers: the same k and c; without a yield stress the elastic k."""
+    steel = LawJoint.from_scene(load_scene(SCENES / "steel_pin.toml"))
+    found = calibrated("strain", 0.3, s=0.4)
+    expected = plastic_force(LawJoint(10.0, 0.05, steel.E_star, steel.yield_stress, k=found.k, c=found.c), 0.07)
+    assert LAWS["calibrated"].force(steel, 0.07) == pytest.approx(float(expected), rel=1e-9)
+    assert LAWS["calibrated"].peak_pressure(steel, expected) == pytest.approx(found.c * steel.yield_stress)
+    unlike = ["pin.E=70000", "pin.nu=0.2", "pin.yield_stress=none", "block.yield_stress=none"]
+    scene = LawJoint.from_scene(load_scene(SCENES / "elastic_pin.toml", unlike[:2]))
+    block = load_scene(SCENES / "elastic_pin.toml").block
+    elastic = calibrated(scene.plane, block.nu, 70000 / block.E, pin_nu=0.2)
+    assert math.isinf(elastic.c)
+    assert joint_calibrated(scene).k == pytest.approx(elastic.k, rel=1e-9)
+
+
+def test_units_do_not_matter():
+    """Forces go with E* R, displacements with R."""
+    joint = LawJoint(1.0, 0.005, 1.0, 0.002, dundurs_alpha=0.2, plane="strain", nu=0.3)
+    scaled = replace(joint, radius=25.4, clearance=0.005 * 25.4, E_star=7.0, yield_stress=0.014)
+    one, other = LAWS["calibrated"].force(joint, 0.008), LAWS["calibrated"].force(scaled, 0.008 * 25.4)
+    assert other == pytest.approx(one * 7.0 * 25.4, rel=1e-12)
+
+
+def test_stiffness_is_the_slope():
+    joint = LawJoint(1.0, 0.005, 1.0, 0.002, dundurs_alpha=0.2, plane="stress", nu=0.3)
+    slope = np.diff(LAWS["calibrated"].force(joint, [0.007999, 0.008001]))[0] / 2e-6
+    assert LAWS["calibrated"].stiffness(joint, 0.008) == pytest.approx(slope, rel=1e-6)
+
+
+def test_a_strong_joint_is_elastic():
+    """k and P tend to the elastic joint's, without a jump and without a warning, in both planes."""
+    for plane in ("strain", "stress"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            elastic, strong = calibrated(plane, 0.3), calibrated(plane, 0.3, s=50.0)
+        assert strong.k == pytest.approx(elastic.k, rel=1e-6)
+        joints = [LawJoint(1.0, 0.005, 1.0, sigY, plane=plane, nu=0.3) for sigY in (None, 0.25)]
+        P = [LAWS["calibrated"].force(joint, 0.01) for joint in joints]
+        assert P[1] == pytest.approx(P[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("yielding", ["both", "block"])
+def test_everywhere_in_the_range_k_and_c_are_sensible(plane, yielding):
+    """Between those of the cases fitted, give or take a tenth: polynomials do not run away between them."""
+    random = np.random.default_rng(5)
+    same = [case for case in CASES if case.kind == (plane, yielding)]
+    k, c = [case.k for case in same], [case.c for case in same if math.isfinite(case.told_c)]
+    least, most = min(case.s for case in same), 1.0
+    checked = 0
+    for nu, pin_nu, ratio, s in random.uniform([0, 0, 0.5, least], [0.49, 0.49, 9, most], (200, 4)):
+        try:
+            found = calibrated(plane, nu, ratio, s, yielding, pin_nu, outside="raise")
+        except LawRangeError:
+            continue
+        assert 0.9 * min(k) < found.k < 1.1 * max(k)
+        assert 0.9 * min(c) < found.c < 1.1 * max(c)
+        checked += 1
+    assert checked > 100
+
+
+def test_k_is_smooth_up_to_a_rigid_pin():
+    for kind in ({}, {"s": 0.4, "yielding": "block"}):
+        stiff, rigid = (calibrated("strain", 0.3, ratio, **kind) for ratio in (1e9, math.inf))
+        assert stiff.k == pytest.approx(rigid.k, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"s": 0.1}, r"sigY R/\(E\* dR\) = 0.1 is outside 0.15"),
+        ({"nu": -0.2}, "nu of the block = -0.2 is outside 0 to 0.49"),
+        ({"pin_nu": 0.495}, "nu of the pin = 0.495 is outside 0 to 0.49"),
+        ({"modulus_ratio": 0.1}, r"E'\(pin\)/E'\(block\) = 0.1 is outside 0.3333 to"),
+        ({"modulus_ratio": 100.0}, r"E'\(pin\)/E'\(block\) = 100 is outside"),
+        ({"modulus_ratio": 0.4, "nu": 0.48}, "Poisson's ratio = 0.6593 is outside 0 to 0.5"),
+        ({"clearance": 0.05}, "dR/R = 0.05 is outside 0.001 to 0.02"),
+        ({"yielding": "pin"}, "only the pin yields"),
+        ({"yielding": "unlike"}, "unlike yield stresses"),
+    ],
+)
+def test_outside_the_simulations_there_is_no_number(change, said):
+    """nan and a warning that says what is outside, and of which range; the formula, or an error, on request."""
+    given = {"plane": "strain", "nu": 0.3, "s": 0.4} | change
+    with pytest.warns(LawRangeWarning, match=said):
+        found = calibrated(**given)
+    assert math.isnan(found.k)
+    assert math.isnan(found.c)
+    with pytest.raises(LawRangeError, match=said):
+        calibrated(**given, outside="raise")
+    with pytest.warns(LawRangeWarning, match=said):
+        assert calibrated(**given, outside="extrapolate").k > 0
+
+
+@pytest.mark.parametrize(
+    "bad", [{"plane": "axial"}, {"nu": 0.5}, {"s": 0.0}, {"modulus_ratio": -1.0}, {"yielding": "x"}]
+)
+def test_what_is_no_joint_is_refused(bad):
+    with pytest.raises(InputError, match=f"{next(iter(bad))} = "):
+        calibrated(**({"plane": "strain", "nu": 0.3} | bad))

@@ -1,0 +1,125 @@
+"""``archord fit`` as a user runs it."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from archord.cli import run
+from archord.postprocess.laws.fitted_law import FittedLaw
+from archord.postprocess.run_curve import read_run
+from tests.postprocess.synthetic import curve
+
+
+def test_fit_prints_a_table_and_writes_what_is_asked_for(runs, tmp_path, capsys):
+    """The numbers of table and JSON agree; the module gives the run's forces; the picture is a picture."""
+    files = {name: tmp_path / f"law.{name}" for name in ("json", "py", "png")}
+    arguments = ["--json", files["json"], "--python", files["py"], "--picture", files["png"], "--residuals"]
+    assert run(["fit", *map(str, [runs["plastic"], *arguments])]) == 0
+    printed = capsys.readouterr().out
+    data = json.loads(files["json"].read_text())
+    law = FittedLaw.from_json(files["json"].read_text())
+    for quantity, name in (("P", "k"), ("P", "c"), ("p0", "c"), ("plateau", "c")):
+        assert f"{data['joint'][quantity][name]['value']:.5f}" in printed
+    assert data["joint"]["P"]["k"]["value"] == law.k
+    assert len(data["joint"]["P"]["residuals"][0]["relative"]) == 8
+    assert "discretisation error is unknown" in printed
+    assert files["png"].read_bytes()[1:4] == b"PNG"
+    history = read_run(runs["plastic"])
+    values: dict = {}
+    exec(files["py"].read_text(), values)
+    forces = [values["force"](d) for d in history.delta]
+    assert forces[-1] == pytest.approx(history.P[-1], rel=0.05)
+    np.testing.assert_allclose(forces, law.force(history.delta), rtol=1e-14)
+
+
+def test_two_meshes_give_a_mesh_error(runs, capsys):
+    """Order does not matter; the finer run is the law's."""
+    assert run(["fit", str(runs["coarse"]), str(runs["elastic"]), "--range", "0.3", "2"]) == 0
+    printed = capsys.readouterr().out
+    assert f"{runs['coarse']} serves to estimate the discretisation error of {runs['elastic']}." in printed
+    assert "unknown" in printed.split(str(runs["elastic"]))[0]
+
+
+def test_held_k_is_told_everywhere(runs, tmp_path, capsys):
+    """In the table, below it, and in the file."""
+    file = tmp_path / "law.json"
+    assert run(["fit", str(runs["plastic"]), "--hold-k", "0.83", "--json", str(file)]) == 0
+    printed = capsys.readouterr().out
+    row = next(line.split() for line in printed.splitlines() if " k " in line)
+    assert row[row.index("k") :][:3] == ["k", "0.83000", "held"]
+    assert "k: held at 0.83, not fitted" in printed
+    assert "law: k = 0.83000 (held), c = " in printed
+    data = json.loads(file.read_text())
+    assert (data["hold_k"], data["law"]["k"], data["joint"]["P"]["k_held"]) == (0.83, 0.83, True)
+    assert FittedLaw.from_json(file.read_text()).c == data["joint"]["P"]["c"]["value"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["{empty}"], "{empty}: is not a run folder: scene.toml is missing."),
+        (["{elastic}", "--range", "3", "4"], "{elastic}: has no step with contact from 3 to 4 clearances;"),
+        (["{elastic}", "{plastic}"], "{plastic}: analysis.plane = 'stress' does not fit"),
+        (["{elastic}", "{elastic}"], "{elastic}: is the same scene on the same mesh as {elastic}; give one of them."),
+        (["{elastic}", "--json", "{empty}/no/x"], "{empty}/no/x: cannot be written: {empty}/no is not a folder."),
+        (["{elastic}", "--python", "{empty}"], "{empty}: cannot be written: it is a folder"),
+        (["{elastic}", "--json", "{empty}/x.json", "--picture", "{empty}/x.xyz"], "{empty}/x.xyz: must end in one of "),
+        (["{elastic}", "--held-out", "0.2"], "{elastic}: --csv, --law and --held-out are for a sweep, and this is"),
+        (["{begun}"], "{begun}: holds no accepted step."),
+        (["{broken}"], "{broken}/history.csv: cannot be read as the history of a run."),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_sentence(runs, tmp_path, capsys, arguments, said):
+    """Exit code 2, nothing on stdout."""
+    folders = runs | {name: tmp_path / name for name in ("empty", "begun", "broken")}
+    (tmp_path / "empty").mkdir()
+    history = (runs["elastic"] / "history.csv").read_text()
+    for name, text in (("begun", history.splitlines()[0] + "\n"), ("broken", history + "1,2\n")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "scene.toml").write_text((runs["elastic"] / "scene.toml").read_text())
+        (tmp_path / name / "history.csv").write_text(text)
+    assert run(["fit", *(a.format(**folders) for a in arguments)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(said.format(**folders))
+    assert err.count("\n") == 1
+    assert not list((tmp_path / "empty").iterdir())
+
+
+def test_no_picture_loads_no_plotting_library(runs, tmp_path):
+    """matplotlib only for --picture."""
+    code = f"import sys; from archord.cli import run; run(['fit', {str(runs['elastic'])!r}]); print('matplotlib' in sys.modules)"  # noqa: E501
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.splitlines()[-1] == "False"
+
+
+def _through(delta, P):
+    """The curve of a run through these points."""
+    return replace(curve(0.85), delta=np.array(delta), **dict.fromkeys(("P", "p0", "eps", "peeq_max"), np.array(P)))
+
+
+def test_unloading_is_left_out(runs):
+    """Of a way there, back and further, the steps on new ground remain."""
+    curve = read_run(runs["elastic"])
+    there, back = np.arange(len(curve.delta)), np.arange(len(curve.delta))[::-1]
+    path = np.concatenate([there[:5], back[4:], there])
+    loop = replace(curve, **{name: getattr(curve, name)[path] for name in ("delta", "P", "p0", "eps", "peeq_max")})
+    np.testing.assert_array_equal(loop.loading().delta, curve.delta)
+    np.testing.assert_array_equal(loop.loading().P, curve.P)
+
+
+def test_a_step_on_the_way_back_to_the_first_loading_is_left_out():
+    """The same force again, a little deeper by what yielded on the way, or a smaller one, is not on new ground."""
+    cycles = _through([1, 2, 1.5, 2.002, 1.5, 2.003, 2.5, 3], [1, 2, 0, 2, 0, 2 + 1e-9, 2.5, 3])
+    assert list(cycles.loading().delta) == [1, 2, 2.5, 3]
+    softer = _through([1, 2, 1, 2.001, 2.1, 3], [1, 2, 0, 1.999, 2.1, 3])
+    assert list(softer.loading().delta) == [1, 2, 2.1, 3]
+
+
+def test_the_first_loading_may_soften():
+    """Without an unloading every deeper step counts, also where P falls."""
+    assert list(_through([1, 2, 3, 4], [1, 2, 1.9, 2]).loading().P) == [1, 2, 1.9, 2]

@@ -1,0 +1,116 @@
+"""``archord fit SWEEP`` as a user runs it."""
+
+import csv
+import json
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from archord.cli import run
+from archord.postprocess.laws.calibrated_law import ROWS, TABLE
+from archord.postprocess.laws.calibrated_model import CalibratedModel
+from archord.postprocess.laws.calibration import calibrate
+from archord.postprocess.laws.fitted_cases import read_cases
+from archord.postprocess.run_curve import read_run
+from archord.studies.cases import read_sweep
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="the whole command, on one rank")
+
+SWEEP = """
+list = [
+    {{ pin.nu = 0.3 }},
+    {{ pin.nu = 0.1 }},
+    {{ pin.nu = 0.1, block.yield_stress = 0.002, block.hardening = 0.1 }},
+    {{ pin.nu = 0.1, joint.relative_element_size = 0.2 }},
+]
+[base]
+joint = {{ radius = 1.0, relative_clearance = 0.005, relative_element_size = 0.12 }}
+pin = {{ E = 2.0, nu = 0.3 }}
+block = {{ E = 1.0, nu = 0.3 }}
+load = {{ displacement = 2.0, steps = 4 }}
+"""
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory) -> Path:
+    """A small sweep: two elastic joints, one of them on two meshes, and one that hardens."""
+    folder = tmp_path_factory.mktemp("sweep")
+    (folder / "some.sweep.toml").write_text(SWEEP.replace("{{", "{").replace("}}", "}"))
+    assert run(["sweep", str(folder / "some.sweep.toml"), "-o", str(folder / "out"), "-q"]) == 0
+    return folder / "out"
+
+
+def test_a_small_sweep_gets_its_table(solved, capsys):
+    """k of every case is that of archord fit RUN; the coarse mesh and the hardening joint are named."""
+    assert run(["fit", str(solved)]) == 0
+    printed = capsys.readouterr().out
+    cases = read_sweep(solved / "sweep.toml").distinct
+    stored, notes = read_cases(solved / "fit.csv")
+    assert [c.run for c in stored] == [cases[0].run, cases[1].run]
+    for case, row in zip(cases[:2], stored, strict=True):
+        k = calibrate([read_run(solved / "cases" / case.run)]).joint.P.k
+        assert row.k == pytest.approx(k.value, rel=1e-6)
+        assert row.k_error == pytest.approx(k.standard_error, rel=1e-6)
+        assert f" {row.k:.4f} " in printed
+        assert math.isnan(row.c)
+    assert stored[0].k != pytest.approx(stored[1].k, rel=1e-3)
+    assert math.isnan(stored[0].k_mesh)
+    assert 0 < stored[1].k_mesh < 0.01
+    assert f"left out: {cases[3].run}: {cases[1].run} is the same joint on a finer mesh" in printed
+    assert f"left out: {cases[2].run}: hardening" in printed
+    assert "elastic cases are too few for a model" in printed
+    assert notes["distinct cases"] == "4"
+    judged = next(line for line in printed.splitlines() if line.startswith("| archord's law | strain | none"))
+    cells = [cell.strip() for cell in judged.split("|")]
+    assert cells[4] == "2"
+    assert float(cells[5].rstrip("%")) < 1.0
+
+
+def test_too_few_cases_write_no_law(solved, tmp_path, capsys):
+    assert run(["fit", str(solved), "--law", str(tmp_path / "law.json")]) == 2
+    assert "law.json: no law to write: 2 elastic cases are too few" in capsys.readouterr().err
+    assert not (tmp_path / "law.json").exists()
+
+
+def test_stored_rows_give_the_law_that_is_shipped(tmp_path, capsys):
+    """By the documented command; table, coefficients and errors are printed, the files hold what is printed."""
+    law, copy, data, picture = (tmp_path / name for name in ("law.json", "fit.csv", "all.json", "fit.png"))
+    words = ["--law", law, "--csv", copy, "--json", data, "--picture", picture]
+    assert run(["fit", str(ROWS), *map(str, words)]) == 0
+    printed = capsys.readouterr().out
+    model, shipped = (CalibratedModel.from_json(file.read_text()) for file in (law, TABLE))
+    assert model.form == shipped.form
+    np.testing.assert_allclose(model.elastic, shipped.elastic, rtol=1e-4)
+    assert model.provenance == shipped.provenance
+    assert copy.read_text() == ROWS.read_text()
+    assert f"{abs(model.elastic[0]):g} p" in printed
+    row = next(line for line in printed.splitlines() if line.startswith("| held out | both | all |"))
+    assert f"{model.errors['held out']['both all']['P']['rms']:.1%}" in row
+    everything = json.loads(data.read_text())
+    with copy.open() as stream:
+        rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
+    assert len(everything["cases"]) == len(rows)
+    assert everything["model"]["elastic"] == list(model.elastic)
+    assert picture.read_bytes()[1:4] == b"PNG"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["{out}", "{out}"], "a sweep is fitted alone"),
+        (["{out}", "--hold-k", "0.8"], "--hold-k, --residuals and --python are for runs"),
+        (["{out}", "--held-out", "0.9"], "--held-out 0.9: must be a share from 0 to 0.5"),
+        (["{run}", "--csv", "x.csv"], "--csv, --law and --held-out are for a sweep"),
+        (["nothing.csv"], "nothing.csv: cannot be read"),
+        (["{out}", "--csv", "no/where.csv"], "no is not a folder"),
+    ],
+)
+def test_bad_requests_are_one_sentence(solved, capsys, words, said):
+    places = {"out": solved, "run": solved / "cases" / read_sweep(solved / "sweep.toml").distinct[0].run}
+    assert run(["fit", *(word.format(**places) for word in words)]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1

@@ -1,0 +1,89 @@
+"""The exported law is the law."""
+
+import ast
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from archord.postprocess.laws.chord_laws import plastic_force
+from archord.postprocess.laws.fitted_law import FittedLaw
+from archord.postprocess.laws.law_joint import LawJoint
+from archord.scene.errors import InputError
+
+ELASTIC = FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, fitted_range=(0.1, 2.0))
+PLASTIC = FittedLaw(
+    k=0.83 + 1e-16, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, c=1 / 3, sigY=230.7, c_error=0.02,
+    fitted_to=('a "quoted"\nrun """',),
+)  # fmt: skip
+DELTA = np.array([-0.1, 0.0, 1e-9, 0.003, 0.01, 0.02, 0.1, 1.0])
+
+
+@pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
+def test_json_gives_the_law_back(law):
+    """Every digit, also out of the file of ``archord fit --json``."""
+    assert FittedLaw.from_json(law.to_json()) == law
+    assert FittedLaw.from_json(json.dumps({"law": json.loads(law.to_json()), "each": []})) == law
+
+
+@pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
+def test_the_python_module_needs_only_math_and_gives_the_same(law, tmp_path):
+    """In an interpreter without site packages, to the last digits, whatever runs are called."""
+    source = law.to_python()
+    imports = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert [alias.name for node in imports for alias in node.names] == ["math"]
+    (tmp_path / "joint.py").write_text(source)
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from joint import force, stiffness\n"
+    code += f"print([[f(d) for d in {DELTA.tolist()}] for f in (force, stiffness)])"
+    printed = subprocess.run(
+        [sys.executable, "-I", "-S", "-c", code], capture_output=True, text=True, check=True
+    ).stdout
+    force, stiffness = ast.literal_eval(printed)
+    np.testing.assert_allclose(force, law.force(DELTA), rtol=1e-14, atol=0)
+    np.testing.assert_allclose(stiffness, law.stiffness(DELTA), rtol=1e-13, atol=0)
+
+
+@pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
+def test_stiffness_is_the_slope_and_displacement_the_inverse(law):
+    """Central differences away from first touch; of any shape, the open joint and the unreachable included."""
+    delta = DELTA[2:]
+    h = 1e-5 * delta
+    slope = (law.force(delta + h) - law.force(delta - h)) / (2 * h)
+    np.testing.assert_allclose(law.stiffness(delta), slope, rtol=1e-7)
+    np.testing.assert_allclose(law.displacement(law.force(delta).reshape(2, 3)), delta.reshape(2, 3), rtol=1e-12)
+    np.testing.assert_array_equal(law.displacement([-1.0, 0.0]), 0)
+    assert (law.stiffness(DELTA[:2]) == 0).all()
+
+
+def test_the_plastic_law_has_a_largest_force():
+    """2 sqrt(2) c sigY R; just below it a large displacement, from it on none."""
+    limit = 2 * np.sqrt(2) * PLASTIC.c * PLASTIC.sigY * PLASTIC.R
+    assert PLASTIC.force(1e9) == pytest.approx(limit, rel=1e-9)
+    assert PLASTIC.displacement(0.999 * limit) > 100 * PLASTIC.dR
+    assert np.isnan(PLASTIC.displacement(1.001 * limit))
+
+
+def test_the_law_is_the_plastic_winkler_law_of_its_joint():
+    """`force` is eqs. 9 to 12 with its own numbers, and yields at its onset."""
+    joint = LawJoint(10.0, 0.05, 1.05e5, yield_stress=230.7, k=PLASTIC.k, c=PLASTIC.c)
+    np.testing.assert_array_equal(PLASTIC.force(DELTA), plastic_force(joint, np.maximum(DELTA, 0)))
+    assert PLASTIC.onset < DELTA[4]
+    assert PLASTIC.force(0.02) < FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.0).force(0.02)
+    assert ELASTIC.onset is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "not valid JSON"),
+        ("[1]", "must be a JSON object"),
+        ('{"k": 1}', "must be a JSON object"),
+        (ELASTIC.to_json().replace("0.83", "-0.83"), "k = -0.83 must be a number greater than 0"),
+        (ELASTIC.to_json().replace('"c": null', '"c": 1.0'), "c and sigY belong together"),
+    ],
+)
+def test_what_is_no_law(text, said):
+    with pytest.raises(InputError, match=said):
+        FittedLaw.from_json(text)

@@ -1,0 +1,156 @@
+"""The laws over the chord and on the arc against integrals of the pressures they assume."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from archord.postprocess.laws.chord_laws import (
+    LIU,
+    chord_angle,
+    paper_force,
+    plastic_force,
+    plastic_peak,
+    plastic_stiffness,
+    semi_chord,
+    winkler_force,
+    winkler_pressure,
+)
+from archord.postprocess.laws.law_joint import LawJoint
+from archord.postprocess.laws.laws import LAWS
+
+JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, yield_stress=300.0)
+DEPTHS = JOINT.clearance * np.array([1e-3, 0.1, 0.5, 1.0, 2.0])
+
+
+def contact_angle(delta):
+    return np.arccos(JOINT.clearance / (JOINT.clearance + delta))
+
+
+def chord_integral(pressure, delta):
+    """2 * integral over the chord of ``pressure(x / l)``."""
+    l = 2 * JOINT.radius * np.sin(contact_angle(delta) / 2)  # noqa: E741
+    return 2 * l * quad(pressure, 0, 1, epsabs=0, epsrel=1e-12)[0]
+
+
+@pytest.mark.parametrize("delta", DEPTHS)
+def test_elastic_law_is_the_force_of_the_parabola(delta):
+    p0 = 0.85 * JOINT.E_star * delta / JOINT.radius
+    expected = chord_integral(lambda t: p0 * (1 - t**2), delta)
+    assert LAWS["paper"].force(JOINT, delta) == pytest.approx(expected, rel=1e-10)
+    assert LAWS["paper"].peak_pressure(JOINT, expected) == pytest.approx(p0, rel=1e-9)
+
+
+@pytest.mark.parametrize(("k", "c"), [(0.85, 1.0), (0.7, 1.6), (1.2, 0.5)])
+@pytest.mark.parametrize("delta", [*DEPTHS, 40 * JOINT.clearance])
+def test_plastic_law_is_the_force_of_the_cut_parabola(delta, k, c):
+    """P = 2 int_0^l min(p0 (1 - x^2/l^2), c sigY) dx, before and beyond the onset."""
+    joint = replace(JOINT, k=k, c=c)
+    p0, plateau = k * JOINT.E_star * delta / JOINT.radius, c * 300.0
+    edge = np.sqrt(max(0.0, 1 - plateau / p0))
+    l = 2 * JOINT.radius * np.sin(contact_angle(delta) / 2)  # noqa: E741
+
+    def integral(a, b):
+        return 2 * l * quad(lambda t: min(p0 * (1 - t**2), plateau), a, b, epsabs=0, epsrel=1e-13)[0]
+
+    expected = integral(edge, 1) + (integral(0, edge) if edge else 0)
+    assert plastic_force(joint, np.array(delta)) == pytest.approx(expected, rel=1e-11)
+    assert semi_chord(joint, np.array(delta)) == pytest.approx(l, rel=1e-11)
+    if delta <= 2 * JOINT.clearance:
+        assert LAWS["paper-plastic"].force(joint, delta) == pytest.approx(expected, rel=1e-11)
+        assert LAWS["paper-plastic"].peak_pressure(joint, expected) == pytest.approx(min(p0, plateau), rel=1e-9)
+
+
+@pytest.mark.parametrize("c", [1.0, 1.6])
+def test_up_to_the_onset_the_plastic_law_is_the_elastic_one(c):
+    """To round-off, and at delta0 Winkler's pressure is the plateau; without a yield stress, everywhere."""
+    joint = replace(JOINT, c=c)
+    lower = np.linspace(0, joint.first_yield, 7)
+    np.testing.assert_allclose(plastic_force(joint, lower), paper_force(joint, lower), rtol=1e-14)
+    assert winkler_pressure(joint, lower[-1]) == pytest.approx(c * 300.0, rel=1e-14)
+    elastic, deep = replace(joint, yield_stress=None), 10 * joint.first_yield
+    assert plastic_force(elastic, deep) == paper_force(joint, deep) > plastic_force(joint, deep)
+    assert plastic_peak(elastic, deep) == winkler_pressure(joint, deep)
+
+
+def test_at_first_touch_there_is_nothing():
+    """No force, pressure or stiffness at delta = 0, a little beyond; no floating point trouble on the way."""
+    with np.errstate(all="raise"):
+        for law in (plastic_force, plastic_stiffness, plastic_peak):
+            nothing, little = law(JOINT, np.array([0.0, 1e-30]))
+            assert nothing == 0 < little
+
+
+def test_plastic_law_joins_the_elastic_one_smoothly():
+    """The same force and slope at delta0; above it less and less than elastic."""
+    delta0 = JOINT.first_yield
+    assert 0.85 * JOINT.E_star * delta0 / JOINT.radius == pytest.approx(JOINT.yield_stress)
+    elastic, plastic = LAWS["paper"], LAWS["paper-plastic"]
+    near = delta0 * np.array([1 - 1e-12, 1 + 1e-12])
+    assert plastic.force(JOINT, near) == pytest.approx(elastic.force(JOINT, near), rel=1e-8)
+    assert plastic.stiffness(JOINT, near) == pytest.approx(elastic.stiffness(JOINT, near), rel=1e-5)
+    deep = np.linspace(1.01 * delta0, 2 * JOINT.clearance, 20)
+    ratio = plastic.force(JOINT, deep) / elastic.force(JOINT, deep)
+    assert (np.diff(ratio) < 0).all()
+    assert ratio[0] < 1
+
+
+def test_far_beyond_yield_the_chord_is_under_the_yield_stress():
+    """P -> 2 sigY l, and no digit is lost on the way."""
+    soft = LawJoint(radius=1.0, clearance=1e-3, E_star=1.0, yield_stress=1e-12, k=0.8, c=1.3)
+    delta = np.array([0.1, 1.0]) * 1e-3
+    u = soft.first_yield / delta
+    ratio = plastic_force(soft, delta) / (2 * 1.3e-12 * semi_chord(soft, delta))
+    np.testing.assert_allclose(ratio, 1 - u / 4, rtol=0, atol=2e-14)  # series of eq. 11 for small delta0/delta
+    slope = 1.3e-12 * semi_chord(soft, delta) / delta * 1e-3 / (1e-3 + delta)  # of 2 c sigY l
+    np.testing.assert_allclose(plastic_stiffness(soft, delta) / slope, 1, rtol=2 * u.max())
+
+
+@pytest.mark.parametrize("delta", DEPTHS)
+def test_winkler_law_is_the_force_of_the_foundation(delta):
+    eps, dR = contact_angle(delta), JOINT.clearance
+
+    def vertical(phi):
+        spring = 0.85 * JOINT.E_star / JOINT.radius
+        return spring * (delta * np.cos(phi) - dR * (1 - np.cos(phi))) * np.cos(phi) * JOINT.radius
+
+    expected = 2 * quad(vertical, 0, eps, epsabs=0, epsrel=1e-12)[0]
+    assert LAWS["winkler"].force(JOINT, delta) == pytest.approx(expected, rel=1e-10)
+
+
+def test_winkler_keeps_its_digits_at_first_touch():
+    """P -> k E* (4/3) delta sqrt(2 delta/dR): the leading term of the integral."""
+    delta = JOINT.clearance * 1e-12
+    leading = 0.85 * JOINT.E_star * 4 / 3 * delta * np.sqrt(2e-12)
+    assert winkler_force(JOINT, np.array(delta)) == pytest.approx(leading, rel=1e-9)
+
+
+@pytest.mark.parametrize("delta", DEPTHS)
+def test_liu_is_the_force_of_the_ellipse(delta):
+    p0 = JOINT.E_star * delta / (2 * JOINT.radius)
+    l = 2 * JOINT.radius * np.sin(contact_angle(delta) / 2)  # noqa: E741
+    # x = l sin(t) takes the root out of the integrand
+    expected = 2 * l * quad(lambda t: p0 * np.cos(t) ** 2, 0, np.pi / 2)[0]
+    assert LAWS["liu"].force(JOINT, delta) == pytest.approx(expected, rel=1e-10)
+    assert pytest.approx(np.pi / 2) == LIU
+
+
+@pytest.mark.parametrize("name", ["paper", "paper-plastic", "winkler", "liu"])
+def test_angle_is_that_of_overlapping_circles(name):
+    P = LAWS[name].force(JOINT, DEPTHS)
+    assert LAWS[name].angle(JOINT, P) == pytest.approx(contact_angle(DEPTHS), rel=1e-9)
+    assert chord_angle(JOINT, np.array(0.0)) == 0
+
+
+@pytest.mark.parametrize("name", ["paper", "paper-plastic", "winkler", "liu"])
+def test_inverse_finds_the_root(name):
+    """As brentq does, and back to the force from loads of many sizes."""
+    law = LAWS[name]
+    loads = law.force(JOINT, 2 * JOINT.clearance) * np.array([1e-9, 1e-3, 0.2, 0.7, 1.0])
+    found = law.displacement(JOINT, loads)
+    for P, delta in zip(loads, found, strict=True):
+        root = brentq(lambda d, P=P: law.force_at(JOINT, np.array(d)) - P, 0, 0.1, xtol=1e-18, rtol=1e-14)
+        assert delta == pytest.approx(root, rel=1e-9)
+    assert law.force(JOINT, found) == pytest.approx(loads, rel=1e-12)

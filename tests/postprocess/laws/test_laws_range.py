@@ -1,0 +1,174 @@
+"""What holds for every law: derivative, inverse, units, and a word at the end of the range."""
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from archord.postprocess.laws.law_joint import LawJoint, LawRangeError, LawRangeWarning
+from archord.postprocess.laws.law_tables import laws_as_markdown
+from archord.postprocess.laws.laws import LAWS, find_law
+from archord.postprocess.laws.monotone_root import monotone_root
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene
+
+JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, yield_stress=300.0, length=11.0, plane="strain", nu=0.3)
+WITH_DISPLACEMENT = [name for name, law in LAWS.items() if law.gives_displacement]
+SCENES = Path(__file__).parents[3] / "scenes"
+
+
+@pytest.fixture(autouse=True)
+def _warnings_are_errors():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+@pytest.mark.parametrize("name", WITH_DISPLACEMENT)
+def test_stiffness_is_the_derivative(name):
+    """Central differences within the range, away from the kink in curvature at first yield."""
+    law = LAWS[name]
+    delta = law.limit(JOINT) * np.array([1e-4, 0.05, 0.21, 0.6, 0.9])
+    h = 1e-5 * delta
+    slope = (law.force(JOINT, delta + h) - law.force(JOINT, delta - h)) / (2 * h)
+    assert law.stiffness(JOINT, delta) == pytest.approx(slope, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", WITH_DISPLACEMENT)
+def test_displacement_inverts_force(name):
+    """For a table of any shape, from first touch to the end of the range."""
+    law = LAWS[name]
+    delta = law.limit(JOINT) * np.array([[0.0, 1e-9, 1e-3], [0.3, 0.8, 1.0]])
+    P = law.force(JOINT, delta)
+    assert P.shape == delta.shape
+    assert P[0, 0] == 0
+    assert (np.diff(P.ravel()) > 0).all()
+    assert law.displacement(JOINT, P) == pytest.approx(delta, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_units_do_not_matter(name):
+    """In millimetres and MPa or in metres and Pa, the dimensionless state is the same."""
+    law = LAWS[name]
+    metres = LawJoint(7e-3, 3e-5, 1.2e11, yield_stress=3e8, length=11e-3, plane="strain", nu=0.3)
+    a = law.at_load(JOINT, 0.02 * JOINT.E_star * JOINT.clearance)
+    b = law.at_load(metres, 0.02 * metres.E_star * metres.clearance)
+    assert a.peak_pressure / JOINT.E_star == pytest.approx(b.peak_pressure / 1.2e11, rel=1e-9, nan_ok=True)
+    assert a.angle == pytest.approx(b.angle, rel=1e-9, nan_ok=True)
+    assert a.stiffness / JOINT.E_star == pytest.approx(b.stiffness / 1.2e11, rel=1e-9, nan_ok=True)
+    if law.gives_displacement:
+        assert a.delta / 7.0 == pytest.approx(b.delta / 7e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", WITH_DISPLACEMENT)
+def test_outside_the_range_every_law_says_so(name):
+    """nan and a warning, an error on request; inside no word."""
+    law, inside = LAWS[name], LAWS[name].limit(JOINT) * np.array([0.0, 0.5, 1.0])
+    assert np.isfinite(law.force(JOINT, inside)).all()
+    both = law.limit(JOINT) * np.array([-0.1, 0.5, 1.01])
+    with pytest.warns(LawRangeWarning, match=re.escape(f"{name}: delta = ")):
+        P = law.force(JOINT, both)
+    assert np.isnan(P[[0, 2]]).all()
+    assert P[1] == law.force(JOINT, both[1])
+    with pytest.raises(LawRangeError, match="range: "):
+        law.force(JOINT, both, "raise")
+    largest = law.force(JOINT, law.limit(JOINT))
+    with pytest.warns(LawRangeWarning, match="E\\* dR is outside"):
+        assert np.isnan(law.displacement(JOINT, 1.01 * largest))
+    with pytest.raises(LawRangeError):
+        law.displacement(JOINT, -largest, "raise")
+
+
+def test_extrapolation_ends_with_the_formula():
+    """Hu et al.'s formula goes on, Johnson's has no number beyond its load limit."""
+    dR = JOINT.clearance
+    with pytest.warns(LawRangeWarning):
+        assert LAWS["paper"].force(JOINT, 5 * dR, "extrapolate") > LAWS["paper"].force(JOINT, 2 * dR)
+    with pytest.warns(LawRangeWarning):
+        assert np.isnan(LAWS["johnson"].force(JOINT, dR, "extrapolate"))
+
+
+def test_half_space_pressure_has_its_own_range():
+    """Johnson's force goes further than Hertz's pressure."""
+    P = JOINT.E_star * JOINT.clearance
+    assert np.isfinite(LAWS["johnson"].displacement(JOINT, P))
+    with pytest.warns(LawRangeWarning, match="p0 and eps are Hertz's"):
+        assert np.isnan(LAWS["johnson"].peak_pressure(JOINT, P))
+    with pytest.raises(LawRangeError):
+        LAWS["johnson"].angle(JOINT, P, "raise")
+    with pytest.warns(LawRangeWarning):
+        assert LAWS["johnson"].peak_pressure(JOINT, P, "extrapolate") > 0
+    with pytest.warns(LawRangeWarning):
+        assert np.isnan(LAWS["hertz"].peak_pressure(JOINT, P))
+
+
+@pytest.mark.parametrize("name", ["paper", "paper-plastic", "winkler", "liu", "persson"])
+def test_thin_clearance_laws_refuse_a_wide_one(name):
+    wide = LawJoint(radius=1.0, clearance=0.3, E_star=1.0, yield_stress=0.01)
+    with pytest.warns(LawRangeWarning, match="no small clearance"):
+        assert np.isnan(LAWS[name].at_load(wide, 0.001).peak_pressure)
+
+
+def test_persson_refuses_bodies_with_beta():
+    unlike = LawJoint(radius=1.0, clearance=0.01, E_star=1.0, dundurs_alpha=0.5, dundurs_beta=0.14)
+    with pytest.warns(LawRangeWarning, match="beta = 0.14 is not zero"):
+        assert np.isnan(LAWS["persson"].angle(unlike, 0.01))
+    with pytest.warns(LawRangeWarning):
+        assert LAWS["persson"].angle(unlike, 0.01, "extrapolate") > 0
+
+
+def test_what_a_law_needs_or_lacks_is_a_sentence():
+    bare = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5)
+    with pytest.raises(InputError, match="paper-plastic: this law needs yield_stress"):
+        LAWS["paper-plastic"].force(bare, 0.01)
+    with pytest.raises(InputError, match="needs length"):
+        LAWS["lankarani-nikravesh"].force(bare, 0.01)
+    with pytest.raises(InputError, match="gives no displacement"):
+        LAWS["persson"].displacement(bare, 1.0)
+    with pytest.raises(InputError, match="gives no contact angle"):
+        LAWS["esdu-78035"].angle(bare, 1.0)
+    with pytest.raises(InputError, match="did you mean radzimovsky"):
+        find_law("radzimowsky")
+
+
+@pytest.mark.parametrize(
+    "values", [{"radius": 0.0}, {"clearance": -1.0}, {"E_star": float("nan")}, {"dundurs_alpha": 1.5}, {"length": 0.0}]
+)
+def test_values_that_make_no_joint_are_refused(values):
+    with pytest.raises(InputError, match=next(iter(values))):
+        LawJoint(**({"radius": 1.0, "clearance": 0.01, "E_star": 1.0} | values))
+
+
+def test_joint_of_a_scene():
+    """Like bodies have neither alpha nor beta; a rigid pin has alpha = 1, and beta from the block alone."""
+    steel = LawJoint.from_scene(load_scene(SCENES / "steel_pin.toml"))
+    assert (steel.radius, steel.clearance, steel.dundurs_alpha, steel.dundurs_beta) == (10.0, 0.05, 0.0, 0.0)
+    assert steel.E_star == pytest.approx(105000 / 0.91)
+    assert steel.yield_stress == pytest.approx(0.002 * steel.E_star)
+    rigid = LawJoint.from_scene(load_scene(SCENES / "rigid_pin.toml"))
+    assert rigid.dundurs_alpha == 1.0
+    assert rigid.dundurs_beta == pytest.approx((1 - 0.34) / 2)  # (kappa - 1)/(kappa + 1), kappa = (3 - nu)/(1 + nu)
+    soft = LawJoint.from_scene(load_scene(SCENES / "steel_pin.toml", ["block.E=70000"]))
+    assert soft.dundurs_alpha == pytest.approx(0.5)
+    assert soft.dundurs_beta == pytest.approx(0.5 * 0.4 / 1.4)  # like nu: beta = alpha (1 - 2 nu)/(2 (1 - nu))
+
+
+def test_roots_of_rising_functions():
+    """Against the inverse, over twenty decades; nothing for nothing, nan for nan."""
+    target = np.array([0.0, 1e-12, 1e-3, 1.0, 1e8, np.nan, -1.0])
+    root = monotone_root(lambda x: x**1.5, lambda x: 1.5 * np.sqrt(x), target, 1.0)
+    assert root[:5] == pytest.approx(target[:5] ** (2 / 3), rel=1e-13)
+    assert np.isnan(root[5])
+    assert root[6] == 0
+    bounded = monotone_root(np.tanh, lambda x: 1 / np.cosh(np.minimum(x, 99.0)) ** 2, np.array([0.5, 2.0]), 1.0)
+    assert bounded[0] == pytest.approx(np.arctanh(0.5), rel=1e-13)
+    assert np.isnan(bounded[1])
+    concave = monotone_root(np.log1p, lambda x: 1 / (1 + x), target[:4], 1e-3)
+    assert concave == pytest.approx(np.expm1(target[:4]), rel=1e-13)
+
+
+def test_documentation_is_what_the_command_prints():
+    """docs/laws.md holds the output of `archord laws --markdown`, number for number."""
+    assert laws_as_markdown() in (Path(__file__).parents[3] / "docs" / "laws.md").read_text(encoding="utf-8")

@@ -1,0 +1,116 @@
+"""What is exported is what the run holds."""
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+import pyvista
+
+from archord.cli import run as command
+from archord.postprocess.run_result import Run
+from archord.postprocess.vtk_export import export_vtk
+
+_QUADRATIC_TRIANGLE = 22  # VTK's number
+
+
+@pytest.fixture(scope="module")
+def exported(runs, tmp_path_factory):
+    """The run that yields as VTK files."""
+    folder = tmp_path_factory.mktemp("vtk")
+    return folder, export_vtk(Run(runs["plastic"]), folder)
+
+
+def test_vtk_reads_back_the_fields(runs, exported):
+    """pyvista finds every step at its delta: the nodes, the curved triangles, displacement, stress and PEEQ of
+    fields.h5."""
+    run, reader = Run(runs["plastic"]), pyvista.get_reader(str(exported[0] / "run.pvd"))
+    np.testing.assert_allclose(reader.time_values, run.columns["delta"], rtol=1e-15)
+    for step in (1, run.steps):
+        reader.set_active_time_value(reader.time_values[step - 1])
+        mesh, fields = reader.read()[0], run.fields(step)
+        assert set(mesh.celltypes) == {_QUADRATIC_TRIANGLE}
+        np.testing.assert_array_equal(mesh.cells.reshape(-1, 7)[:, 1:], fields.cells)
+        np.testing.assert_array_equal(mesh.points[:, :2], fields.coordinates)
+        np.testing.assert_array_equal(mesh["displacement"][:, :2], fields.displacement)
+        with h5py.File(runs["plastic"] / "fields.h5") as file:
+            for name in ("peeq", "von_mises", "mean_stress", "contact_pressure"):
+                np.testing.assert_array_equal(mesh[name], file[f"{name}/{step:04d}"][()])
+    assert mesh["peeq"].max() > 0
+    # the curved quarters: the area of the pin is that of a quarter circle, which straight triangles miss by 1.7e-3
+    pin = mesh.threshold([1, 1], scalars="body").triangulate().compute_cell_sizes()["Area"].sum()
+    assert pin == pytest.approx(np.pi / 4, rel=6e-4)
+
+
+def test_vtk_has_the_contact_as_another_piece(runs, exported):
+    """Lines along both arcs; warped by their displacement they are where contact.h5 has them."""
+    run, reader = Run(runs["plastic"]), pyvista.get_reader(str(exported[0] / "run.pvd"))
+    reader.set_active_time_value(reader.time_values[-1])
+    arcs, contact = reader.read()[1], run.contact()
+    for number, side in enumerate(("pin", "hole"), 1):
+        chosen = arcs["side"] == number
+        deformed = (arcs.points + arcs["displacement"])[chosen, :2]
+        np.testing.assert_allclose(deformed, contact[side].coordinates.reshape(-1, 2), atol=1e-14)
+        np.testing.assert_array_equal(arcs["pressure"][chosen], contact[side].pressure.ravel())
+    n, q = contact["pin"].angle.shape
+    assert arcs.n_cells == (q - 1) * (n + len(contact["hole"].angle))
+
+
+def test_csv_reads_back_the_tables(runs, tmp_path):
+    """history.csv number by number; contact and nodes to the digits written; units in the headings."""
+    assert command(["export", str(runs["plastic"]), "--csv", str(tmp_path / "csv"), "--step", "2"]) == 0
+    run = Run(runs["plastic"])
+    history = pd.read_csv(tmp_path / "csv" / "history.csv")
+    pd.testing.assert_frame_equal(history, pd.read_csv(runs["plastic"] / "history.csv"))
+    contact = pd.read_csv(tmp_path / "csv" / "contact.csv")
+    assert contact.groupby("step").size().tolist() == [len(run.pressure())] * run.steps
+    third = contact[contact["step"] == 3]
+    np.testing.assert_allclose(third["pressure [MPa]"], run.pressure(3)["pressure"], rtol=1e-11, atol=1e-300)
+    nodes, fields = pd.read_csv(tmp_path / "csv" / "nodes_0002.csv"), run.fields(2)
+    np.testing.assert_allclose(nodes[["ux [mm]", "uy [mm]"]], fields.displacement, rtol=1e-11, atol=1e-300)
+    cells = pd.read_csv(tmp_path / "csv" / "cells_0002.csv")
+    np.testing.assert_allclose(cells["peeq"], fields.peeq, rtol=1e-11)
+    corners = nodes[["x [mm]", "y [mm]"]].to_numpy()[cells[["node1", "node2", "node3"]].to_numpy() - 1]
+    np.testing.assert_allclose(corners.mean(axis=1), cells[["x [mm]", "y [mm]"]], atol=1e-9)
+
+
+def test_a_step_alone(runs, tmp_path, capsys):
+    """Two files and the collection, which are printed."""
+    assert command(["export", str(runs["elastic"]), "--vtk", str(tmp_path / "new" / "vtk"), "--step", "4"]) == 0
+    names = {file.name for file in (tmp_path / "new" / "vtk").iterdir()}
+    assert names == {"run.pvd", "bodies_0004.vtu", "contact_0004.vtu"}
+    assert "2 .vtu files beside it, bodies_0004.vtu to contact_0004.vtu" in capsys.readouterr().out
+
+
+def test_nothing_is_overwritten_without_force(runs, tmp_path, capsys):
+    """The first of the files in the way is named, and none is changed; --force replaces them."""
+    (tmp_path / "run.pvd").write_text("mine")
+    arguments = ["export", str(runs["coarse"]), "--vtk", str(tmp_path)]
+    assert command(arguments) == 2
+    said = f"{tmp_path}/run.pvd: is there already; choose another folder, or overwrite with --force.\n"
+    assert capsys.readouterr().err == said
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["mine"]
+    assert command([*arguments, "--force"]) == 0
+    assert len(list(tmp_path.iterdir())) == 1 + 2 * 6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["{coarse}"], "export: give --vtk DIR, --csv DIR or both."),
+        (["{coarse}", "--vtk", "new", "--step", "7"], "{coarse}: has no step 7; its accepted steps are 1 to 6."),
+        (
+            ["{coarse}", "--csv", "{coarse}", "--force"],
+            "{coarse}/history.csv: cannot be written: it belongs to the run",
+        ),
+        (["nowhere", "--csv", "new"], "nowhere: is not a run folder: scene.toml is missing."),
+        (["{coarse}", "--csv", "{coarse}/run.json"], "{coarse}/run.json: cannot be made: File exists."),
+    ],
+)
+def test_what_cannot_be_exported_is_one_sentence(runs, tmp_path, monkeypatch, capsys, arguments, said):
+    """Exit code 2; nothing is made."""
+    monkeypatch.chdir(tmp_path)
+    assert command(["export", *(a.format(**runs) for a in arguments)]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith(said.format(**runs))
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,128 @@
+"""``archord show`` as a user runs it."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import matplotlib.image
+import pytest
+from mpi4py import MPI
+
+from archord.benchmarks.paper.joint import paper_joint
+from archord.cli import run as command
+from archord.output.run import solve_scene
+from archord.postprocess.run_result import Run
+
+PICTURES = ["force.png", "pressure.png", "field.png", "iterations.png"]
+
+
+@pytest.fixture(scope="module")
+def odd(tmp_path_factory):
+    """A rigid pin without fields, a ring, and a run that does not get through its first step."""
+    scenes = {
+        "rigid": paper_joint(0.2, 2, pin={"rigid": True}, output={"fields": False}),
+        "ring": paper_joint(
+            0.2, joint={"model": "ring"}, load={"displacement": None, "relative_force": 0.005, "steps": 2}
+        ),
+        "stuck": paper_joint(0.2, 1, analysis={"max_iterations": 2}, stepping={"minimum": 1.0}),
+    }
+    folder = tmp_path_factory.mktemp("odd")
+    for name, scene in scenes.items():
+        (folder / name).mkdir()
+        solve_scene(scene, folder / name, MPI.COMM_SELF)
+    return {name: folder / name for name in scenes}
+
+
+@pytest.fixture
+def copy(runs, tmp_path):
+    """A copy of a run to be broken."""
+    return shutil.copytree(runs["coarse"], tmp_path / "run")
+
+
+def test_show_prints_the_run_and_draws_it(runs, tmp_path, capsys):
+    """Every step of history.csv in the table, the peaks below, and pictures that are not empty."""
+    assert command(["show", str(runs["plastic"]), "-o", str(tmp_path / "new")]) == 0
+    printed, run = capsys.readouterr().out, Run(runs["plastic"])
+    rows = [line.split() for line in printed.splitlines()]
+    for k in range(run.steps):
+        row = next(r for r in rows if r and r[0] == str(k + 1))
+        for place, name in ((1, "delta"), (3, "P"), (5, "p0"), (9, "iterations")):
+            assert float(row[place]) == pytest.approx(run.columns[name][k], rel=1e-5)
+    assert f"P = {max(run.columns['P']):.6g} " in printed
+    first = next(k for k, peeq in enumerate(run.columns["peeq_max"]) if peeq > 0)
+    assert f"first seen at step {first + 1} " in printed
+    assert printed.splitlines()[-4:] == [str(tmp_path / "new" / name) for name in PICTURES]
+    for name in PICTURES:
+        pixels = matplotlib.image.imread(tmp_path / "new" / name)
+        assert pixels.std() > 0.05
+
+
+@pytest.mark.parametrize("name", ["ring", "rigid"])
+def test_show_draws_other_joints(odd, capsys, name):
+    """A whole ring; without fields everything but them, and a sentence for those."""
+    assert command(["show", str(odd[name])]) == 0
+    printed = capsys.readouterr().out
+    there = {file.name for file in odd[name].glob("*.png")}
+    without = "no picture of the field: the run was solved with output.fields = false."
+    assert there == set(PICTURES) - ({"field.png"} if name == "rigid" else set())
+    assert (without in printed) == (name == "rigid")
+
+
+def test_a_run_without_a_step_tells_why(odd, capsys):
+    """Its message, no history, no picture."""
+    assert command(["show", str(odd["stuck"])]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith(f"{odd['stuck']}: stopped; 0 of 1 steps: no equilibrium at delta")
+    assert "no picture: no step was accepted." in printed
+    assert not list(odd["stuck"].glob("*.png"))
+
+
+def test_a_killed_run_is_shown_as_far_as_it_came(copy, capsys):
+    """run.json still says running."""
+    report = json.loads((copy / "run.json").read_text())
+    (copy / "run.json").write_text(json.dumps(report | {"status": "running"}))
+    history = (copy / "history.csv").read_bytes().splitlines(keepends=True)
+    (copy / "history.csv").write_bytes(b"".join(history[:4]) + history[4][:20])
+    assert command(["show", str(copy)]) == 0
+    assert capsys.readouterr().out.startswith(f"{copy}: running, or killed (if no archord works there, --restart ")
+    assert Run(copy).steps == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "length", "said"),
+    [
+        ("fields.h5", 5000, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
+        ("fields.h5", 0, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
+        ("fields.h5", None, "{}: is not a complete run folder: fields.h5 is missing."),
+        ("contact.h5", 3000, "{}/contact.h5: cannot be read as the contact of a run."),
+        ("contact.h5", None, "{}: is not a run folder: contact.h5 is missing."),
+        ("run.json", 100, "{}/run.json: cannot be read as the report of a run."),
+        ("run.json", None, "{}: is not a run folder: run.json is missing."),
+        ("history.csv", 30, "{}/history.csv: cannot be read as the history of a run."),
+        ("scene.toml", 25, "{}/scene.toml: is not valid TOML: "),
+    ],
+)
+def test_a_broken_run_is_one_sentence(copy, capsys, name, length, said):
+    """A file cut short or missing: exit code 2, no table, no picture."""
+    content = (copy / name).read_bytes()
+    (copy / name).unlink()
+    if length is not None:
+        (copy / name).write_bytes(content[:length])
+    assert command(["show", str(copy)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(said.format(copy))
+    assert err.count("\n") == 1
+    assert not list(copy.glob("*.png"))
+
+
+def test_tables_load_no_plotting_and_no_solver(runs):
+    """Nor pandas."""
+    code = (
+        "import sys; from archord.cli import run; code = run(sys.argv[1:]); "
+        "print(code, {'matplotlib', 'pandas', 'dolfinx', 'scipy', 'pyvista'} & {*sys.modules})"
+    )
+    command = [sys.executable, "-c", code, "show", str(runs["coarse"]), "--no-pictures"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert result.stdout.splitlines()[-1] == "0 set()", result.stderr

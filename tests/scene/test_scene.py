@@ -1,0 +1,253 @@
+"""Scene files: what is accepted, what is refused, and in which words."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene, parse_scene, resolved
+from archord.scene.reference import TOP_LEVEL, example, reference
+from archord.scene.scene import Scene
+
+
+def basic() -> dict:
+    return {
+        "joint": {"radius": 10.0, "relative_clearance": 0.005},
+        "pin": {"E": 210000.0, "nu": 0.3},
+        "block": {"E": 210000.0, "nu": 0.3},
+        "load": {"displacement": 2.0},
+    }
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "said"),
+    [
+        ("joint", "radius", -1.0, "scene: joint.radius = -1.0 must be greater than 0."),
+        ("joint", "radius", "ten", 'scene: joint.radius = "ten" must be a number.'),
+        ("joint", "radius", True, "scene: joint.radius = true must be a number."),
+        ("joint", "radius", float("nan"), "scene: joint.radius = NaN must be a finite number."),
+        ("joint", "radius", float("inf"), "scene: joint.radius = Infinity must be a finite number."),
+        (
+            "joint",
+            "relative_clearance",
+            0.0,
+            "= 0.0 must be a clearance: between 1e-6 and 0.5 times the radius.",
+        ),
+        ("joint", "relative_clearance", 0.9, "must be a clearance: between 1e-6 and 0.5 times the radius."),
+        ("joint", "clearance", 0.05, "= 0.05 must not be given together with relative_clearance."),
+        ("joint", "element_size", 20.0, "must be between 1e-4 and 0.5 times the radius."),
+        ("joint", "block_size", 15.0, "must be at least twice the radius of the hole."),
+        ("joint", "raduis", 1.0, "did you mean radius?"),
+        ("block", "nu", 0.5, "scene: block.nu = 0.5 must be at least -0.999 and at most 0.499999."),
+        ("block", "rigid", True, "is not a known key"),
+        ("block", "hardening", 1.0, "needs a yield_stress."),
+        ("block", "yield_stress", 0.0, "must be greater than 0."),
+        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times block.E."),
+        ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
+        ("pin", "rigid", True, "is not for a rigid pin."),
+        ("load", "steps", 2.5, "must be a whole number or a list of them."),
+        ("load", "steps", 0, "must be at least 1 and at most 10000."),
+        ("load", "displacement", 200.0, "must not exceed half the radius (5)."),
+    ],
+)
+def test_a_bad_value_is_refused_in_one_sentence(section, key, value, said):
+    """File, key, value and what is allowed."""
+    data = basic()
+    data[section][key] = value
+    with pytest.raises(InputError) as caught:
+        parse_scene(data)
+    sentence = str(caught.value)
+    assert said in sentence
+    assert f"scene: {section}." in sentence
+    assert "\n" not in sentence
+
+
+@pytest.mark.parametrize("section", ["joint", "pin", "block", "load"])
+def test_a_missing_section_is_named(section):
+    """Sections without defaults are required."""
+    data = basic()
+    del data[section]
+    with pytest.raises(InputError, match=f"{section} is missing"):
+        parse_scene(data)
+
+
+def test_files_that_are_no_scenes(tmp_path):
+    """Unreadable, not TOML, not text: one sentence each that names the file."""
+    bad = tmp_path / "bad.toml"
+    bad.write_text("[joint\n")
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    for path, said in (
+        (bad, "is not valid TOML"),
+        (binary, "UTF-8"),
+        (tmp_path, "cannot be read"),
+        ("nope", "cannot be read"),
+    ):
+        with pytest.raises(InputError, match=said) as caught:
+            load_scene(path)
+        assert str(caught.value).startswith(str(path))
+
+
+def test_overrides_replace_values_and_alternatives(tmp_path):
+    """--set wins over the file, drops the alternative key, and is named when it is at fault."""
+    path = tmp_path / "scene.toml"
+    path.write_text(resolved(parse_scene(basic())))
+    scene = load_scene(path, ["joint.clearance=.01", "load.steps=3", "analysis.plane=stress", "block.yield_stress=300"])
+    assert scene.joint.dR == 0.01
+    assert (scene.load.steps, scene.analysis.plane, scene.plastic) == (3, "stress", True)
+    assert not load_scene(path, ["block.yield_stress=300", "block.yield_stress="]).plastic
+    assert load_scene(path, ["pin.rigid=true"]).pin.solid is None
+    with pytest.raises(InputError, match=r"^--set joint\.radius=-1: joint\.radius must be greater than 0\.$"):
+        load_scene(path, ["joint.radius=-1"])
+    for malformed in ("radius=3", "joint.radius", "joint=3", "a.b.c=1"):
+        with pytest.raises(InputError, match=r"must read section\.key=value"):
+            load_scene(path, [malformed])
+
+
+def test_the_resolved_scene_is_the_same_scene():
+    """What a run folder keeps solves to the same numbers."""
+    for change in (
+        {},
+        {"pin": {"rigid": True}},
+        {"block": {"E": 1.0, "nu": 0.2, "yield_stress": 0.01, "hardening": 0.1}},
+    ):
+        scene = parse_scene(basic() | change)
+        again = parse_scene(tomllib.loads(resolved(scene)))
+        for a, b in ((scene, again),):
+            assert (a.joint.dR, a.joint.h, a.joint.W, a.target, a.E_star) == (
+                b.joint.dR,
+                b.joint.h,
+                b.joint.W,
+                b.target,
+                b.E_star,
+            )
+            assert (a.pin.solid, a.block, a.analysis, a.load) == (b.pin.solid, b.block, b.analysis, b.load)
+
+
+def test_the_example_shows_every_key_and_loads():
+    """Each key of the model stands in the example, with its description."""
+    text = example()
+    parse_scene(tomllib.loads(text))
+    for section, info in Scene.model_fields.items():
+        if section in TOP_LEVEL:
+            assert f"\n{section} = " in text
+            continue
+        assert f"[{section}]" in text
+        for key, field in info.annotation.model_fields.items():
+            assert f"{key} = " in text
+            assert field.description in text
+
+
+def test_the_reference_page_is_that_of_the_model():
+    """docs/scene.md is what `archord scene --reference` prints."""
+    assert (Path(__file__).parents[2] / "docs" / "scene.md").read_text() == reference()
+
+
+def test_contact_modulus_of_plane_strain_and_stress():
+    """1/E* = sum (1 - nu^2)/E in plane strain, sum 1/E in plane stress; a rigid pin adds nothing."""
+    data = basic()
+    assert parse_scene(data).E_star == pytest.approx(105000 / 0.91, rel=1e-14)
+    assert parse_scene(data | {"analysis": {"plane": "stress"}}).E_star == pytest.approx(105000, rel=1e-14)
+    assert parse_scene(data | {"pin": {"rigid": True}}).E_star == pytest.approx(210000 / 0.91, rel=1e-14)
+
+
+def test_a_mesh_of_too_many_triangles_is_refused():
+    """With the key to change; the sizes that are used are far below."""
+    data = basic()
+    data["joint"] |= {"relative_element_size": 1e-4, "growth": 0.01}
+    with pytest.raises(InputError, match=r"relative_element_size = 0.0001 with growth = 0.01 would make about .e\+06"):
+        parse_scene(data)
+    data["joint"] |= {"growth": 0.25}
+    assert parse_scene(data).joint.expected_cells < 1e6
+
+
+@pytest.mark.parametrize("value", [2, 10**30])
+def test_a_scene_of_a_newer_format_is_refused_for_that_alone(value):
+    """Whatever else it holds, which may mean something there."""
+    with pytest.raises(InputError) as caught:
+        parse_scene(basic() | {"format": value, "friction": {"mu": 0.1}})
+    assert str(caught.value) == (
+        f"scene: format = {value} is newer than this archord, which reads format 1; use a newer archord."
+    )
+
+
+@pytest.mark.parametrize("value", [1.0, True, "1", 0, -1, [1], {"a": 1}])
+def test_a_format_that_is_no_version_is_refused(value):
+    """A version is a whole number from 1."""
+    with pytest.raises(InputError, match=r"^scene: format = .* must be a whole number, the version .*: 1\.$"):
+        parse_scene(basic() | {"format": value})
+
+
+def test_scenes_say_their_format_when_written():
+    """The resolved scene does; where it is not said it is 1."""
+    assert parse_scene(basic()) == parse_scene(basic() | {"format": 1})
+    assert tomllib.loads(resolved(parse_scene(basic())))["format"] == 1
+    assert tomllib.loads(example())["format"] == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"x = " + b"9" * 5000, "is not valid TOML"),
+        (b"x = " + b"[" * 20000, "are nested too deeply"),
+        (b"a." * 100000 + b"b = 1", "dotted parts"),
+        (b"['a'" + b" . 'a'" * 100000 + b"]", "dotted parts"),
+        (b"# " + b"x" * 1000000, "larger than 1 MB"),
+        (b"".join(b"k%d = 1\n" % i for i in range(3000)), r"has 2984 more faults like these\."),
+        (b"x" * 5000 + b" = 1", "is not a known key"),
+        (b'"a\\nb" = 1', r'"a\\nb" = 1 is not a known key'),
+        (b"date = 0000-00-00", "is not valid TOML"),
+    ],
+    ids=["digits", "brackets", "dots", "header", "comment", "keys", "long key", "two-line key", "date"],
+)
+def test_monstrous_files_are_refused_briefly(tmp_path, content, said):
+    """In time and in words."""
+    path = tmp_path / "scene.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=said) as caught:
+        load_scene(path)
+    assert all(line.startswith(str(path)) and len(line) < 400 for line in str(caught.value).splitlines())
+
+
+def test_a_byte_order_mark_and_carriage_returns_change_nothing(tmp_path):
+    """What editors on Windows leave."""
+    path = tmp_path / "scene.toml"
+    text = resolved(parse_scene(basic()))
+    path.write_bytes(text.replace("\n", "\r\n").encode("utf-8-sig"))
+    assert load_scene(path) == parse_scene(tomllib.loads(text))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    length=st.integers(-60, 60),
+    stress=st.integers(-60, 60),
+    clearance=st.floats(-7, 0),
+    size=st.floats(-5, 0),
+    growth=st.floats(0.01, 2),
+    soft=st.floats(-10, 10),
+    delta=st.floats(-3, 4),
+)
+def test_whether_a_scene_is_accepted_does_not_depend_on_its_units(length, stress, clearance, size, growth, soft, delta):
+    """Units scaled by powers of two, which round nothing: the same verdict, the same expected mesh."""
+
+    def accepted(L: float, S: float) -> tuple[bool, float]:
+        data = {
+            "joint": {
+                "radius": 10.0 * L,
+                "clearance": 10.0**clearance * L,
+                "element_size": 10.0**size * L,
+                "growth": growth,
+            },
+            "pin": {"E": S, "nu": 0.3, "yield_stress": 1e-3 * S},
+            "block": {"E": 10.0**soft * S, "nu": 0.2},
+            "load": {"displacement": 10.0**delta},
+        }
+        try:
+            return True, parse_scene(data).joint.expected_cells
+        except InputError:
+            return False, 0.0
+
+    assert accepted(2.0**length, 2.0**stress) == accepted(1.0, 1.0)

@@ -1,0 +1,101 @@
+"""Pairs of contact points: none is missed, whatever the start of the search."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from archord.geometry import curve as curve_module
+from archord.geometry.curve import Curve, ProjectionError
+from archord.geometry.joint_mesh import Cells
+from archord.solver.contact.contact import Contact
+from tests.solver.parts import DR, contact_force, joint_parts, n_nodes, nodes_of
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_corrupted_start_does_not_change_the_forces(seed):
+    """Start facets drawn at random lead to the pairs, and the forces, of a search over the whole curve."""
+    parts = joint_parts(size=0.1)
+    contact, u = parts.contact, parts.pressed(1.5 * DR, noise=1e-4)
+    contact.search()
+    expected = contact_force(contact, u)
+    rng = np.random.default_rng(seed)
+    for pair in contact.pairings:
+        random = rng.integers(0, pair.curve.n_facets, len(pair.projection.facet))
+        pair.projection = replace(pair.projection, facet=random)
+    np.testing.assert_allclose(contact_force(contact, u), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_the_path_to_a_state_does_not_change_its_pairs():
+    """Pairs followed from far away, step by step, are those of a search from scratch."""
+    parts = joint_parts(size=0.1)
+    contact, u = parts.contact, parts.pressed(1.5 * DR)
+    pin = nodes_of(parts.V, parts.cells, Cells.PIN)
+    for slid in np.linspace(0.5, 0, 6):
+        v = u.copy()
+        v[pin, 0] += slid
+        contact.evaluate(v)
+    followed = contact_force(contact, u)
+    contact.search()
+    fresh = contact_force(contact, u)
+    assert np.abs(fresh).max() > 0
+    np.testing.assert_allclose(followed, fresh, rtol=0, atol=1e-12 * np.abs(fresh).max())
+
+
+def test_only_points_beyond_the_ends_have_no_partner():
+    """At rest every point within the arcs is paired; pressed down, those of the pin below the block's top still are."""
+    parts = joint_parts(size=0.1)
+    contact = parts.contact
+    for depth in (0.0, 1.5 * DR, 0.05):
+        u = parts.pressed(0.0)
+        u[nodes_of(parts.V, parts.cells, Cells.PIN), 1] -= depth
+        contact.evaluate(u)
+        pin, hole = (contact.state(side) for side in parts.sides)
+        below = parts.sides[0].point[..., 1] - depth < 0
+        assert below.any()
+        assert pin.found[below].all()
+        covered = parts.sides[1].point[..., 1] < -DR - depth
+        assert hole.found[covered].all()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("when", ["at rest", "moving"])
+def test_a_lost_point_is_an_error_on_every_rank(when, comm, monkeypatch):
+    """A projection that fails on one rank is raised by all, at the start and at any later evaluation: none waits."""
+    parts = joint_parts(comm)
+    rest = np.zeros((n_nodes(parts.V), 2))
+    parts.contact.evaluate(rest)
+    search = {"at rest": lambda: Contact(parts.sides), "moving": lambda: parts.contact.evaluate(rest)}[when]
+    lost = comm.size - 1
+    project = Curve._project
+
+    def fail(self, *arguments):
+        if comm.rank == lost:
+            raise ProjectionError("one point is lost")
+        return project(self, *arguments)
+
+    monkeypatch.setattr(Curve, "_project", fail)
+    with pytest.raises(ProjectionError, match="one point is lost"):
+        search()
+
+
+def test_a_point_that_does_not_converge_is_an_error(monkeypatch):
+    """It is not taken for a point without a partner."""
+    parts = joint_parts()
+    monkeypatch.setattr(curve_module, "_NEWTON_STEPS", 1)
+    with pytest.raises(ProjectionError, match="found no closest point"):
+        parts.contact.evaluate(parts.pressed(1.5 * DR, noise=1e-3))
+
+
+def test_sliding_out_of_the_pattern_extends_it():
+    """The matrix pattern grows with the pairs, and says so; a state seen before needs no more room."""
+    parts = joint_parts(size=0.1)
+    u = parts.pressed(1.5 * DR)
+    assert not parts.contact.evaluate(u)
+    before = parts.contact.pattern()[0].size
+    u[nodes_of(parts.V, parts.cells, Cells.PIN), 0] += 0.5
+    assert parts.contact.evaluate(u)
+    assert parts.contact.pattern()[0].size > before
+    assert not parts.contact.evaluate(u)

@@ -1,0 +1,192 @@
+"""One side of a contact: its facets on this rank, and its whole curve on every rank."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dolfinx.mesh import meshtags
+
+from archord.geometry.basis import bulk_quadrature, cell_basis, strain
+from archord.geometry.joint_mesh import Facets
+from archord.solver.contact.surface import ContactSide, _chain
+from tests.solver.parts import DR, ELASTIC, PERFECT, PLANE_STRESS, R, coordinates, joint_parts
+
+SIDES = {"pin": (0, R, np.array([0.0, -DR])), "hole": (1, R + DR, np.array([0.0, 0.0]))}
+BOTTOM = np.array([0.0, -R - DR])
+both_sides = pytest.mark.parametrize(("number", "radius", "centre"), SIDES.values(), ids=SIDES.keys())
+MATERIALS = {"elastic": ELASTIC, "plastic": PERFECT, "plane stress": PLANE_STRESS}
+every_material = pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS.keys())
+
+
+def trace_forms(side):
+    """Both sides of the trace inequality, ``(n, 12, 12)`` each, from strains of unit displacements of the cell's nodes.
+
+    The integral over the facet of sigma_n^2, and twice the elastic energy of the cell under the bulk's rule.
+    """
+    X, w = bulk_quadrature(2)
+    basis = cell_basis(side.V.mesh, 2, side.cells, X)
+    C = side.points.elastic_tangent
+    units = np.eye(12).reshape(12, 6, 2)
+    n = side.outward
+    sigma_n, eps = [], []
+    for unit in units:
+        u, nodes = unit.copy(), np.tile(np.arange(6, dtype=np.int32), (len(side.cells), 1))
+        s = strain(side.gradient, nodes, u) @ C
+        sigma_n.append(n[..., 0] ** 2 * s[..., 0] + n[..., 1] ** 2 * s[..., 1] + 2 * n[..., 0] * n[..., 1] * s[..., 2])
+        eps.append(strain(basis.gradient, nodes, u))
+    sigma_n, eps = np.stack(sigma_n, axis=1), np.stack(eps, axis=1)
+    trace = np.einsum("nq,naq,nbq->nab", side.weight, sigma_n, sigma_n)
+    return trace, np.einsum("nq,naqi,ij,nbqj->nab", basis.measure * w, eps, C, eps)
+
+
+@every_material
+def test_gamma_bounds_the_traction_by_the_energy(material):
+    """Integral over the facet of sigma_n^2 <= gamma a(v, v), for random displacements of every contact cell."""
+    parts = joint_parts(pin=material, block=material)
+    rng = np.random.default_rng(0)
+    for side in parts.sides:
+        trace, energy = trace_forms(side)
+        v = rng.normal(size=(len(side.cells), 500, 12))
+        left, right = (np.einsum("nka,nab,nkb->nk", v, form, v) for form in (trace, energy))
+        assert np.all(left <= side.gamma[:, None] * right)
+
+
+@every_material
+def test_gamma_is_sharp(material):
+    """On every contact cell some displacement attains the bound: power iteration finds it."""
+    parts = joint_parts(pin=material, block=material)
+    for side in parts.sides:
+        trace, energy = trace_forms(side)
+        step = np.linalg.pinv(energy, rcond=1e-10, hermitian=True) @ trace
+        v = np.random.default_rng(0).normal(size=(len(side.cells), 12))
+        for _ in range(300):
+            v = np.einsum("nab,nb->na", step, v)
+            v /= np.linalg.norm(v, axis=1)[:, None]
+        left, right = (np.einsum("na,nab,nb->n", v, form, v) for form in (trace, energy))
+        np.testing.assert_allclose(left / right, side.gamma, rtol=1e-6)
+
+
+def test_gamma_scales_as_stress_per_length():
+    """Ten times the modulus gives ten times gamma, half the cells about twice."""
+    from dataclasses import replace
+
+    soft, stiff = joint_parts(), joint_parts(pin=replace(ELASTIC, E=10 * ELASTIC.E))
+    np.testing.assert_allclose(stiff.sides[0].gamma, 10 * soft.sides[0].gamma, rtol=1e-12)
+    np.testing.assert_allclose(stiff.sides[1].gamma, soft.sides[1].gamma, rtol=1e-12)
+    fine = joint_parts(size=0.1)
+    assert np.median(fine.sides[1].gamma) / np.median(soft.sides[1].gamma) == pytest.approx(2, rel=0.2)
+
+
+@pytest.mark.mpi
+@both_sides
+def test_points_normals_and_weights(number, radius, centre, comm):
+    """Points on the arc, normals along the radius, weights that sum to its length: to the order of the geometry."""
+    side = joint_parts(comm).sides[number]
+    ray = side.point - centre
+    distance = np.linalg.norm(ray, axis=-1)
+    out = 1 if number == 0 else -1
+    assert np.abs(distance / radius - 1).max(initial=0) < 1e-5
+    assert np.abs(side.outward - out * ray / distance[..., None]).max(initial=0) < 1e-3
+    np.testing.assert_allclose(np.linalg.norm(side.outward, axis=-1), 1, rtol=1e-14)
+    total = comm.allreduce(side.weight.sum())
+    assert total == pytest.approx(side.curve.arc_length(np.array([1.0]))[-1, 0], rel=1e-8)
+    assert total == pytest.approx(np.pi / 2 * radius, rel=1e-5)
+
+
+@pytest.mark.mpi
+@both_sides
+def test_arc_position(number, radius, centre, comm):
+    """Angle from the bottom times radius, growing along the curve, whichever way it runs; the other end counts back."""
+    side = joint_parts(comm).sides[number]
+    s = side.arc_position(BOTTOM)
+    order = s.ravel() if s[0, 0] < s[-1, -1] else s.ravel()[::-1]
+    assert np.all(np.diff(order) > 0)
+    ray = side.point - centre
+    angle = np.arctan2(ray[..., 0], -ray[..., 1])
+    np.testing.assert_allclose(s[side.facet], radius * angle, rtol=0, atol=1e-5)
+    other = side.arc_position(centre + np.array([radius, 0.0]))
+    np.testing.assert_allclose(s + other, np.pi / 2 * radius, rtol=1e-5)
+
+
+@pytest.mark.mpi
+@both_sides
+def test_every_rank_holds_the_same_curve(number, radius, centre, comm):
+    """Nodes, their dofs and cells; each facet belongs to one rank, and its points lie where the curve has it."""
+    side = joint_parts(comm).sides[number]
+    for item in (side.curve.X, side.curve_cell_dofs, side.curve_dofs):
+        for other in comm.allgather(item):
+            np.testing.assert_array_equal(other, item)
+    facets = np.sort(np.concatenate(comm.allgather(side.facet)))
+    np.testing.assert_array_equal(facets, np.arange(side.curve.n_facets))
+    N, _, _ = side.curve.shapes(side.curve_xi[side.facet])
+    on_curve = np.einsum("nqa,nai->nqi", N, side.curve.X[side.curve.connectivity[side.facet]])
+    np.testing.assert_allclose(side.point, on_curve, rtol=0, atol=1e-14)
+    step = np.diff(side.curve.X, axis=0)
+    normal = np.stack([step[:, 1], -step[:, 0]], axis=1)
+    out = 1 if number == 0 else -1
+    assert np.all(out * (normal * (side.curve.X[:-1] - centre)).sum(axis=1) > 0)
+
+
+@pytest.mark.mpi
+@both_sides
+def test_curve_displacement_collects_the_nodes_of_all_ranks(number, radius, centre, comm):
+    """The field u = x gives the coordinates of the curve's nodes; forces go back to the rank that owns the node."""
+    parts = joint_parts(comm)
+    side = parts.sides[number]
+    np.testing.assert_allclose(side.curve_displacement(coordinates(parts.V)), side.curve.X, rtol=0, atol=1e-15)
+    force = np.zeros((parts.V.dofmap.index_map.size_local, 2))
+    side.add_to_owned(side.curve.X, force)
+    assert comm.allreduce((force**2).sum()) == pytest.approx((side.curve.X**2).sum(), rel=1e-13)
+
+
+@every_material
+def test_points_see_the_strain_of_their_own_cell(material):
+    """A linear displacement gives its constant strain's stress at every point, and itself as displacement."""
+    side = joint_parts(pin=material, block=material).sides[1]
+    A = 1e-3 * np.array([[1.0, 0.4], [-0.2, -0.5]])
+    displacement, stress, tangent = side.deform(coordinates(side.V) @ A.T)
+    np.testing.assert_allclose(displacement, side.point @ A.T, rtol=0, atol=1e-15)
+    expected = side.points.elastic_tangent @ [A[0, 0], A[1, 1], A[0, 1] + A[1, 0]]
+    np.testing.assert_allclose(stress[..., [0, 1, 3]], np.broadcast_to(expected, (*stress.shape[:2], 3)), atol=1e-13)
+    np.testing.assert_array_equal(tangent, np.broadcast_to(side.points.elastic_tangent, tangent.shape))
+
+
+def test_a_contact_edge_with_a_hole_in_it_is_an_error():
+    """A missing facet leaves two pieces: never a silent gap."""
+    parts = joint_parts()
+    hole = np.sort(parts.facets.find(Facets.HOLE_ARC))
+    torn = np.setdiff1d(hole, parts_in_the_middle(parts))
+    tags = meshtags(parts.V.mesh, 1, torn.astype(np.int32), np.full(len(torn), Facets.HOLE_ARC, dtype=np.int32))
+    with pytest.raises(ValueError, match="2 pieces"):
+        ContactSide(parts.V, tags, Facets.HOLE_ARC, ELASTIC)
+
+
+def parts_in_the_middle(parts):
+    """A facet of the hole that is not at its ends."""
+    from dolfinx.mesh import compute_midpoints
+
+    hole = parts.facets.find(Facets.HOLE_ARC)
+    x = compute_midpoints(parts.V.mesh, 1, hole)
+    return hole[[np.argmin(np.abs(np.arctan2(x[:, 0], -x[:, 1]) - np.pi / 4))]]
+
+
+def test_facets_are_chained_end_to_start():
+    """Whatever their order; a closed curve starts somewhere."""
+    start, end = np.array([30, 10, 20]), np.array([40, 20, 30])
+    np.testing.assert_array_equal(_chain(start, end), [1, 2, 0])
+    np.testing.assert_array_equal(_chain(np.array([3, 1, 2]), np.array([1, 2, 3])), [1, 2, 0])
+
+
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [
+        pytest.param([1, 2, 7], [2, 3, 8], id="two pieces"),
+        pytest.param([1, 2, 7, 8, 9], [2, 3, 8, 9, 7], id="a piece and a ring"),
+        pytest.param([1, 2, 3, 7, 8, 9], [2, 3, 1, 8, 9, 7], id="two rings"),
+        pytest.param([1, 2, 2], [2, 3, 4], id="a fork"),
+    ],
+)
+def test_facets_that_are_no_chain_are_an_error(start, end):
+    """None is left out in silence."""
+    with pytest.raises(ValueError, match="a contact edge must be one"):
+        _chain(np.array(start), np.array(end))

@@ -1,0 +1,109 @@
+"""One factorisation for all linear systems of an elastic joint."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from archord.benchmarks.paper.joint import paper_joint
+from archord.presets import joint as joint_module
+from archord.presets.joint import Joint
+from archord.solver.linear import condensed as condensed_module
+from archord.solver.linear.condensed import Condensed
+from tests.solver.solving import solve
+
+
+def stiffness(n, rng):
+    """A sparse symmetric positive definite matrix, dense and as PETSc's."""
+    dense = np.diag(rng.uniform(5, 6, n)) - np.diag(np.ones(n - 2), 2) - np.diag(np.ones(n - 2), -2)
+    A = PETSc.Mat().createAIJ((n, n), nnz=5, comm=MPI.COMM_SELF)
+    for i, j in np.argwhere(dense):
+        A[i, j] = dense[i, j]
+    A.assemble()
+    return dense, A
+
+
+def as_it_is(increment):
+    """No point opens or closes."""
+    return None
+
+
+def test_solves_are_those_with_the_whole_matrix():
+    """Rows that come, go and come again, in any order: product and solution as of the dense matrix."""
+    rng = np.random.default_rng(5)
+    nodes = 20
+    dense, A = stiffness(2 * nodes, rng)
+    condensed = Condensed(A, np.array([3, 4, 9, 17]), as_it_is)
+    r, x = A.createVecs()
+    for places in ([], [(3, 4), (3, 5), (9, 9)], [(9, 2), (17, 0)], [(3, 3), (4, 3), (17, 17)]):
+        blocks = rng.normal(size=(len(places), 2, 2))
+        whole = dense.copy()
+        for (i, j), block in zip(places, blocks, strict=True):
+            whole[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] += block
+        rows, columns = np.array(places, dtype=np.int64).reshape(-1, 2).T
+        condensed.occupy(rows, columns)
+        condensed.update(rng.normal(size=blocks.shape))
+        condensed.update(np.where(rng.random(len(blocks))[:, None, None] < 0.5, 0.0, blocks))
+        condensed.update(blocks)
+        r.array[:] = rng.normal(size=2 * nodes)
+        condensed.apply(None, r, x)
+        assert whole @ x.array_r == pytest.approx(r.array_r, abs=1e-11)
+        condensed.mult(None, x, r)
+        assert r.array_r == pytest.approx(whole @ x.array_r, abs=1e-12)
+
+
+def test_a_singular_system_has_no_number_for_an_answer():
+    dense, A = stiffness(4, np.random.default_rng(1))
+    condensed = Condensed(A, np.array([0]), as_it_is)
+    condensed.occupy(np.array([0, 0]), np.array([0, 1]))
+    condensed.update(-np.array([dense[:2, :2], dense[:2, 2:]]))
+    r, x = A.createVecs()
+    r.array[:] = 1.0
+    condensed.apply(None, r, x)
+    assert not np.isfinite(x.array_r).all()
+
+
+@pytest.mark.parametrize("kinematics", ["current", "reference"])
+@pytest.mark.parametrize("pin", [{}, {"rigid": True}], ids=["deformable", "rigid"])
+def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin, monkeypatch):
+    """As with the whole matrix factorised each time, in far fewer iterations: each finds the points that open or close.
+    With fixed partners nothing else is nonlinear: where all of them are found, the first iteration is the last."""
+    scene = paper_joint(0.08, 3, pin=pin, analysis={"kinematics": kinematics})
+    short = solve(scene)
+    monkeypatch.setattr(condensed_module, "_MOST_REVISIONS", 20)
+    patient = solve(scene)
+    monkeypatch.setattr(joint_module, "_MOST_CONDENSED", 0)
+    long = solve(scene)
+    assert short.joint.tangent_factorisations == 1 < long.joint.tangent_factorisations
+    counts = [[m.iterations for m in run.steps] for run in (short, long)]
+    assert max(counts[0]) <= 4
+    assert sum(counts[0]) < 0.8 * sum(counts[1])
+    assert max(m.iterations for m in patient.steps) <= (4 if kinematics == "current" else 1)
+    for a, b in zip(short.steps, long.steps, strict=True):
+        assert (a.P, a.p0, a.eps) == pytest.approx((b.P, b.p0, b.eps), rel=1e-9)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("pin", [{}, {"rigid": True}], ids=["deformable", "rigid"])
+def test_the_ranks_take_the_same_way(comm, pin):
+    """Iterations, factorisations and points, on ranks without facets or cells, too."""
+    scene = paper_joint(0.1, 3, pin=pin)
+    many, one = solve(scene, comm), solve(scene, MPI.COMM_SELF)
+    assert many.joint.equilibrium.tangent.condensed is not None
+    for a, b in zip(many.steps, one.steps, strict=True):
+        assert a.iterations == b.iterations
+        assert (a.P, a.p0, a.eps) == pytest.approx((b.P, b.p0, b.eps), rel=1e-10)
+    assert many.joint.tangent_factorisations == one.joint.tangent_factorisations == 1
+
+
+def test_only_joints_that_stay_elastic_and_held_are_condensed():
+    """Nothing that yields, floats, acts by force, or is large."""
+    relative_force = {"displacement": None, "relative_force": 0.005}
+    for scene in (
+        paper_joint(0.2, 1, 0.002),
+        paper_joint(0.2, 1, load=relative_force),
+        paper_joint(0.02, 1),
+        paper_joint(0.2, 1, analysis={"gamma_factor": 10.0}),
+    ):
+        assert Joint(scene, MPI.COMM_SELF).equilibrium.tangent.condensed is None
+    assert Joint(paper_joint(0.2, 1), MPI.COMM_SELF).equilibrium.tangent.condensed is not None

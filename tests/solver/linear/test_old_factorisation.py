@@ -1,0 +1,107 @@
+"""Large elastic joints: GMRES with the factorisation of the step's first matrix."""
+
+import pytest
+from mpi4py import MPI
+
+from archord.benchmarks.paper.joint import paper_joint
+from archord.presets import joint as joint_module
+from archord.solver import newton as newton_module
+from archord.solver.linear.bordered import Bordered
+from tests.solver.solving import solve
+
+FORCE = {"load": {"displacement": None, "relative_force": 0.012}}
+RING = {"joint": {"model": "ring"}, "load": {"displacement": None, "relative_force": 0.05}}
+
+
+@pytest.fixture
+def small_is_large(monkeypatch):
+    monkeypatch.setattr(joint_module, "_MOST_CONDENSED", 0)
+    monkeypatch.setattr(newton_module, "_MANY_DOFS", 0)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("kind", [{}, {"pin": {"rigid": True}}, FORCE, RING], ids=["moved", "rigid", "pressed", "ring"])
+def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
+    """To the tolerance of the residual, with fewer factorisations than iterations; on two ranks as on one."""
+    scene = paper_joint(0.15, 2, **kind)
+    iterative = solve(scene, MPI.COMM_WORLD)
+    monkeypatch.setattr(newton_module, "_MANY_DOFS", 10**9)
+    direct = solve(scene)
+    for a, b in zip(iterative.steps, direct.steps, strict=True):
+        assert (a.P, a.delta, a.p0, a.eps) == pytest.approx((b.P, b.delta, b.p0, b.eps), rel=1e-8)
+    iterations = sum(m.iterations for m in iterative.steps)
+    assert iterative.joint.tangent_factorisations < 0.75 * iterations
+    assert iterations <= 2 * sum(m.iterations for m in direct.steps)
+
+
+def test_many_solves_bring_a_new_factorisation(small_is_large, monkeypatch):
+    scene = paper_joint(0.15, 2)
+    usual = solve(scene)
+    monkeypatch.setattr(newton_module, "_MANY_SOLVES", 1)
+    often = solve(scene)
+    P = often.steps[-1].P
+    assert often.joint.tangent_factorisations > usual.joint.tangent_factorisations
+    assert abs(P / usual.steps[-1].P - 1) < 1e-9
+
+
+def test_solvers_that_follow_factorise_as_ever(monkeypatch):
+    """What a large elastic joint asks of PETSc is not asked of the next joint."""
+    plastic = paper_joint(0.15, 2, 0.002)
+    before = solve(plastic).steps
+    monkeypatch.setattr(newton_module, "_MANY_DOFS", 0)
+    monkeypatch.setattr(joint_module, "_MOST_CONDENSED", 0)
+    solve(paper_joint(0.15, 1))
+    assert [m.iterations for m in solve(plastic).steps] == [m.iterations for m in before]
+
+
+def test_plastic_joints_factorise_every_matrix(small_is_large, monkeypatch):
+    scene = paper_joint(0.12, 2, 0.002)
+    usual = solve(scene)
+    monkeypatch.setattr(newton_module, "_MANY_DOFS", 10**9)
+    assert solve(scene).joint.tangent_factorisations == usual.joint.tangent_factorisations
+
+
+def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
+    """The preconditioner stays the inverse of the old bordered matrix, while the product is of the new one."""
+    import numpy as np
+    from petsc4py import PETSc
+
+    rng = np.random.default_rng(3)
+    n = 6
+    old, new = (rng.normal(size=(n, n)) + 5 * np.eye(n) for _ in range(2))
+    borders = [(rng.normal(size=n), rng.normal(size=n), 3.0), (rng.normal(size=n), rng.normal(size=n), 4.0)]
+    A = PETSc.Mat().createAIJ((n, n), nnz=n, comm=MPI.COMM_SELF)
+
+    def fill(values):
+        for i, j in np.ndindex(n, n):
+            A[i, j] = values[i, j]
+        A.assemble()
+
+    def whole(values, border):
+        b, c, d = border
+        return np.block([[values, b[:, None]], [c[None], np.array([[d]])]])
+
+    fill(old)
+    system = Bordered(A, 1.0)
+    r, x = system.vector(), system.vector()
+    r.array[:] = rng.normal(size=n + 1)
+    system.update(*borders[0])
+    system.apply(None, r, x)
+    assert whole(old, borders[0]) @ x.array_r == pytest.approx(r.array_r, abs=1e-12)
+    fill(new)
+    system.update(*borders[1], factorise=False)
+    system.apply(None, r, x)
+    assert whole(old, borders[0]) @ x.array_r == pytest.approx(r.array_r, abs=1e-12)
+    system.mult(None, r, x)
+    assert x.array_r == pytest.approx(whole(new, borders[1]) @ r.array_r, abs=1e-12)
+    system.update(*borders[1])
+    system.apply(None, r, x)
+    assert whole(new, borders[1]) @ x.array_r == pytest.approx(r.array_r, abs=1e-12)
+
+
+def test_many_changes_of_the_contact_bring_a_new_factorisation(small_is_large, monkeypatch):
+    """A guess from afar opens and closes points everywhere: as many factorisations as flips ask for."""
+    scene = paper_joint(0.15, 2)
+    usual = solve(scene).joint.tangent_factorisations
+    monkeypatch.setattr(newton_module, "_MANY_FLIPS", 0)
+    assert solve(scene).joint.tangent_factorisations > usual

@@ -1,0 +1,311 @@
+"""A scene solved to an accuracy: the error is below it, and what is left is an ordinary run."""
+
+import json
+import os
+import signal
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.benchmarks.paper.joint import paper_joint
+from archord.output.restart import plan_restart
+from archord.output.run import solve_scene
+from archord.scene import geometry as scene_geometry
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene, parse_scene, resolved
+from archord.studies import mesh_family
+from archord.studies.accuracy import solve_to_accuracy
+from archord.studies.error_estimate import mesh_error, step_error
+from archord.studies.mesh_family import MeshFamily
+from tests.output.run_files import accepted_steps, same_run
+
+REFERENCE = Path(__file__).parents[2] / "benchmarks" / "cost" / "work_precision_reference.json"
+
+
+def open_scene(asked, steps=2, yield_stress=None, **sections):
+    """The paper's joint, its mesh left open."""
+    sections["joint"] = {"element_size": None} | sections.get("joint", {})
+    sections["analysis"] = {"accuracy": asked} | sections.get("analysis", {})
+    return paper_joint(steps=steps, yield_stress=yield_stress, **sections)
+
+
+def known_force(case):
+    """P at 2 dR in units of E* R, from meshes of up to 400 thousand dofs (docs/work_precision.md)."""
+    return json.loads(REFERENCE.read_text())["cases"][case]["current"]["quantities"]["P"]["value"]
+
+
+@pytest.fixture(scope="module")
+def elastic(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("elastic")
+    return solve_to_accuracy(open_scene(1e-3), folder, MPI.COMM_SELF)
+
+
+def test_an_elastic_joint_is_as_accurate_as_asked(elastic):
+    """The estimate is below what was asked, and the true error below the estimate."""
+    found = elastic.accuracy
+    true = abs(elastic.steps[-1].P / known_force("elastic") - 1)
+    assert elastic.status == "done"
+    assert true < found.estimated <= found.asked == 1e-3
+    assert found.substeps == 1
+    assert found.step_error == 0
+    sizes = [level.element_size for level in found.levels]
+    assert np.divide(sizes[:-1], sizes[1:]) == pytest.approx(mesh_family.RATIO, rel=1e-3)
+    assert [level.mesh_error is None for level in found.levels] == [True] + [False] * (len(sizes) - 1)
+
+
+def test_the_run_says_how_accurate_it_is(elastic):
+    """run.json has what was asked, what came out, and every mesh; the last one is the run's."""
+    report = json.loads((elastic.folder / "run.json").read_text())
+    block, last = report["accuracy"], report["accuracy"]["levels"][-1]
+    assert report["status"] == "done"
+    assert block["asked"] == 1e-3
+    assert report["error_estimates"]["mesh"] == block["mesh_error"] == block["estimated"]
+    assert last["dofs"] == report["mesh"]["dofs"]
+    assert last["last"] == report["steps"][-1]["P"]
+    assert last["iterations"] == report["totals"]["newton_iterations"]
+    assert sum(level["seconds"] for level in block["levels"]) <= block["seconds"]
+
+
+def test_the_scene_that_is_left_gives_the_same_numbers(elastic, tmp_path):
+    """It holds the mesh, and no accuracy."""
+    scene = load_scene(elastic.folder / "scene.toml")
+    assert scene.analysis.accuracy is None
+    assert scene.joint.h == pytest.approx(elastic.accuracy.levels[-1].element_size)
+    solve_scene(scene, tmp_path, MPI.COMM_SELF)
+    same_run(elastic.folder, tmp_path, 1e-10)
+
+
+def test_a_plastic_joint_is_as_accurate_as_asked(tmp_path):
+    """In 20 output steps, as the reference has them; its own error of the steps at 2 dR is below 5e-4."""
+    outcome = solve_to_accuracy(open_scene(6e-3, 20, 0.002, output={"fields": False}), tmp_path, MPI.COMM_SELF)
+    found = outcome.accuracy
+    assert outcome.status == "done"
+    assert found.estimated == found.mesh_error + found.step_error <= 6e-3
+    assert 0 < found.step_error <= 3e-3
+    assert abs(outcome.steps[-1].P / known_force("plastic") - 1) < 6e-3
+    tried = {level.substeps for level in found.levels if level.mesh == 1}
+    assert {found.substeps, 2 * found.substeps} <= tried or {found.substeps, found.substeps // 2} <= tried
+
+
+def test_under_a_force_the_displacement_is_accurate(tmp_path):
+    """The force that belongs to 2 dR presses the pin by 2 dR."""
+    scene = open_scene(3e-3, load={"displacement": None, "relative_force": known_force("elastic")})
+    outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
+    assert outcome.steps[-1].delta == pytest.approx(0.01, rel=3e-3)
+    assert outcome.accuracy.levels[-1].last == outcome.steps[-1].delta
+
+
+def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
+    """A plastic joint in two output steps: more accuracy takes more substeps, and brings P closer to that of many."""
+    plane = {"plane": "stress"}
+    short = {"initial": 1 / 16, "maximum": 1 / 16}
+    many = paper_joint(0.2, 2, 0.002, joint={"growth": 1.25}, analysis=plane, stepping=short)
+    known = solve_scene(many, _made(tmp_path / "many"), MPI.COMM_SELF).steps[-1].P
+    taken, errors = [], []
+    for asked in (0.1, 0.04):
+        scene = open_scene(asked, 2, 0.002, analysis=plane, output={"fields": False})
+        found = solve_to_accuracy(scene, _made(tmp_path / f"{asked}"), MPI.COMM_SELF).accuracy
+        of_coarsest = {level.substeps: level.last for level in found.levels if level.mesh == 1}
+        taken.append(found.substeps)
+        errors.append(abs(of_coarsest[found.substeps] / known - 1))
+        assert errors[-1] < asked / 2
+    assert taken[1] > taken[0]
+    assert errors[1] < errors[0]
+
+
+def test_a_mesh_that_does_not_see_the_contact_is_no_evidence(tmp_path, monkeypatch):
+    """Where the contact is smaller than expected, coarse meshes are passed over until a few facets touch."""
+    monkeypatch.setattr(mesh_family, "expected_angle", lambda scene: 1.17)
+    scene = open_scene(0.02, 1, load={"displacement": 0.05}, output={"fields": False})
+    outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
+    levels = outcome.accuracy.levels
+    facets = [outcome.steps[-1].contact_area / 2 / level.element_size for level in levels]
+    assert facets[0] < 2
+    assert all(level.mesh_error is None for level, n in zip(levels, facets, strict=True) if n < 2.5)
+    assert outcome.accuracy.estimated <= 0.02
+
+
+def test_a_pin_that_never_touches_has_no_error(tmp_path):
+    """Drawn away from the hole it bears no force on any mesh."""
+    outcome = solve_to_accuracy(open_scene(0.01, 1, load={"displacement": -0.5}), tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "done"
+    assert outcome.accuracy.estimated == 0
+
+
+def test_too_much_accuracy_ends_with_a_warning(tmp_path, monkeypatch):
+    """The finest mesh allowed stays; the warning has the estimate and what to do."""
+    scene = open_scene(1e-4)
+    monkeypatch.setattr(scene_geometry, "_MOST_CELLS", 1000)
+    outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "done"
+    assert outcome.accuracy.estimated > 1e-4
+    (warning,) = (w for w in outcome.warnings if w.startswith("accuracy"))
+    assert "not below analysis.accuracy = 0.0001" in warning
+    assert f"{outcome.accuracy.estimated:.1e}" in warning
+    assert json.loads((tmp_path / "run.json").read_text())["warnings"] == outcome.warnings
+    monkeypatch.setattr(scene_geometry, "_MOST_CELLS", 5)
+    with pytest.raises(InputError, match="no mesh within the limits"):
+        solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize(
+    ("when", "number", "yield_stress", "steps", "meshes"),
+    [("on_step", 6, None, 2, 1), ("on_level", 1, None, 4, 1), ("on_step", 4, 0.002, 4, 0)],
+)
+def test_ctrl_c_in_any_mesh_ends_the_run(tmp_path, when, number, yield_stress, steps, meshes):
+    """In the second mesh after a step, between meshes, and while steps are chosen: what was accepted is there."""
+    seen = []
+
+    def interrupt(thing):
+        seen.append(thing)
+        if len(seen) == number:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    scene = open_scene(1e-3, 4, yield_stress)
+    outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF, **{when: interrupt})
+    assert (outcome.status, outcome.signal, len(outcome.steps)) == ("interrupted", signal.SIGINT, steps)
+    assert "interrupted by SIGINT" in outcome.message
+    assert accepted_steps(tmp_path) == steps
+    report = json.loads((tmp_path / "run.json").read_text())
+    assert report["status"] == "interrupted"
+    assert report["accuracy"]["estimated"] is None
+    assert len(report["accuracy"]["levels"]) == meshes
+    assert signal.getsignal(signal.SIGINT) is before
+    plan = plan_restart(tmp_path)
+    assert solve_scene(plan.scene, tmp_path, MPI.COMM_SELF, start=plan.start).status == "done"
+    assert accepted_steps(tmp_path) == 4
+
+
+def test_more_accuracy_makes_finer_meshes():
+    """Everywhere: on the arcs and far from them."""
+    families = [MeshFamily(open_scene(asked), asked) for asked in (0.01, 1e-3, 1e-4, 1e-5)]
+    third = [family.scene_of(2, 1).joint for family in families]
+    assert all(a.h > b.h and a.growth > b.growth for a, b in pairwise(third))
+    fewer = MeshFamily(open_scene(1e-4, analysis={"degree": 3}), 1e-4).scene_of(2, 1).joint
+    assert fewer.h > third[2].h
+
+
+def test_small_contacts_get_small_elements_that_grow_as_fast():
+    """A contact of a tenth of the angle is resolved by as many elements."""
+    wide, small = (MeshFamily(open_scene(1e-3, load={"displacement": d}), 1e-3) for d in (2.0, 0.01))
+    a, b = wide.scene_of(1, 1).joint, small.scene_of(1, 1).joint
+    assert b.growth == a.growth
+    angle = mesh_family.expected_angle(small.scene)
+    assert np.cos(angle) == pytest.approx(1 / 1.01)
+    assert b.h / a.h == pytest.approx(angle / 1.17, rel=1e-3)
+
+
+def test_units_do_not_matter():
+    """Metres and pascals instead of millimetres and megapascals: the same meshes in units of R."""
+    text = resolved(open_scene(1e-3, load={"displacement": 0.3}))
+    data = load_data(text)
+    other = load_data(text)
+    other["joint"] |= {"radius": 0.037, "clearance": 0.005 * 0.037, "block_size": 3.7}
+    for body in ("pin", "block"):
+        other[body]["E"] *= 1.3e9
+    joints = [MeshFamily(s, 1e-3).scene_of(1, 1).joint for s in map(parse_scene, (data, other))]
+    assert joints[0].relative_element_size == joints[1].relative_element_size
+    assert joints[0].growth == joints[1].growth
+
+
+def load_data(text):
+    return tomllib.loads(text)
+
+
+def test_meshes_are_bounded_by_the_keys():
+    """Unlike elements on both arcs and a shrinking edge stay within what a scene allows; beyond it there is no mesh."""
+    for keys in ({"size_ratio": 0.01}, {"size_ratio": 10.0}, {"edge_angle": 1.0, "edge_ratio": 0.01}):
+        family = MeshFamily(open_scene(1e-3, joint=keys), 1e-3)
+        assert family.scene_of(0, 1) is not None
+        assert family.scene_of(1, 1) is not None
+    assert family.scene_of(20, 1) is None
+    short = family.scene_of(0, 64).stepping
+    assert short.initial == short.maximum == 1 / 64 >= short.minimum
+
+
+@pytest.mark.parametrize("order", [1.5, 2.0, 3.0, 4.0])
+def test_estimates_of_a_known_order_are_cautious(order):
+    """Never below the error from order 1.5 on if there are three meshes; at most 5 times as large."""
+    h = 1.5 ** -np.arange(3.0)
+    curves = [[0.5, 2.0 * (1 + 0.1 * size**order)] for size in h]
+    error = 0.1 * h[-1] ** order
+    assert error * 0.9 <= mesh_error(curves, 1.5) <= 5 * error
+    assert mesh_error(curves[:1], 1.5) is None
+
+
+def test_a_lucky_coincidence_is_not_believed():
+    """Two meshes that happen to agree say no more than the two before."""
+    assert mesh_error([[1.1], [1.0], [1.0]], 1.5) == pytest.approx(0.1 / 1.5**3 / 1.25)
+    assert mesh_error([[0.0], [0.0]], 1.5) == 0
+
+
+def test_steps_are_of_first_order():
+    """The error of the finer of two curves is their difference, over the largest value."""
+    curves = [[1 + 0.2 / m, -4 - 0.4 / m] for m in (4, 8)]
+    assert step_error(*curves) == pytest.approx(0.4 / 8 / 4.05)
+
+
+def test_a_scene_without_a_mesh_is_not_solved_as_it_is(tmp_path):
+    """By functions that need one; and there must be an accuracy where one is needed."""
+    with pytest.raises(InputError, match=r"accuracy = 0\.001: leaves the mesh open"):
+        solve_scene(open_scene(1e-3), tmp_path, MPI.COMM_SELF)
+    with pytest.raises(InputError, match=r"analysis\.accuracy is missing"):
+        solve_to_accuracy(paper_joint(), tmp_path, MPI.COMM_SELF)
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_accuracy_and_the_mesh_exclude_each_other(tmp_path):
+    """In a scene; an override takes the place of what the file has."""
+    text = resolved(open_scene(1e-3))
+    file = tmp_path / "open.toml"
+    file.write_text(text)
+    assert load_scene(file) == parse_scene(load_data(text))
+    for override in ("joint.growth=0.5", "joint.element_size=0.1", "stepping.initial=0.5"):
+        assert load_scene(file, [override]).analysis.accuracy is None
+        key, _, value = override.partition("=")
+        section, _, name = key.partition(".")
+        data = load_data(text)
+        data[section][name] = float(value)
+        with pytest.raises(
+            InputError, match=rf"{key} = {value} must not be given together with analysis\.accuracy, which chooses it"
+        ):
+            parse_scene(data)
+        with pytest.raises(InputError, match="must not be given together"):
+            load_scene(file, ["analysis.accuracy=0.01", override])
+    closed = tmp_path / "closed.toml"
+    closed.write_text(resolved(paper_joint()))
+    assert load_scene(closed, ["analysis.accuracy=0.01"]).analysis.accuracy == 0.01
+
+
+@pytest.mark.mpi
+def test_ranks_choose_the_same_meshes(tmp_path, comm):
+    """As one rank does, with the same estimates and forces."""
+    scene = open_scene(0.03, 4, 0.002)
+    folder = Path(comm.bcast(str(tmp_path)))
+    together = solve_to_accuracy(scene, _shared(folder / "together", comm), comm)
+    alone = None
+    if comm.rank == 0:
+        alone = solve_to_accuracy(scene, _made(folder / "alone"), MPI.COMM_SELF)
+        alone = [m.P for m in alone.steps], alone.accuracy
+    forces, found = comm.bcast(alone)
+    assert [m.P for m in together.steps] == pytest.approx(forces, rel=1e-8)
+    assert together.accuracy.estimated == pytest.approx(found.estimated, rel=1e-4)
+    for a, b in zip(together.accuracy.levels, found.levels, strict=True):
+        assert (a.mesh, a.element_size, a.substeps, a.dofs) == (b.mesh, b.element_size, b.substeps, b.dofs)
+
+
+def _made(folder):
+    folder.mkdir()
+    return folder
+
+
+def _shared(folder, comm):
+    if comm.rank == 0:
+        folder.mkdir()
+    comm.barrier()
+    return folder

@@ -1,0 +1,320 @@
+"""What a sweep file expands to: laws of counting, sampling and naming, before anything is solved."""
+
+import math
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene, resolved
+from archord.studies import sweep as run
+from archord.studies.cases import read_sweep, run_name
+from archord.studies.cost import expected_seconds
+from archord.studies.design import combinations, factors, samples
+from archord.studies.sweep import Share
+from archord.studies.sweep_file import LatinHypercube, SweepFile
+
+SCENES = Path(__file__).parents[2] / "scenes"
+DOCS = SCENES.parent / "docs"
+ELASTIC = str(SCENES / "elastic_pin.toml")
+
+
+def written(folder: Path, text: str, base: str = ELASTIC) -> Path:
+    path = folder / "some.sweep.toml"
+    path.write_text(f'base = "{base}"\n{text}' if base else text)
+    return path
+
+
+def faults(folder: Path, text: str, base: str = ELASTIC, overrides=()) -> list[str]:
+    path = written(folder, text, base)
+    with pytest.raises(InputError) as caught:
+        read_sweep(path, overrides)
+    return str(caught.value).replace(f"{path}: ", "FILE: ").splitlines()
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    grid=st.lists(st.integers(1, 4), max_size=3),
+    zipped=st.integers(0, 4),
+    listed=st.integers(0, 3),
+    sampled=st.integers(0, 4),
+)
+def test_everything_is_multiplied(grid, zipped, listed, sampled):
+    """As many cases as the product of all lengths, all different, the last factor varying fastest."""
+    names = ["joint.radius", "joint.growth", "load.steps"]
+    varied = {
+        "grid": {name: list(range(n)) for name, n in zip(names, grid, strict=False)},
+        "zip": {"pin.E": list(range(zipped)), "pin.nu": list(range(zipped))} if zipped else {},
+        "list": [{"block.E": i} for i in range(listed)],
+        "latin_hypercube": {"number": sampled, "ranges": {"block.nu": [0.0, 0.5]}} if sampled else None,
+    }
+    file = SweepFile.model_validate({"base": {}} | {name: some for name, some in varied.items() if some})
+    rows = combinations(factors(file))
+    lengths = [n for n in (listed, zipped, *grid, sampled) if n]
+    assert len(rows) == math.prod(lengths)
+    assert len({tuple(sorted(row.items())) for row in rows}) == len(rows)
+    for row in rows:
+        assert row.get("pin.E") == row.get("pin.nu")
+    keys = [key for key in ("block.E", "pin.E", *names) if any(key in row for row in rows)]
+    order = [tuple(row[key] for key in keys) for row in rows]
+    assert order == sorted(order)
+
+
+@settings(max_examples=20, deadline=None)
+@given(number=st.integers(1, 40), seed=st.integers(0, 2**31), low=st.floats(1e-3, 1.0), factor=st.floats(1.5, 1e3))
+def test_every_stratum_of_a_range_holds_one_sample(number, seed, low, factor):
+    """On a linear and on a logarithmic scale; the same seed gives the same samples, another one others."""
+    ends = {"from": low, "to": low * factor}
+    ranges = {"joint.radius": ends, "joint.clearance": {**ends, "scale": "log"}}
+    rows = samples(LatinHypercube.model_validate({"number": number, "seed": seed, "ranges": ranges}))
+    linear = np.array([row["joint.radius"] for row in rows])
+    log = np.array([row["joint.clearance"] for row in rows])
+    for share in ((linear - low) / (low * (factor - 1)), np.log(log / low) / math.log(factor)):
+        position = share * number
+        # rounded to nine digits, a sample may lie on the edge of its stratum
+        assert (np.abs(np.sort(position) - np.arange(number) - 0.5) <= 0.5 + 1e-5).all()
+    again = samples(LatinHypercube.model_validate({"number": number, "seed": seed, "ranges": ranges}))
+    other = samples(LatinHypercube.model_validate({"number": number, "seed": seed + 1, "ranges": ranges}))
+    assert rows == again != other
+
+
+def test_overrides_mean_what_set_means(tmp_path):
+    """A case's scene is the base's with --set, alternatives and absent keys included."""
+    text = """
+        [[list]]
+        pin.rigid = true
+        joint.relative_clearance = 0.01
+        [[list]]
+        "block.yield_stress" = 0.002
+        [[list]]
+        load.displacement = "none"
+        load.relative_force = [0.001, 0.002]
+    """
+    options = [
+        ["pin.rigid=true", "joint.relative_clearance=0.01"],
+        ["block.yield_stress=0.002"],
+        ["load.displacement=", "load.relative_force=[0.001, 0.002]"],
+    ]
+    found = read_sweep(written(tmp_path, text)).cases
+    assert [resolved(case.scene) for case in found] == [resolved(load_scene(ELASTIC, some)) for some in options]
+    plastic = read_sweep(
+        written(tmp_path, '[grid]\nblock.yield_stress = ["none", 300.0]', str(SCENES / "steel_pin.toml"))
+    )
+    assert [case.scene.block.yield_stress for case in plastic.cases] == [None, 300.0]
+    assert all(case.scene.pin.yield_stress for case in plastic.cases)
+
+
+def test_identical_scenes_are_one_run(tmp_path):
+    """However they are written; a scene's name depends on nothing but its content."""
+    text = (
+        "[grid]\njoint.clearance = [0.005, 5e-3, 0.006]\n[[list]]\nblock.hardening = 0\n[[list]]\nblock.hardening = 0.0"
+    )
+    sweep = read_sweep(written(tmp_path, text))
+    assert (len(sweep.cases), len(sweep.distinct)) == (6, 2)
+    assert [case.number for case in sweep.distinct] == [1, 3]
+    assert sweep.cases[0].run == run_name(load_scene(ELASTIC, ["joint.clearance=0.005"]))
+    assert len({run_name(load_scene(ELASTIC, [f"load.steps={n}"])) for n in range(1, 20)}) == 19
+
+
+def test_the_resolved_file_gives_the_same_cases(tmp_path):
+    """From another folder, too, though a path of the base counts from the base's folder."""
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "targets.csv").write_text("displacement\n0.5\n1\n")
+    base = tomllib.loads(Path(ELASTIC).read_text())
+    base["load"] = {"path": "targets.csv"}
+    (tmp_path / "other.csv").write_text("relative_force\n0.001\n")
+    path = tmp_path / "scenes" / "base.toml"
+    path.write_text(_toml(base))
+    text = """
+        [grid]
+        load.path = ["none", "other.csv"]
+        [zip]
+        pin.E = [1.0, 2.0]
+        [[list]]
+        load.displacement = 1.5
+        [latin_hypercube]
+        number = 3
+        ranges = { "joint.clearance" = { from = 0.001, to = 0.01, scale = "log" } }
+    """.replace("[[list]]\n        load.displacement = 1.5\n", "").replace('["none", "other.csv"]', '["other.csv"]')
+    sweep = read_sweep(written(tmp_path, text, "scenes/base.toml"))
+    assert {case.scene.load.name for case in sweep.cases} == {"relative_force"}
+    unchanged = read_sweep(written(tmp_path, "", "scenes/base.toml"))
+    assert unchanged.cases[0].scene.load.legs == [0.5, 1.0]
+    for number, one in enumerate((sweep, unchanged)):
+        folder = tmp_path / f"elsewhere{number}"
+        folder.mkdir()
+        (folder / "sweep.toml").write_text(run.resolved(one.file))
+        again = read_sweep(folder / "sweep.toml")
+        assert [(c.number, c.run) for c in again.cases] == [(c.number, c.run) for c in one.cases]
+        assert again.keys == one.keys
+
+
+def _toml(data) -> str:
+    import tomli_w
+
+    return tomli_w.dumps(data)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "gird = 3",
+            ["FILE: gird = 3 is not a known key; did you mean grid? Keys are base, list, zip, grid, latin_hypercube."],
+        ),
+        ("grid = [1]", ["FILE: grid = [1] must be a table."]),
+        ("[grid]\njoint.clearance = 1", ["FILE: grid.joint.clearance = 1 must be a list of values."]),
+        ("[grid]\njoint.clearance = []", ["FILE: grid.joint.clearance = [] must not be empty."]),
+        ("[grid]\nclearance = [1]", ["FILE: [grid] clearance = 1: must read section.key, like joint.clearance."]),
+        (
+            '[grid]\nunits.length = ["m"]',
+            ["FILE: [grid] units.length: cannot vary; all cases of a table have the same units."],
+        ),
+        ("[grid]", ["FILE: grid must not be empty."]),
+        ("zip = {}", ["FILE: zip must not be empty."]),
+        ("list = []", ["FILE: list = [] must not be empty."]),
+        ("list = 3", ["FILE: list = 3 must be a list of values; write [[list]]."]),
+        (
+            "[zip]\npin.E = [1.0, 2.0]\npin.nu = [0.3]",
+            ["FILE: zip must hold lists of one length, but pin.E has 2, pin.nu has 1."],
+        ),
+        (
+            "[grid]\njoint.clearance = [0.1]\n[[list]]\njoint.relative_clearance = 0.1",
+            ["FILE: [grid] joint.clearance: is varied by [[list]] joint.relative_clearance already."],
+        ),
+        (
+            "latin_hypercube = { number = 0, sed = 1, ranges = { pin.nu = [0.3, 0.1] } }",
+            [
+                "FILE: latin_hypercube.number = 0 must be at least 1.",
+                "FILE: latin_hypercube.ranges.pin.nu = [0.3, 0.1] must have a from that is less than its to.",
+                "FILE: latin_hypercube.sed = 1 is not a known key; did you mean seed? Keys are number, seed, ranges.",
+            ],
+        ),
+        (
+            '[latin_hypercube]\nnumber = 2\nranges = { "pin.nu" = { from = 0, to = 1, scale = "log" } }',
+            ['FILE: latin_hypercube.ranges.pin.nu must have a positive from where scale = "log".'],
+        ),
+        (
+            'latin_hypercube = { number = 2, ranges = { pin.E = ["a", 1.0], pin.nu = [0.1, nan] } }',
+            [
+                'FILE: latin_hypercube.ranges.pin.E = ["a", 1.0] must be two finite numbers, [low, high].',
+                "FILE: latin_hypercube.ranges.pin.nu = [0.1, NaN] must be two finite numbers, [low, high].",
+            ],
+        ),
+        (
+            "[grid]\njoint.clearence = [1]",
+            [
+                "FILE: every case: joint.clearence = 1 is not a known key; did you mean clearance? Keys are model, "
+                "radius, clearance, relative_clearance, block_size, element_size, relative_element_size, size_ratio, "
+                "edge_angle, edge_ratio, growth."
+            ],
+        ),
+        (
+            "[grid]\njoint.relative_clearance = [0.005, 0.9]\nload.steps = [1, 2, 3]",
+            [
+                "FILE: case 4 and 2 more: joint.relative_clearance = 0.9 must be a clearance: between 1e-6 and 0.5 "
+                "times the radius."
+            ],
+        ),
+        (
+            "[grid]\nload.steps = [1, 1.5]\npin.E = [1.82, -1.0]",
+            [
+                "FILE: case 2 and 1 more: pin.E = -1.0 must be greater than 0.",
+                "FILE: case 3 and 1 more: load.steps = 1.5 must be a whole number or a list of them.",
+            ],
+        ),
+        (
+            f"[grid]\npin.E = {[1.0] * 400}\nload.steps = {[1] * 400}",
+            ["FILE: has 160000 cases (400 x 400); 100000 are allowed."],
+        ),
+    ],
+)  # fmt: skip
+def test_faults_are_told_in_a_sentence(tmp_path, text, said):
+    """File, key, value, and what is allowed; each fault once, however many cases have it."""
+    assert sorted(faults(tmp_path, text)) == sorted(said)
+
+
+def test_one_fault_of_many_values_is_told_once(tmp_path):
+    sampled = "[latin_hypercube]\nnumber = 30\nranges = { load.steps = [5, 6] }"
+    (told,) = faults(tmp_path, f"[grid]\njoint.clearance = [0.004, 0.005]\n{sampled}")
+    assert re.fullmatch(r"FILE: every case: load\.steps = 5\.\d+ must be a whole number or a list of them\.", told)
+    (told,) = faults(tmp_path, '[grid]\nload.steps = [3, "a = b c", 4, "d", 2.5]')
+    assert told == 'FILE: case 2 and 2 more: load.steps = "a = b c" must be a whole number or a list of them.'
+
+
+def test_a_base_is_needed(tmp_path):
+    assert faults(tmp_path, "", "") == ['FILE: base is missing; give base = "scene.toml" or a [base] table.']
+    assert faults(tmp_path, "base = 3", "") == ['FILE: base must be a scene file, base = "scene.toml", or a table.']
+    nowhere = f'FILE: base = "nowhere.toml" must be a scene file, beside the sweep file; {tmp_path}/nowhere.toml'
+    assert faults(tmp_path, "", "nowhere.toml") == [f"{nowhere} does not exist."]
+    assert faults(tmp_path, "", ".") == [
+        f'FILE: base = "." must be a scene file, beside the sweep file; {tmp_path} is not one.'
+    ]
+    sweep = f'FILE: base = "some.sweep.toml" must be a scene file, beside the sweep file; {tmp_path}/some.sweep.toml'
+    assert faults(tmp_path, "", "some.sweep.toml") == [f"{sweep} is a sweep."]
+
+
+def test_a_fault_of_the_base_names_its_file(tmp_path):
+    """Unless the sweep or --set gives the key."""
+    scene = tomllib.loads(Path(ELASTIC).read_text())
+    scene["block"]["nu"] = 0.7
+    (tmp_path / "base.toml").write_text(_toml(scene))
+    fault = "block.nu = 0.7 must be at least -0.999 and at most 0.499999."
+    by_base = f"FILE: every case, by its base {tmp_path}/base.toml: {fault}"
+    assert faults(tmp_path, "[grid]\npin.nu = [0.1, 0.2]", "base.toml") == [by_base]
+    assert faults(tmp_path, "[grid]\nblock.nu = [0.7]", "base.toml") == [f"FILE: every case: {fault}"]
+    assert faults(tmp_path, "", "base.toml", ["block.nu=0.7"]) == [f"FILE: every case: {fault}"]
+    assert faults(tmp_path, "[grid]\nblock.nu = [0.7, 0.3]", "base.toml") == [f"FILE: case 1: {fault}"]
+
+
+def test_the_example_of_the_documentation_is_sound(tmp_path):
+    text = re.search(r"```toml\n(base = .*?)```", (DOCS / "sweeps.md").read_text(), re.DOTALL)[1]
+    path = tmp_path / "all.sweep.toml"
+    path.write_text(text.replace("steel_pin.toml", str(SCENES / "steel_pin.toml")))
+    sweep = read_sweep(path)
+    assert len(sweep.cases) == len(sweep.distinct) == 2 * 2 * 3 * 20
+
+
+def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
+    text = "[grid]\njoint.clearance = [0.005, 0.006]"
+    sweep = read_sweep(written(tmp_path, text), ["load.steps=3"])
+    assert [case.scene.load.steps for case in sweep.cases] == [3, 3]
+    said = faults(tmp_path, text, overrides=["joint.clearance=0.1"])
+    assert said == [f"--set joint.clearance=0.1: is varied by {tmp_path}/some.sweep.toml already."]
+    said = faults(tmp_path, text, overrides=["joint.relative_clearance=0.1"])
+    by = f"{tmp_path}/some.sweep.toml as joint.clearance"
+    assert said == [f"--set joint.relative_clearance=0.1: is varied by {by} already."]
+
+
+def test_scenes_and_sweeps_are_told_apart(tmp_path):
+    with pytest.raises(InputError, match="is a scene, not a sweep; solve it by archord solve") as told:
+        read_sweep(ELASTIC)
+    assert len(str(told.value).splitlines()) == 1
+    sweep = written(tmp_path, "[grid]\npin.E = [1.0]")
+    with pytest.raises(InputError) as told:
+        load_scene(sweep)
+    assert str(told.value) == f"{sweep}: is a sweep, not a scene; archord sweep solves it."
+
+
+@pytest.mark.parametrize("name", ["clearance", "stiffness"])
+def test_examples_are_sound(name):
+    sweep = read_sweep(SCENES / f"{name}.sweep.toml")
+    assert len(sweep.cases) == len(sweep.distinct) == {"clearance": 9, "stiffness": 24}[name]
+
+
+def test_the_parts_of_an_array_are_the_whole(tmp_path):
+    """Every case in one part, and the parts take about as long."""
+    text = "[grid]\njoint.relative_element_size = [0.3, 0.1, 0.05]\nload.steps = [1, 2, 3, 4, 5, 6, 7, 8]"
+    cases = read_sweep(written(tmp_path, text)).cases
+    parts = [Share.parse(f"{i}/3").of(cases) for i in (1, 2, 3)]
+    assert sorted(case.number for part in parts for case in part) == [case.number for case in cases]
+    cost = [sum(expected_seconds(case.scene) for case in part) for part in parts]
+    assert max(cost) < 1.2 * min(cost)
+    for wrong in ("0/3", "4/3", "1", "a/b", "1/0"):
+        with pytest.raises(InputError, match=f"--array {wrong}: must be I/N"):
+            Share.parse(wrong)

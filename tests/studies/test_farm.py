@@ -1,0 +1,201 @@
+"""Cases on any number of ranks: each is solved once, all ranks take part, and the numbers are those of one rank."""
+
+import json
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from archord.geometry.mesh_cache import MESHES
+from archord.output.folder import claim_folder
+from archord.output.history import read_history
+from archord.output.ranks import agreed
+from archord.output.run import solve_scene
+from archord.studies import case_run
+from archord.studies.case_run import report_of, solve_case, standing
+from archord.studies.cases import read_sweep
+from archord.studies.farm import Farm, Job, suited
+from archord.studies.sweep import Share, open_jobs
+from archord.studies.tables import of_case
+from tests.studies.parts import SOFT, written
+
+CLOCK = {"seconds", "force_balance"}
+
+
+def jobs_of(comm, folder: Path, text: str = SOFT) -> tuple[Path, list[Job]]:
+    """Jobs in a folder that all ranks share; the longer ones are the later ones."""
+    folder = comm.bcast(folder)
+
+    def made() -> list[Job]:
+        cases = read_sweep(written(folder, text)).cases
+        return [Job(case.scene, folder / case.run, float(case.number)) for case in cases]
+
+    return folder, agreed(comm, made)
+
+
+@pytest.mark.mpi
+def test_each_job_is_solved_once_by_somebody(comm, tmp_path):
+    """Results come to rank 0 alone, longest first; each history is that of a solve by itself on one rank."""
+    folder, jobs = jobs_of(comm, tmp_path)
+    results, running = [], []
+    assert Farm(comm).run(jobs, results.append, running.append) == 0
+    if comm.rank:
+        assert results == running == []
+        return
+    assert sorted(result.run for result in results) == sorted(job.folder.name for job in jobs)
+    assert {result.status for result in results} == {"done"}
+    assert results[-1].run != jobs[-1].folder.name  # the longest does not end last
+    assert sum(result.meshes for result in results) <= comm.size
+    assert sum(result.meshes + result.reused for result in results) == len(jobs)
+    for job in jobs:
+        assert report_of(job.folder)["ranks"] == 1
+    from mpi4py import MPI
+
+    alone = folder / "alone"
+    claim_folder(alone, force=True)
+    solve_scene(jobs[0].scene, alone, MPI.COMM_SELF)
+    a, b = (read_history(place / "history.csv") for place in (alone, jobs[0].folder))
+    assert {name: a[name] for name in a if name not in CLOCK} == {name: b[name] for name in b if name not in CLOCK}
+
+
+@pytest.mark.mpi
+def test_a_group_solves_what_one_rank_does(comm, tmp_path):
+    """All ranks on each case: the same numbers to round-off."""
+    folder, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 1.82]\n")
+    results = []
+    assert Farm(comm, comm.size).run(jobs, results.append) == 0
+    if comm.rank == 0:
+        from mpi4py import MPI
+
+        assert [result.status for result in results] == ["done", "done"]
+        for job in jobs:
+            assert report_of(job.folder)["ranks"] == comm.size
+        alone = folder / "alone"
+        claim_folder(alone, force=True)
+        solve_scene(jobs[1].scene, alone, MPI.COMM_SELF)
+        a, b = (read_history(place / "history.csv") for place in (alone, jobs[1].folder))
+        for name in set(a) - CLOCK:
+            assert a[name] == pytest.approx(b[name], rel=1e-9), name
+
+
+@pytest.mark.mpi
+def test_a_signal_ends_the_batch_on_all_ranks(comm, tmp_path):
+    """Whoever gets it: no case begins after it, and what is there is continued by the next call."""
+    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 0.6, 0.7, 0.8, 1.0, 1.82]\n")
+    results = []
+
+    def ended(result) -> None:
+        if not results:
+            os.kill(os.getpid(), signal.SIGTERM)
+        results.append(result)
+
+    before = signal.getsignal(signal.SIGTERM)
+    assert Farm(comm).run(jobs, ended) == signal.SIGTERM
+    assert signal.getsignal(signal.SIGTERM) == before
+    if comm.rank == 0:
+        assert "interrupted" in {result.status for result in results} or len(results) < len(jobs)
+        assert any(standing(job.folder).status != "done" for job in jobs)
+    rest = agreed(comm, lambda: [job for job in jobs if standing(job.folder).status != "done"])
+    assert Farm(comm).run(rest, lambda result: None) == 0
+    if comm.rank == 0:
+        assert {standing(job.folder).status for job in jobs} == {"done"}
+
+
+@pytest.mark.mpi
+def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
+    """Whichever rank has them."""
+    from archord.presets.joint import Joint
+
+    true_mesh = Joint._mesh
+
+    def broken(self, partitioner):
+        if self.scene.pin.E < 0.75:
+            raise ValueError("broken")
+        return true_mesh(self, partitioner)
+
+    monkeypatch.setattr(Joint, "_mesh", broken)
+    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 0.6, 0.7, 0.8, 1.0, 1.82]\n")
+    results = []
+    assert Farm(comm).run(jobs, results.append) == 0
+    if comm.rank == 0:
+        by_run = {result.run: result for result in results}
+        assert [by_run[job.folder.name].status for job in jobs] == 3 * ["failed"] + 3 * ["done"]
+        assert [standing(job.folder).message for job in jobs] == 3 * ["ValueError: broken"] + 3 * [""]
+
+
+@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")
+def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(comm, tmp_path, monkeypatch):
+    """ffcx waits for a file that nobody will write; only an old one is removed, as a new one is somebody's work."""
+    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5]\n")
+    half = tmp_path / "libffcx_forms_0.c"
+    half.touch()
+    complaint = (
+        "JIT compilation timed out, probably due to a failed previous compile. "
+        f"Try cleaning cache (e.g. remove {half}) or increase timeout option."
+    )
+    from archord.output import run
+
+    true_solve, calls = run.solve_scene, []
+
+    def solve(*arguments, **named):
+        calls.append(half.exists())
+        if half.exists():
+            raise TimeoutError(complaint)
+        return true_solve(*arguments, **named)
+
+    monkeypatch.setattr(run, "solve_scene", solve)
+    assert solve_case(jobs[0].scene, jobs[0].folder, comm).status == "failed"
+    assert calls == [True, True, True]
+    os.utime(half, (1, 1))
+    calls.clear()
+    assert solve_case(jobs[0].scene, jobs[0].folder, comm).status == "done"
+    assert calls == [True, False]
+    assert not (jobs[0].folder / case_run.FAILURE).exists()
+
+
+@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")
+def test_a_farm_keeps_meshes_only_while_it_works(comm, tmp_path):
+    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 1.0]\n")
+    results = []
+    Farm(comm).run(jobs, results.append)
+    assert [(result.meshes, result.reused) for result in results] == [(1, 0), (0, 1)]
+    results.clear()
+    jobs = [Job(job.scene, job.folder.with_name(job.folder.name + "x"), job.cost) for job in jobs[:1]]
+    Farm(comm).run(jobs, results.append)
+    assert (results[0].meshes, results[0].reused) == (1, 0)
+    assert MESHES.capacity == 0
+
+
+@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")
+def test_a_case_with_an_accuracy_gets_its_meshes_again_after_a_kill_between_two(comm, tmp_path):
+    """Each of its meshes is a finished run: only one with an estimate is the case's."""
+    varied = '[grid]\nanalysis.accuracy = [0.05]\njoint.relative_element_size = ["none"]\njoint.growth = ["none"]\n'
+    sweep = read_sweep(written(tmp_path, varied))
+    case = sweep.cases[0]
+    folder = of_case(case, tmp_path)
+    folder.parent.mkdir()
+    assert solve_case(case.scene, folder, comm).status == "done"
+    report = report_of(folder)
+    assert report["accuracy"]["estimated"] <= 0.05
+    assert not open_jobs(sweep, tmp_path, Share(), retry=False)[1]
+    del report["accuracy"]
+    (folder / "run.json").write_text(json.dumps(report))
+    assert [job.folder for job in open_jobs(sweep, tmp_path, Share(), retry=False)[1]] == [folder]
+
+
+def test_rank_0_takes_cases_whose_mesh_it_has(tmp_path):
+    """Its own meshes first, then one that nobody has, and the longest where others are much shorter."""
+    base = read_sweep(written(tmp_path, SOFT)).cases[0].scene
+
+    def job(number: int, size: float, cost: float) -> Job:
+        joint = base.joint.model_copy(update={"relative_element_size": size})
+        return Job(base.model_copy(update={"joint": joint}), tmp_path / f"{number}", cost)
+
+    jobs = [job(1, 0.2, 9.0), job(2, 0.2, 8.0), job(3, 0.3, 5.0), job(4, 0.3, 5.0), job(5, 0.4, 2.0)]
+    mesh = [job.mesh for job in jobs]
+    assert mesh[0] == mesh[1] != mesh[2] == mesh[3] != mesh[4]
+    assert suited(jobs, set(), {mesh[0]}) == 2, "the other rank has the first mesh"
+    assert suited(jobs[1:], {mesh[2]}, {mesh[0]}) == 1
+    assert suited(jobs, {mesh[4]}, {mesh[0], mesh[2]}) == 0, "the last case is too short"
+    assert suited(jobs[4:], {mesh[0]}, {mesh[4]}) == 0

@@ -1,0 +1,244 @@
+"""archord sweep as a user runs it, in this process: what is solved, what is not solved again, what the tables say."""
+
+import os
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from archord.cli import run
+from archord.output.history import read_history
+from archord.postprocess.run_curve import read_run
+from archord.studies.case_run import standing
+from archord.studies.cases import read_sweep
+from tests.studies.parts import SOFT, STUCK, numbers, sweep, table, times, written
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="the whole command, on one rank")
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory) -> Path:
+    """A folder with some.sweep.toml, six cases, solved into ``out``."""
+    folder = tmp_path_factory.mktemp("sweep")
+    assert sweep(written(folder, SOFT), "-o", folder / "out", "-q") == 0
+    return folder
+
+
+def test_each_case_is_what_solve_makes_of_it(solved, tmp_path):
+    """To the last digit, though the process and its mesh had other cases before."""
+    (tmp_path / "base.toml").write_text((solved / "some.sweep.toml").read_text().partition("[base]")[2])
+    for number, options in ((1, ["pin.E=0.5", "load.steps=2"]), (6, ["pin.E=1.82", "load.steps=3"])):
+        flags = [word for option in options for word in ("--set", option)]
+        assert run(["solve", str(tmp_path / "base.toml"), *flags, "-o", str(tmp_path / f"{number}"), "-q"]) == 0
+        alone = read_history(tmp_path / f"{number}" / "history.csv")
+        rows = [row for row in table(solved / "out" / "sweep.csv") if row["case"] == str(number)]
+        for name in set(alone) - {"seconds"}:
+            column = next(c for c in rows[0] if c.split(" [")[0] == name)
+            assert [float(row[column]) for row in rows] == alone[name], name
+
+
+def test_tables_are_tidy(solved):
+    """A row per case and step, the varied keys in columns of their own with their units; three tables, one content."""
+    rows = table(solved / "out" / "sweep.csv")
+    assert list(rows[0])[:6] == ["case", "run", "status", "pin.E [E*]", "load.steps", "step"]
+    assert [(row["case"], row["step"]) for row in rows] == [
+        (str(case), str(step)) for case in range(1, 7) for step in range(1, 4 if case % 2 == 0 else 3)
+    ]
+    assert {(row["case"], row["pin.E [E*]"], row["load.steps"]) for row in rows} == {
+        (str(1 + 2 * i + j), f"{E:g}", str(n)) for i, E in enumerate((0.5, 1.0, 1.82)) for j, n in enumerate((2, 3))
+    }
+    with h5py.File(solved / "out" / "sweep.h5") as file:
+        steps, cases = file["steps"][()], file["cases"][()]
+    assert list(steps.dtype.names) == list(rows[0])
+    for name in set(rows[0]) - {"run", "status"}:
+        assert steps[name] == pytest.approx([float(row[name]) for row in rows], rel=1e-11, abs=0), name
+    assert [value.decode() for value in steps["run"]] == [row["run"] for row in rows]
+    ends = table(solved / "out" / "cases.csv")
+    assert len(ends) == len(cases) == 6
+    for end, case in zip(ends, cases, strict=True):
+        own = [row for row in rows if row["case"] == end["case"]]
+        assert {name: end[name] for name in ("P [E* R]", "eps [rad]", "work/(E* R2)")} == {
+            name: own[-1][name] for name in ("P [E* R]", "eps [rad]", "work/(E* R2)")
+        }
+        assert int(end["iterations"]) == case["iterations"] == sum(int(row["iterations"]) for row in own)
+        assert (end["status"], end["message"], end["steps"]) == ("done", "", str(len(own)))
+
+
+def test_softer_pins_give_way(solved):
+    """P grows with the pin's stiffness, at each of the equal displacements."""
+    ends = [row for row in table(solved / "out" / "cases.csv") if row["load.steps"] == "3"]
+    P = [float(row["P/(E* R)"]) * read_run(solved / "out" / "cases" / row["run"]).E_star for row in ends]
+    assert (np.diff(P) > 0).all()
+    assert P[0] < 0.6 * P[-1]
+
+
+def test_what_is_solved_is_not_solved_again(solved, tmp_path, capsys):
+    """By the same file, by one with another design, and by the folder itself."""
+    before = times(solved / "out")
+    assert sweep(written(solved, SOFT), "-o", solved / "out") == 0
+    assert "6 cases" in capsys.readouterr().out
+    more = written(solved, SOFT.replace("[0.5,", "[0.25,"), "more")
+    assert sweep(more, "-o", solved / "out") == 0
+    out = capsys.readouterr().out
+    assert "4 of 6 cases are there already" in out
+    assert "1 mesh made, 1 used again" in out
+    after = times(solved / "out")
+    assert {name: after[name] for name in before} == before
+    assert len({name.split("/")[1] for name in after}) == 8
+    assert {row["pin.E [E*]"] for row in table(solved / "out" / "cases.csv")} == {"0.25", "1", "1.82"}
+    assert sweep(written(solved, SOFT), "-o", solved / "out", "-q") == 0
+    rows = numbers(solved / "out")
+    assert sweep(solved / "out", "-q") == 0
+    assert numbers(solved / "out") == rows
+    assert times(solved / "out") == after
+
+
+def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, capsys):
+    out = _again(solved)
+    before = {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
+    other = written(tmp_path, SOFT.replace("[2, 3]", "[4]"), "other")
+    assert sweep(other, "-o", out) == 2
+    assert capsys.readouterr().err == (
+        f"{out}: holds another sweep, which has no case in common with {other}; choose another folder with -o, or "
+        "remove this one.\n"
+    )
+    assert {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()} == before
+
+
+def test_identical_cases_are_solved_once(tmp_path, capsys):
+    file = written(tmp_path, "[grid]\njoint.clearance = [0.005, 0.0050]\nload.steps = [1, 1]\n")
+    assert sweep(file, "-o", tmp_path / "out") == 0
+    assert "4 cases, 1 of them distinct" in capsys.readouterr().out
+    rows = numbers(tmp_path / "out")
+    assert [row.pop("case") for row in rows] == ["1", "2", "3", "4"]
+    assert rows == 4 * rows[:1]
+    assert len(list((tmp_path / "out" / "cases").iterdir())) == 1
+
+
+def test_a_failure_stops_nobody_else(tmp_path, capsys):
+    """A case that finds no equilibrium, and one that raises: noted, exit code 3, and left alone until --retry."""
+    file = written(
+        tmp_path, f"[[list]]\nload.steps = 1\n[[list]]\n{STUCK}[[list]]\npin.E = 1.0\n[[list]]\npin.nu = 0.2\n"
+    )
+    runs = [case.run for case in read_sweep(file).cases]
+    taken = tmp_path / "out" / "cases" / runs[2]
+    assert sweep(file, "-o", tmp_path / "out", "--array", "4/4", "-q") in (0, 3)  # makes the folder
+    if taken.exists():
+        shutil.rmtree(taken)
+    taken.write_text("a file where the run folder belongs")
+    capsys.readouterr()
+    assert sweep(file, "-o", tmp_path / "out") == 3
+    out, err = capsys.readouterr()
+    assert "2 done, 1 stopped, 1 failed" in out
+    assert f"archord: case 2, {runs[1]}: stopped: " in err
+    ends = table(tmp_path / "out" / "cases.csv")
+    assert [end["status"] for end in ends][:2] == ["done", "stopped"]
+    assert "no equilibrium" in ends[1]["message"]
+    assert ends[3]["status"] == "done"
+    before = times(tmp_path / "out")
+    assert sweep(file, "-o", tmp_path / "out", "-q") == 3
+    assert times(tmp_path / "out") == before
+    taken.unlink()
+    assert sweep(file, "-o", tmp_path / "out", "-q", "--retry") == 3
+    assert [end["status"] for end in table(tmp_path / "out" / "cases.csv")] == ["done", "stopped", "done", "done"]
+
+
+def test_an_error_is_kept_with_its_traceback(tmp_path, monkeypatch, capsys):
+    """What nobody foresaw is the case's own: failure.txt has it, the table its sentence, and a retry removes it."""
+    from archord.presets import joint
+
+    true_mesh = joint.Joint._mesh
+
+    def broken(self, partitioner):
+        if self.scene.pin.E == 1.0:
+            raise ValueError("two\nlines")
+        return true_mesh(self, partitioner)
+
+    monkeypatch.setattr(joint.Joint, "_mesh", broken)
+    file = written(tmp_path, "[grid]\npin.E = [0.5, 1.0, 1.82]\n")
+    assert sweep(file, "-o", tmp_path / "out") == 3
+    assert "2 done, 1 failed" in capsys.readouterr().out
+    end = table(tmp_path / "out" / "cases.csv")[1]
+    assert (end["status"], end["message"], end["P [E* R]"]) == ("failed", "ValueError: two lines", "")
+    run_folder = tmp_path / "out" / "cases" / end["run"]
+    assert "in broken" in (run_folder / "failure.txt").read_text()
+    monkeypatch.undo()
+    assert sweep(file, "-o", tmp_path / "out", "--retry", "-q") == 0
+    assert standing(run_folder).status == "done"
+    assert not (run_folder / "failure.txt").exists()
+
+
+def test_an_array_solves_the_whole(tmp_path, solved):
+    """Part by part into one folder; the last part leaves the table of the whole, and so does --gather."""
+    file, out = written(tmp_path, SOFT), tmp_path / "out"
+    for part, done in (("2/2", 3), ("1/2", 6)):
+        assert sweep(file, "-o", out, "--array", part, "-q") == 0
+        assert sum(row["status"] == "done" for row in table(out / "cases.csv")) == done
+    assert numbers(out) == numbers(_again(solved))
+    for name in ("sweep.csv", "cases.csv", "sweep.h5"):
+        (out / name).unlink()
+    before = times(out)
+    assert sweep(file, "-o", out, "--gather", "-q") == 0
+    assert numbers(out) == numbers(solved / "out")
+    assert times(out) == before
+
+
+def _again(solved: Path) -> Path:
+    """The folder of `solved` with the tables of its own file."""
+    assert sweep(written(solved, SOFT), "-o", solved / "out", "--gather", "-q") == 0
+    return solved / "out"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["FILE", "--dry-run"], ""),
+        (["FILE", "--array", "3/2"], "--array 3/2: must be I/N, with I from 1 to N.\n"),
+        (["FILE", "--ranks-per-case", "2"], "--ranks-per-case 2: must divide the number of ranks, 1.\n"),
+        (["FILE", "--gather"], "runs/some: holds no sweep to gather.\n"),
+        (["FILE", "-o", "full"], "full: is not empty and holds no sweep; choose another folder with -o.\n"),
+        (["FILE", "-o", "full/file"], "full/file: is a file, not the folder of a sweep.\n"),
+        (["WRONG"], "WRONG: case 2: pin.E = -1.0 must be greater than 0.\n"),
+        (["full"], "full: is not the folder of a sweep: sweep.toml is missing.\n"),
+        (["nowhere.toml"], "nowhere.toml: cannot be read: No such file or directory.\n"),
+    ],
+)
+def test_nothing_is_written_by_a_dry_run_or_bad_input(tmp_path, monkeypatch, capsys, arguments, said):
+    """Exit code 2 with a sentence; a dry run prints a line for each case."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "file").touch()
+    file, wrong = written(tmp_path, SOFT), written(tmp_path, "[grid]\npin.E = [1.0, -1.0]\n", "wrong")
+    before = sorted(tmp_path.rglob("*"))
+    code = sweep(*(a.replace("FILE", file).replace("WRONG", wrong) for a in arguments))
+    out, err = capsys.readouterr()
+    assert err == said.replace("WRONG", wrong)
+    assert code == (2 if said else 0)
+    if not said:
+        assert out.startswith("6 cases; about ")
+        assert [line.split()[0] for line in out.splitlines()[2:]] == ["1", "2", "3", "4", "5", "6"]
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_numbers_of_absent_and_mixed_keys(tmp_path):
+    """An absent key is empty in the CSV and nan in the HDF5 file, text and lists are text."""
+    text = """
+        [[list]]
+        block.yield_stress = "none"
+        [[list]]
+        block.yield_stress = 0.05
+        [grid]
+        load.displacement = [0.5, [0.5, 0.2]]
+        analysis.plane = ["stress"]
+    """
+    assert sweep(written(tmp_path, text), "-o", tmp_path / "out", "-q") == 0
+    rows = table(tmp_path / "out" / "cases.csv")
+    assert [row["block.yield_stress [E*]"] for row in rows] == ["", "", "0.05", "0.05"]
+    assert [row["load.displacement"] for row in rows] == 2 * ["0.5", "[0.5, 0.2]"]
+    with h5py.File(tmp_path / "out" / "sweep.h5") as file:
+        cases = file["cases"][()]
+    assert np.isnan(cases["block.yield_stress [E*]"][:2]).all()
+    assert cases["analysis.plane"][0] == b"stress"
+    assert cases["load.displacement"][1] == b"[0.5, 0.2]"

@@ -1,0 +1,151 @@
+"""archord sweep in processes of its own: killed, interrupted, and under mpirun."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from archord.studies.case_run import report_of
+from archord.studies.cases import read_sweep
+from tests.studies.parts import numbers, sweep, table, times, written
+from tests.test_cli import ENVIRONMENT, archord
+
+pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
+TEXT = "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\nload.steps = [5, 6, 7]\n"  # twelve cases, some two seconds
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> Path:
+    """A sweep solved in one go."""
+    folder = tmp_path_factory.mktemp("whole")
+    assert sweep(written(folder, TEXT), "-o", folder / "out", "-q") == 0
+    return folder / "out"
+
+
+def started(file: str, folder: Path, ranks: int = 0) -> subprocess.Popen:
+    launcher = ["mpirun", "-n", str(ranks)] if ranks else []
+    command = [*launcher, sys.executable, "-m", "archord", "sweep", file, "-o", str(folder)]
+    return subprocess.Popen(command, env=ENVIRONMENT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def done(folder: Path) -> set[str]:
+    return {p.name for p in folder.glob("cases/*") if report_of(p).get("status") == "done"}
+
+
+def until_cases_are_done(process: subprocess.Popen, number: int) -> None:
+    """Wait until the process has reported so many cases; fails if it ends before."""
+    assert process.stdout is not None
+    for line in process.stdout:
+        number -= " done, " in line
+        if not number:
+            return
+    raise AssertionError(process.stderr.read() if process.stderr else "")
+
+
+def test_a_killed_sweep_goes_on_where_it_was(whole, tmp_path):
+    """kill -9 at random moments: what is done stays as it is, and the end is that of the sweep in one go."""
+    chance, out, file = random.Random(3), tmp_path / "out", written(tmp_path, TEXT)
+    continued = 0
+    for cases in (1, 3):
+        finished, before = done(out), times(out)
+        process = started(file, out)
+        until_cases_are_done(process, cases)
+        time.sleep(chance.uniform(0, 0.15))
+        process.kill()
+        process.communicate()
+        after = times(out)
+        for name, written_at in before.items():
+            if name.split("/")[1] in finished:
+                assert after[name] == written_at, name
+        assert len(done(out)) >= len(finished) + cases
+        continued += any((p / "checkpoint.h5").exists() and p.name not in done(out) for p in out.glob("cases/*"))
+    assert len(done(out)) < 12
+    assert sweep(file, "-o", out, "-q") == 0
+    same_numbers(out, whole)
+    restarted = [p for p in out.glob("cases/*") if report_of(p)["restarts"]]
+    assert len(restarted) >= min(continued, 1)
+
+
+def same_numbers(a: Path, b: Path) -> None:
+    """A continued run has the numbers of one in one go to round-off."""
+    for one, other in zip(numbers(a), numbers(b), strict=True):
+        for name in one:
+            if name in ("run", "status"):
+                assert one[name] == other[name]
+            elif name != "force_balance":
+                assert float(one[name]) == pytest.approx(float(other[name]), rel=1e-10, abs=1e-30), name
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_a_signal_ends_a_sweep_in_order(whole, tmp_path, ranks):
+    """SIGTERM: running cases keep their accepted steps, the tables tell, and the sweep goes on to the same numbers."""
+    out, file = tmp_path / "out", written(tmp_path, TEXT)
+    process = started(file, out, ranks)
+    until_cases_are_done(process, 2)
+    process.send_signal(signal.SIGTERM)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == (1 if ranks else 143)
+    if ranks:  # mpirun kills its ranks after a quarter of a second: the tables may not be there
+        assert sweep(file, "-o", out, "--gather", "-q") == 0
+    else:
+        assert " open in " in said
+    status = [row["status"] for row in table(out / "cases.csv")]
+    assert set(status) <= {"done", "interrupted", "open"}
+    assert 2 <= status.count("done") == len(done(out)) < 12
+    finished, before = done(out), times(out)
+    assert sweep(file, "-o", out, "-q") == 0
+    after = times(out)
+    assert all(after[name] == at for name, at in before.items() if name.split("/")[1] in finished)
+    same_numbers(out, whole)
+
+
+def test_two_ranks_write_what_one_does(whole, tmp_path):
+    """The same tables but for the seconds, to the last digit; told once."""
+    result = archord("sweep", written(tmp_path, TEXT), "-o", "out", cwd=tmp_path, ranks=2)
+    assert result.returncode == 0, result.stderr
+    assert result.stderr == ""
+    assert numbers(tmp_path / "out") == numbers(whole)
+    assert numbers(tmp_path / "out", "cases.csv") == numbers(whole, "cases.csv")
+    assert sum(" done, " in line for line in result.stdout.splitlines()) == 12
+    assert "2 meshes made, 10 used again" in result.stdout  # both ranks worked: each made the mesh
+
+
+def test_two_ranks_tell_bad_input_once(tmp_path):
+    file = written(tmp_path, "[grid]\npin.E = [-1.0]\n")
+    result = archord("sweep", file, cwd=tmp_path, ranks=2)
+    assert result.returncode == 2
+    assert result.stderr.count("pin.E = -1.0 must be greater than 0.") == 1
+    assert not (tmp_path / "runs").exists()
+
+
+def test_the_reader_of_the_progress_may_leave(tmp_path):
+    """``archord sweep ... | head -1`` solves all cases."""
+    file = written(tmp_path, "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\n")
+    process = started(file, tmp_path / "out")
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.stdout.close()
+    process.wait(60)
+    assert process.returncode == 0
+    assert len(done(tmp_path / "out")) == len(read_sweep(file).distinct) == 4
+    assert {row["status"] for row in table(tmp_path / "out" / "cases.csv")} == {"done"}
+
+
+def test_the_job_script_calls_what_exists(tmp_path):
+    """Without SLURM it is one part of one; within an array, it is the task's part."""
+    root = Path(__file__).parents[2]
+    script, file = root / "docs" / "cluster" / "sweep.sbatch", written(tmp_path, TEXT)
+    command = ["bash", str(script), file, "-o", str(tmp_path / "out")]
+    plain = subprocess.run([*command, "--dry-run"], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    assert plain.returncode == 0, plain.stderr
+    assert plain.stdout.startswith("12 cases; ")
+    task = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_COUNT": "12", "TMPDIR": str(tmp_path)}
+    part = subprocess.run([*command, "-q"], cwd=tmp_path, env=task, capture_output=True, text=True)
+    assert part.returncode == 0, part.stderr
+    assert len(done(tmp_path / "out")) == 1
+    assert not list(tmp_path.glob("archord.*"))  # its scratch is gone
