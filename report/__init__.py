@@ -1,0 +1,1 @@
+"""Tables, figures and files for people: one of each. Imports nothing of archord."""

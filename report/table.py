@@ -1,0 +1,51 @@
+"""Tables, on a terminal and as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+
+class Table:
+    """Rows of cells under ``headings``; ``str()`` is the table in aligned columns, `markdown` that of a document.
+
+    The first ``left`` columns hold text, the others numbers, which are aligned on the right. Cells may be anything that
+    has a `str`.
+    """
+
+    def __init__(self, *headings: str, rows: Iterable[Iterable[object]] = (), left: int = 0) -> None:
+        self.headings, self.left = headings, left
+        self.rows: list[list[str]] = []
+        for row in rows:
+            self.add(*row)
+
+    @classmethod
+    def of(cls, rows: Sequence[Mapping[str, object]], left: int = 0) -> Table:
+        """The table of ``rows``, at least one, which all have the headings of the first."""
+        return cls(*rows[0], rows=[row.values() for row in rows], left=left)
+
+    def add(self, *cells: object) -> None:
+        """Add a row. Raises `ValueError` if it is not as long as the headings."""
+        if len(cells) != len(self.headings):
+            raise ValueError(f"a row of {len(cells)} cells under {len(self.headings)} headings")
+        self.rows.append([str(cell) for cell in cells])
+
+    def __str__(self) -> str:
+        """In columns two spaces apart."""
+        lines = [list(self.headings), *self.rows]
+        width = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        return "\n".join(
+            "  ".join(
+                cell.ljust(w) if k < self.left else cell.rjust(w)
+                for k, (cell, w) in enumerate(zip(line, width, strict=True))
+            ).rstrip()
+            for line in lines
+        )
+
+    def markdown(self) -> str:
+        """As Markdown, a bar within a cell escaped, with a line break at the end."""
+        lines = [_line(self.headings), "|---" * len(self.headings) + "|", *map(_line, self.rows)]
+        return "\n".join(lines) + "\n"
+
+
+def _line(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
