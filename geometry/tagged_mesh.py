@@ -1,0 +1,44 @@
+"""A mesh with named sets of cells and facets: what a problem's bodies, surfaces and supports are found by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx.mesh import Mesh, MeshTags
+
+
+@dataclass(frozen=True)
+class TaggedMesh:
+    """A mesh of triangles, its ``cells`` and ``facets`` with tags, and the tags' names; all bodies live in one mesh."""
+
+    mesh: Mesh
+    cells: MeshTags
+    facets: MeshTags
+    cell_sets: Mapping[str, int]
+    facet_sets: Mapping[str, int]
+
+    def cells_of(self, name: str) -> np.ndarray:
+        """Cells ``(n,)`` of this rank, ghosts included, of the set ``name``. Raises ValueError."""
+        return self.cells.find(_tag("cell", self.cell_sets, name))
+
+    def facets_of(self, name: str) -> np.ndarray:
+        """Facets ``(n,)`` of this rank, ghosts included, of the set ``name``. Raises ValueError."""
+        return self.facets.find(_tag("facet", self.facet_sets, name))
+
+    def tags_behind(self, name: str) -> set[int]:
+        """Tags of the cells at the facets of the set ``name``, over all ranks. Collective."""
+        self.mesh.topology.create_connectivity(1, 2)
+        to_cell = self.mesh.topology.connectivity(1, 2)
+        n_cells = self.mesh.topology.index_map(2).size_local + self.mesh.topology.index_map(2).num_ghosts
+        tag = np.zeros(n_cells, dtype=np.int64)
+        tag[self.cells.indices] = self.cells.values
+        here = {int(tag[cell]) for facet in self.facets_of(name) for cell in to_cell.links(facet)}
+        return set().union(*self.mesh.comm.allgather(here))
+
+
+def _tag(kind: str, sets: Mapping[str, int], name: str) -> int:
+    if name not in sets:
+        raise ValueError(f"there is no {kind} set {name!r}; there are {', '.join(map(repr, sets))}")
+    return sets[name]
