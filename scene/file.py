@@ -66,7 +66,8 @@ def read_targets(data: dict[str, Any], scene: Path) -> None:
         raise InputError(f"{scene}: load.path must not be given together with {both}.")
     file = scene.parent / load.pop("path")
     try:
-        heading, *rows = [row for row in csv.reader(file.open(newline="", encoding="utf-8-sig")) if row] or [[]]
+        reader = csv.reader(file.open(newline="", encoding="utf-8-sig"))
+        (_, heading), *rows = [(reader.line_num, row) for row in reader if row] or [(0, [])]
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror or error}.") from None
     except (UnicodeDecodeError, csv.Error):
@@ -74,11 +75,20 @@ def read_targets(data: dict[str, Any], scene: Path) -> None:
     name = heading[0].strip() if len(heading) == 1 else None
     if name not in LOADS:
         raise InputError(f"{file}: must have one column, headed by {', '.join(LOADS[:-1])} or {LOADS[-1]}.")
-    try:
-        load[name] = [float(row[0]) for row in rows]
-    except ValueError as error:
-        raise InputError(f"{file}: {error}; every row below the heading must be a number.") from None
+    load[name] = [_target(file, line, row) for line, row in rows]
     load.setdefault("steps", 1)
+
+
+def _target(file: Path, line: int, row: list[str]) -> float:
+    """The number in ``row`` of the ``file`` of targets. Raises `InputError`."""
+    try:
+        (value,) = row  # 0,5 with a decimal comma would be two
+        return float(value)
+    except ValueError:
+        given = _shortened(json.dumps(",".join(row), ensure_ascii=False))
+        raise InputError(
+            f"{file}: line {line}: {given} must be one number, as every row below the heading (0.5, not 0,5)."
+        ) from None
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
