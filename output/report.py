@@ -26,6 +26,10 @@ from archord.solver.timer import BEFORE_SOLVING
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")
 _FEW_FACETS = 5
 _ROUGH = 0.01  # of the clearance
+_APART = (
+    "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; give a "
+    "displacement or a force above 0 if it should"
+)
 
 
 class Report:
@@ -76,7 +80,7 @@ class Report:
             "started": before["started"],
             "command": before["command"],
             "restarts": [*before.get("restarts", []), restart],
-            "warnings": [w for w in before["warnings"] if _step_of(w) <= done],
+            "warnings": [w for w in before["warnings"] if _step_of(w) <= done and w != _APART],
             "steps": steps,
         }
 
@@ -98,6 +102,8 @@ class Report:
     def finish(self, status: str, message: str, failed: Step | None = None) -> None:
         """Note how the run ended, and the output step that ``failed``."""
         self.content |= {"status": status, "message": message}
+        if status == "done" and not any(m.contact_area for m in self.measures):
+            self.content["warnings"].append(_APART)
         if failed is not None:
             self.content["failed_step"] = asdict(failed)
         self.write()

@@ -85,8 +85,11 @@ def fit_curve(
     of ``k``, and ``c`` alone is fitted to those that have. ``hold_k`` is ``k`` where it is given, without an error.
     Where some scenes have a second mesh, the fit is repeated with their data extrapolated to vanishing element size;
     the change of a parameter is its discretisation error.
-    Raises `InputError` where too few steps are in the range.
+    Raises `InputError` where too few steps are in the range, or a run's bodies never touch.
     """
+    for run in (run for g in groups for run in g.runs):
+        if not ((run.P > 0) & (run.p0 > 0)).any():
+            raise InputError(f"{run.name}: the bodies never touch in this run, so there is no law to fit to it.")
     runs = tuple(g.run for g in groups)
     chosen = tuple(selected(run, load_range) for run in runs)
     yielded = tuple(rows & (run.peeq_max > 0) for run, rows in zip(runs, chosen, strict=True))

@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord import cli
 from archord.output import run as run_module
 from archord.output.folder import CHECKPOINT, FILES, PICTURES, claim_folder
 from archord.output.history import read_history
+from archord.output.restart import plan_extension
 from archord.output.run import solve_scene
 from archord.postprocess.picture import draw
 from archord.scene.errors import InputError
-from archord.scene.file import load_scene
+from archord.scene.file import load_scene, resolved
 from tests.solver.solving import scene
 
 
@@ -226,10 +228,11 @@ def test_results_are_not_overwritten_by_accident(tmp_path):
         claim_folder(tmp_path / "new" / "history.csv", True)
 
 
-def test_a_pin_that_touches_nothing_has_no_warnings(tmp_path):
-    """Lifted: what is left of P is round-off, and no reason to doubt the solution."""
+def test_a_pin_that_touches_nothing_has_no_warning_of_its_round_off(tmp_path):
+    """Lifted: what is left of P is round-off, and no reason to doubt the solution; that it is lifted is told."""
     outcome = solve_scene(scene(0.2, 2, load={"displacement": -1.0}), tmp_path, MPI.COMM_SELF)
-    assert (outcome.status, outcome.warnings) == ("done", [])
+    assert outcome.status == "done"
+    assert [w.partition(":")[0] for w in outcome.warnings] == ["the bodies never touched"]
     assert max(m.force_balance for m in outcome.steps) < 1e-8
     assert json.loads((tmp_path / "run.json").read_text())["error_estimates"]["newton_residual"] < 1e-8
 
@@ -249,6 +252,27 @@ def test_a_contact_that_reaches_the_end_of_the_arc_is_named(tmp_path):
         thin = scene(0.2, 2, joint={"clearance": 0.001}, load={"displacement": load})
         outcome = solve_scene(thin, folder, MPI.COMM_SELF)
         assert any("contact reaches the end of the modelled quarter arc" in w for w in outcome.warnings) == said
+
+
+@pytest.mark.parametrize("load", [{"displacement": -0.5}, {"displacement": None, "relative_force": 0.0}])
+def test_bodies_that_never_touch_are_named(tmp_path, load, capfd):
+    """Drawn apart, or not pressed at all: a warning in run.json and on the screen, which goes once they touch."""
+    scene_file, folder = tmp_path / "apart.toml", tmp_path / "run"
+    scene_file.write_text(resolved(scene(0.3, 1, load=load)), encoding="utf-8")
+    assert cli.run(["solve", str(scene_file), "-o", str(folder)]) == 0
+    (warning,) = json.loads((folder / "run.json").read_text())["warnings"]
+    assert warning.startswith("the bodies never touched: ")
+    assert f"archord: warning: {warning}." in capfd.readouterr().err
+
+
+def test_bodies_that_touch_after_all_are_not_said_to_be_apart(tmp_path):
+    """A run that is extended loses the warning."""
+    for load, apart in (([-0.5], True), ([-0.5, 1.0], False)):
+        pulled = scene(0.3, 1, load={"displacement": load})
+        start = None if apart else plan_extension(tmp_path, pulled).start
+        outcome = solve_scene(pulled, tmp_path, MPI.COMM_SELF, start=start)
+        assert outcome.status == "done"
+        assert any("never touched" in w for w in outcome.warnings) == apart
 
 
 def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):

@@ -69,16 +69,24 @@ def test_held_k_is_told_everywhere(runs, tmp_path, capsys):
         (["{elastic}", "--python", "{empty}"], "{empty}: cannot be written: it is a folder"),
         (["{elastic}", "--json", "{empty}/x.json", "--picture", "{empty}/x.xyz"], "{empty}/x.xyz: must end in one of "),
         (["{elastic}", "--held-out", "0.2"], "{elastic}: --csv, --law and --held-out are for a sweep, and this is"),
+        (["{apart}"], "{apart}: the bodies never touch in this run, so there is no law to fit to it."),
+        (["{coarse}", "{apart}"], "{apart}: the bodies never touch in this run, so there is no law to fit to it."),
+        (["{level}"], "{level}: the bodies never touch in this run, so there is no law to fit to it."),
         (["{begun}"], "{begun}: holds no accepted step."),
         (["{broken}"], "{broken}/history.csv: cannot be read as the history of a run."),
     ],
 )  # fmt: skip
 def test_bad_input_is_one_sentence(runs, tmp_path, capsys, arguments, said):
     """Exit code 2, nothing on stdout."""
-    folders = runs | {name: tmp_path / name for name in ("empty", "begun", "broken")}
+    folders = runs | {name: tmp_path / name for name in ("empty", "begun", "broken", "apart", "level")}
     (tmp_path / "empty").mkdir()
     history = (runs["elastic"] / "history.csv").read_text()
-    for name, text in (("begun", history.splitlines()[0] + "\n"), ("broken", history + "1,2\n")):
+    heading, first = history.splitlines()[:2]
+    none = ["0" for _ in first.split(",")]
+    apart, level = (",".join(["1", delta, delta, *none[3:]]) for delta in ("-0.001", "0.001"))
+    texts = {"begun": f"{heading}\n", "broken": f"{history}1,2\n"}
+    texts |= {"apart": f"{heading}\n{apart}\n", "level": f"{heading}\n{level}\n"}
+    for name, text in texts.items():
         (tmp_path / name).mkdir()
         (tmp_path / name / "scene.toml").write_text((runs["elastic"] / "scene.toml").read_text())
         (tmp_path / name / "history.csv").write_text(text)
