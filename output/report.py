@@ -84,12 +84,12 @@ class Report:
             "steps": steps,
         }
 
-    def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
-        """Note an accepted output step."""
+    def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile], core_peeq: float = 0.0) -> None:
+        """Note an accepted output step, at which the core has a PEEQ of up to ``core_peeq`` (`Joint.core_peeq`)."""
         self.measures.append(m)
         if m.contact_area:
             self._residual = max(self._residual, step.residual)
-        self.content["warnings"] += _warnings(self.joint, profiles, m, step.residual)
+        self.content["warnings"] += _warnings(self.joint, profiles, m, step.residual, core_peeq)
         self.content["steps"].append(
             asdict(m)
             | {"substeps": step.substeps, "coarse_iterations": step.coarse_iterations}
@@ -229,7 +229,9 @@ def _rough_arcs(joint: Joint) -> list[str]:
     return [f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"]
 
 
-def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
+def _warnings(
+    joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float, core_peeq: float
+) -> list[str]:
     said = []
     if joint.scene.joint.model == "block" and any(p.in_contact[-1] > 0 for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
@@ -237,6 +239,12 @@ def _warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residu
     if m.contact_area and touching < _FEW_FACETS:
         said.append(
             f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
+        )
+    if core_peeq > 0:
+        said.append(
+            f"the pin yields where the force is applied, with PEEQ up to {core_peeq:.1e} in its core, and delta, the "
+            "mean displacement of the core, contains by how much it is squashed there; a larger load.core_radius would "
+            "spread the force"
         )
     if abs(m.delta) > 0.1 * joint.scene.joint.radius:
         said.append("delta exceeds 0.1 R, too much for small-strain theory")

@@ -218,12 +218,13 @@ class _Output:
 
     def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile], *, again: bool = False) -> None:
         """Make ``m`` the last step of all files but the checkpoint, ``again`` after a halt. Collective."""
+        core_peeq = self.joint.core_peeq()
 
         def add() -> None:
             assert self._report is not None
             self._contact.write(m.step, m.delta, profiles, again=again)
             self._history.add(m)
-            self._report.add(m, step, profiles)
+            self._report.add(m, step, profiles, core_peeq)
 
         with self.joint.timer("output"):
             if self._fields is not None:

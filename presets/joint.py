@@ -11,7 +11,7 @@ from dolfinx import fem
 from dolfinx.la import InsertMode
 from mpi4py import MPI
 
-from archord.geometry.basis import Array
+from archord.geometry.basis import Array, bulk_quadrature, cell_basis
 from archord.geometry.curve import RigidCircle
 from archord.geometry.half_ring import half_ring
 from archord.geometry.joint_mesh import Cells, Facets, JointMesh, refinements
@@ -87,6 +87,7 @@ class Joint:
             self.solver = NewtonSolver(
                 self.equilibrium, tolerance=analysis.tolerance, max_iterations=analysis.max_iterations
             )
+            self._in_core: np.ndarray | None = None  # which points of the pin; found when they are first asked for
 
     def _mesh(self, partitioner) -> JointMesh:
         g = self.scene.joint
@@ -159,6 +160,17 @@ class Joint:
             return self.equilibrium.level
         u = self.equilibrium.displacement()[: self.equilibrium.n_owned]
         return self.comm.allreduce(-float((self._core * u).sum())) - max(self.scene.joint.dR, 0.0)
+
+    def core_peeq(self) -> float:
+        """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a block. Collective."""
+        if self.scene.joint.model != "ring" or self.scene.pin.yield_stress is None:
+            return 0.0
+        cells, points = self.bulk.histories()[Cells.PIN]
+        if self._in_core is None:
+            x = cell_basis(self.V.mesh, self.bulk.degree, cells, bulk_quadrature(self.bulk.degree)[0]).point
+            core = self.scene.load.core_radius * self.scene.joint.radius
+            self._in_core = (np.linalg.norm(x, axis=-1) < core).ravel()
+        return self.comm.allreduce(float(points.trial.peeq[self._in_core].max(initial=0.0)), op=MPI.MAX)
 
     def forces(self) -> dict[str, float]:
         """Downward force of the whole joint at pin, contact and block's support, per unit thickness."""

@@ -6,8 +6,10 @@ from mpi4py import MPI
 
 from archord.benchmarks.verification.persson import DR, UNLIKE, persson_joint, theory, unlike
 from archord.output.report import energy_balance
+from archord.output.run import solve_scene
 from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.laws.persson_law import persson_pressure
+from archord.scene.scene import Load
 from tests.solver.solving import solve
 
 LIKE = LawJoint(1.0, DR, 1.0)
@@ -72,6 +74,46 @@ def test_unlike_bodies_follow_ciavarella_and_decuzzi(bodies):
     m, (eps, peak) = solve(persson_joint(0.5, **sections)).steps[-1], theory(0.5, alpha)
     assert m.p0 / m.P == pytest.approx(peak, rel=5e-3)
     assert np.degrees(m.eps) == pytest.approx(np.degrees(eps), abs=0.5)
+
+
+def pressed_core(core_radius=0.1, yield_stress=None, of="pin"):
+    """A ring whose loaded core yields before the contact does."""
+    load = {"relative_force": 0.006, "steps": 4, "core_radius": core_radius}
+    body = {of: {"yield_stress": yield_stress}} if yield_stress else {}
+    return persson_joint(0.5, 0.1, joint={"clearance": 1e-3}, **body).model_copy(update={"load": Load(**load)})
+
+
+def test_a_core_that_yields_is_named_from_the_step_in_which_delta_contains_it(tmp_path):
+    """Up to there delta is that of a pin that does not yield, beyond it is larger; a larger core does not yield."""
+    elastic = np.array([m.delta for m in solve(pressed_core()).steps])
+    outcome = solve_scene(pressed_core(yield_stress=0.01), tmp_path, MPI.COMM_SELF)
+    named = [f"step {m.step}: the pin yields where the force is applied" for m in outcome.steps if m.peeq_max > 0]
+    assert [w.partition(", with PEEQ")[0] for w in outcome.warnings] == named
+    squashed = np.array([m.delta for m in outcome.steps]) / elastic - 1
+    first = 4 - len(named)
+    assert 0 < first < 4
+    assert (abs(squashed[:first]) < 1e-9).all()
+    assert (squashed[first:] > 1e-4).all()
+    assert all("a larger load.core_radius" in w for w in outcome.warnings)
+    wide = solve(pressed_core(0.3, 0.01))
+    assert wide.joint.core_peeq() == wide.steps[-1].peeq_max == 0
+
+
+def test_yielding_beside_the_core_is_not_the_core_s(tmp_path):
+    """A block that yields at its hole leaves the core alone, and what the run warns of."""
+    outcome = solve_scene(pressed_core(0.1, 0.002, "block"), tmp_path, MPI.COMM_SELF)
+    assert outcome.steps[-1].peeq_max > 0
+    assert not any("where the force is applied" in w for w in outcome.warnings)
+    pin = solve(pressed_core(0.1, 0.01))
+    assert pin.joint.core_peeq() == pin.steps[-1].peeq_max > 0
+
+
+@pytest.mark.mpi
+def test_a_core_that_yields_is_known_on_every_rank(comm):
+    """The largest PEEQ within the core, whoever has its cells."""
+    one, several = (solve(pressed_core(yield_stress=0.01), c).joint.core_peeq() for c in (MPI.COMM_SELF, comm))
+    assert several == pytest.approx(one, rel=1e-6)
+    assert one > 0
 
 
 @pytest.mark.mpi
