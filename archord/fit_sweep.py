@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 FILE = "sweep.toml"
 TABLE = "fit.csv"
+BLOCKS = "small blocks"
 
 
 @dataclass
@@ -100,6 +101,8 @@ def fit_sweep(
         print(f"model: {too_few}; the table stands alone.")
     else:
         _print_model(result, len(found.cases))
+    if BLOCKS in found.notes:
+        print(f"\n{BLOCKS}: {found.notes[BLOCKS]}; k is smaller in them, which a model does not know.\n")
     _print_shipped(used, found.notes)
     for file in files:
         print(file)
@@ -215,6 +218,13 @@ def _runs(distinct: list[Case], folder: Path) -> tuple[list[tuple[Case, Any]], l
     return runs, left_out
 
 
+def _softer(case: Case) -> float:
+    """The share of P that the block of a ``case`` costs, 0 in a ring, which is not fitted."""
+    from archord.postprocess.laws.law_joint import LawJoint
+
+    return LawJoint.from_scene(case.scene).softer[0] if case.scene.joint.model == "block" else 0.0
+
+
 def _notes(folder: Path, distinct: list[Case], cases: list[FittedCase]) -> dict[str, str]:
     """Where the fitted cases are from."""
     import hashlib
@@ -227,8 +237,11 @@ def _notes(folder: Path, distinct: list[Case], cases: list[FittedCase]) -> dict[
     days = sorted({str(report.get("started", ""))[:10] for report in reports} - {""})
     command = [str(word) for word in (reports[0].get("command", []) if reports else [])]
     seconds = sum(report.get("seconds", {}).get("total", 0.0) for report in reports)
+    softer = {
+        case.scene.joint.W / case.scene.joint.radius: share for case in distinct if (share := _softer(case)) > 0.01
+    }
     meshes = sorted({f"{case.mesh:.3g}" for case in cases})
-    return {
+    notes = {
         "archord": __version__,
         "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
         "command": " ".join([Path(command[0]).name, *command[1:]]) if command else "unknown",
@@ -237,3 +250,6 @@ def _notes(folder: Path, distinct: list[Case], cases: list[FittedCase]) -> dict[
         "mesh": f"elements of {' and '.join(meshes)} R on the arcs",
         "cost": f"{seconds:.0f} s on one rank, on a machine that did other work besides",
     }
+    if softer:
+        notes[BLOCKS] = f"block_size from {min(softer):.4g} R on, P about {max(softer.values()):.1%} smaller there"
+    return notes

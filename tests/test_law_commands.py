@@ -89,6 +89,39 @@ def test_bad_input_is_one_sentence(capsys, arguments, said):
     assert result.out == ""
 
 
+def test_a_ring_has_no_law_with_displacements(tmp_path, capsys):
+    """One sentence that says how wrong it would be; p0 and eps of a load are a ring's as well."""
+    ring = tmp_path / "ring.toml"
+    ring.write_text(
+        '[joint]\nmodel = "ring"\nradius = 10.0\nclearance = 0.05\n[pin]\nE = 2e5\nnu = 0.3\n[block]\nE = 2e5\n'
+        "nu = 0.3\n[load]\nrelative_force = 0.01\n",
+        encoding="utf-8",
+    )
+    for words in ([], ["paper", "persson"], ["johnson", "--by-load"], ["paper", "--plot", str(tmp_path / "x.png")]):
+        assert run(["law", *words, "--scene", str(ring)]) == 2
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert 'of joint.model = "ring" its P would be about twice too high' in err
+        assert len(err.splitlines()) == 1
+    assert run(["law", "persson", "hertz", "--scene", str(ring), "--to", "0.1"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("width", "share"), [("25", "22.4%"), ("100", "1.4%"), ("300", "0.2%"), ("1000", None)])
+def test_a_small_block_is_told_with_the_size_of_its_effect(capsys, width, share):
+    """Once for the table and for the picture; the numbers stay those of the law; --strict makes it an error."""
+    words = ["law", "paper", "--scene", SCENE, "--points", "3"]
+    assert run(words) == 0
+    wide = capsys.readouterr().out
+    words += ["--set", f"joint.block_size={width}"]
+    assert run(words) == 0
+    out, err = capsys.readouterr()
+    assert out == wide
+    assert len(err.splitlines()) == (share is not None)
+    assert share is None or f"its P about {share} smaller than the law's" in err
+    assert run([*words, "--strict"]) == (2 if share else 0)
+
+
 def test_law_draws(tmp_path, capsys):
     target = tmp_path / "laws.svg"
     assert run(["law", "paper", "johnson", "persson", *JOINT, "--plot", str(target)]) == 0

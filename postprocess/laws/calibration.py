@@ -8,10 +8,13 @@ import numpy as np
 
 from archord.postprocess.laws.curve_fit import CurveFit, fit_curve
 from archord.postprocess.laws.fitted_law import FittedLaw
+from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.plateau import fit_plateau
 from archord.postprocess.refinement import Refined, group
 from archord.postprocess.run_curve import RunCurve
 from archord.scene.errors import InputError
+
+_LIKE = 0.01  # share of P by which the blocks of runs of one fit may change it
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,11 @@ def _check_compatible(runs: list[RunCurve]) -> None:
         if not np.allclose(_elastic_pair(run), _elastic_pair(first), rtol=1e-6, atol=1e-9):
             raise InputError(f"{run.name}: the Poisson's ratios or the ratio of the moduli are not those of "
                              f"{first.name}; one k is for one pair of materials, fit them separately.")  # fmt: skip
+        softer = abs(LawJoint.from_scene(run.scene).softer[0] - LawJoint.from_scene(first.scene).softer[0])
+        if softer > _LIKE:
+            raise InputError(f"{run.name}: joint.block_size is {run.scene.joint.W / run.R:.4g} R and that of "
+                             f"{first.name} {first.scene.joint.W / first.R:.4g} R, by which their P differs by about "
+                             f"{softer:.1%}; fit them separately.")  # fmt: skip
 
 
 def _elastic_pair(run: RunCurve) -> tuple[float, float, float]:

@@ -11,13 +11,14 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from archord.postprocess.laws.law_joint import Array, LawJoint, LawRangeError, LawRangeWarning
+from archord.postprocess.laws.law_joint import LARGE, Array, LawJoint, LawRangeError, LawRangeWarning
 from archord.postprocess.laws.monotone_root import monotone_root
 from archord.scene.errors import InputError
 
 Outside = Literal["nan", "raise", "extrapolate"]
 _Function = Callable[[LawJoint, Array], Array]
 _Load = Callable[[LawJoint], float]
+_FELT = 1e-3  # share of P by which a small block must change it to be worth a word
 _ROUND_OFF = 1e-9  # a grid up to the limit may overshoot it
 
 
@@ -39,8 +40,9 @@ class Law:
     Displacements are positive in compression and measured from first touch, forces are per unit length of the joint,
     angles are semi-angles in radians. Methods take arrays of any shape and return arrays of that shape. ``outside``
     says what happens to points outside the range: ``"nan"`` and a `LawRangeWarning`, ``"raise"`` a `LawRangeError`,
-    ``"extrapolate"`` the formula with a `LawRangeWarning`, nan where the formula itself has ended. All raise
-    `InputError` if the law needs a parameter that the joint lacks, or does not give the quantity.
+    ``"extrapolate"`` the formula with a `LawRangeWarning`, nan where the formula itself has ended. Of a joint in a
+    small block laws with displacements warn (``"raise"``: a `LawRangeError`). All raise `InputError` if the law needs a
+    parameter that the joint lacks, does not give the quantity, or gives displacements and the joint is a ring.
     """
 
     name: str
@@ -120,6 +122,7 @@ class Law:
     def _at_displacement(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside) -> LawState:
         self._require_displacement()
         self._require(joint)
+        self._heed_block(joint, outside)
         given = np.asarray(delta, dtype=float)
         return self._state(joint, self._inside(joint, given, self.limit(joint), self.end(joint), "delta", outside))
 
@@ -129,6 +132,7 @@ class Law:
         limit, end = self.limit(joint), self.end(joint)
         if self.force_at is None:
             return self._state(joint, None, self._inside(joint, P, limit, end, "P", outside))
+        self._heed_block(joint, outside)
         P = self._inside(joint, P, self._force(joint, limit), self._force(joint, end), "P", outside)
         if self.displacement_of is not None:
             delta = self.displacement_of(joint, np.where(P >= 0, P, 0.0))
@@ -180,6 +184,23 @@ class Law:
         _tell(said, outside)
         keep = (x >= 0) & (x <= end * shift) if outside == "extrapolate" else ~beyond & (not reason)
         return np.where(keep, x, np.nan)
+
+    def _heed_block(self, joint: LawJoint, outside: Outside) -> None:
+        """Refuse a ring, whose P(delta) is another one; warn of a small block, which is softer than the law's."""
+        if joint.model == "ring":
+            raise InputError(
+                f'{self.name}: is a law for a pin in a block; of joint.model = "ring" its P would be about twice too '
+                "high. Of a ring only hertz and persson hold, which give no displacement."
+            )
+        about, most = joint.softer
+        if about > _FELT:
+            assert joint.block_size is not None
+            _tell(
+                f"{self.name}: is a law for a block of {LARGE:g} R; in this one of {joint.block_size / joint.radius:.4g} "
+                f"R the joint is softer, and its P about {about:.1%} smaller than the law's (up to {most:.1%} with a "
+                "rigid pin or beyond yield)",
+                outside,
+            )
 
     def _require(self, joint: LawJoint) -> None:
         for name in self.needs:

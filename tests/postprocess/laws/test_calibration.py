@@ -14,6 +14,7 @@ from archord.postprocess.refinement import group
 from archord.postprocess.run_curve import read_run
 from archord.scene.errors import InputError
 from tests.postprocess.synthetic import LOADS, curve
+from tests.solver.solving import scene
 
 DRAWS = 80
 
@@ -261,6 +262,19 @@ def test_materials_that_do_not_fit():
     soft = run.scene.model_copy(update={"block": run.scene.block.model_copy(update={"nu": 0.4})})
     with pytest.raises(InputError, match="Poisson's ratios"):
         calibrate([run, replace(run, scene=soft, name="other")])
+
+
+def test_one_fit_is_for_blocks_that_make_no_difference():
+    """A small block gives a softer joint: fitted alone, but not together with a wide one."""
+    run = curve(0.83)
+    small, wide = (
+        replace(run, name=name, scene=scene(0.05, joint={"block_size": width}))
+        for name, width in (("small", 5.0), ("wide", 50.0))
+    )
+    assert calibrate([small]).law().k == pytest.approx(0.83)
+    assert calibrate([run, wide]).law().k == pytest.approx(0.83)
+    with pytest.raises(InputError, match=r"small: joint.block_size is 5 R and that of run 100 R, by which .* 5\.6%"):
+        calibrate([run, small])
 
 
 @pytest.mark.parametrize(

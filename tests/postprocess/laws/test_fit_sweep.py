@@ -69,6 +69,22 @@ def test_a_small_sweep_gets_its_table(solved, capsys):
     assert float(cells[5].rstrip("%")) < 1.0
 
 
+def test_small_blocks_are_named(solved, tmp_path, capsys):
+    """k of a case is that of its own block; table and print say that there are such, of wide blocks they do not."""
+    assert "small blocks" not in read_cases(solved / "fit.csv")[1]
+    listed = "list = [{ joint.block_size = 5.0 }, { joint.block_size = 100.0 }]\n[base]"
+    text = SWEEP.replace("{{", "{").replace("}}", "}")
+    (tmp_path / "blocks.sweep.toml").write_text(listed + text.partition("[base]")[2])
+    assert run(["sweep", str(tmp_path / "blocks.sweep.toml"), "-o", str(tmp_path / "out"), "-q"]) == 0
+    assert run(["fit", str(tmp_path / "out")]) == 0
+    said = "block_size from 5 R on, P about 5.6% smaller there"
+    assert f"small blocks: {said}; k is smaller in them" in capsys.readouterr().out
+    small, wide = read_cases(tmp_path / "out" / "fit.csv")[0]
+    assert small.k < 0.96 * wide.k
+    assert run(["fit", str(tmp_path / "out" / "fit.csv")]) == 0
+    assert said in capsys.readouterr().out
+
+
 def test_too_few_cases_write_no_law(solved, tmp_path, capsys):
     assert run(["fit", str(solved), "--law", str(tmp_path / "law.json")]) == 2
     assert "law.json: no law to write: 2 elastic cases are too few" in capsys.readouterr().err

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archord.postprocess.laws.law_joint import LawJoint, LawRangeError, LawRangeWarning
+from archord.postprocess.laws.law_joint import LARGE, LawJoint, LawRangeError, LawRangeWarning
 from archord.postprocess.laws.law_tables import laws_as_markdown
 from archord.postprocess.laws.laws import LAWS, find_law
 from archord.postprocess.laws.monotone_root import monotone_root
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
+from tests.solver.solving import scene, solve
 
 JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, yield_stress=300.0, length=11.0, plane="strain", nu=0.3)
 WITH_DISPLACEMENT = [name for name, law in LAWS.items() if law.gives_displacement]
@@ -172,3 +173,17 @@ def test_roots_of_rising_functions():
 def test_documentation_is_what_the_command_prints():
     """docs/laws.md holds the output of `archord laws --markdown`, number for number."""
     assert laws_as_markdown() in (Path(__file__).parents[3] / "docs" / "laws.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("width", "sections"), [(2.5, {}), (5.0, {}), (5.0, {"pin": {"rigid": True}}), (10.0, {"yield_stress": 0.002})]
+)
+def test_a_small_block_is_as_soft_as_is_said(width, sections):
+    """P of archord's solutions falls by what the joint tells: that share, and up to twice as much for other bodies."""
+    blocks = [scene(0.1, 2, joint={"block_size": size}, **sections) for size in (width, LARGE)]
+    small, wide = ([m.P for m in solve(problem).steps] for problem in blocks)
+    fall = 1 - np.array(small) / wide
+    about, most = LawJoint.from_scene(blocks[0]).softer
+    assert (fall < most).all()
+    assert fall == pytest.approx(about, rel=0.7 if sections else 0.2)
+    assert LawJoint.from_scene(blocks[1]).softer[0] < 2e-4
