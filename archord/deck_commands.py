@@ -26,11 +26,12 @@ def export_deck(
         list[str] | None,
         typer.Option("--set", metavar="SECTION.KEY=VALUE", help="override a key of the scene; may be repeated"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="overwrite the deck if it is there")] = False,
+    force: Annotated[bool, typer.Option("--force", help="overwrite a file that is there")] = False,
 ) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
+    from archord.output.output_file import check_target
     from archord.scene.errors import InputError
-    from archord.scene.file import load_scene
+    from archord.scene.file import files_read, load_scene
 
     checked = load_scene(scene, overrides or [])
     if checked.joint.model != "block":
@@ -38,6 +39,7 @@ def export_deck(
     from archord.benchmarks.peers.deck import write_deck
 
     path = output or Path(f"{scene.stem}.inp")
+    check_target(path, files_read(scene, overrides or []), force=True)  # write_deck heeds force
     write_deck(checked, path, elements.value, force=force)
     print(path)
     return 0

@@ -41,6 +41,9 @@ def fit(
     held_out: Annotated[
         float | None, typer.Option("--held-out", metavar="SHARE", help="sweep: cases kept to judge the model by [0.15]")
     ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="overwrite files that are there and are no picture or earlier output")
+    ] = False,
 ) -> int:
     """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields.
 
@@ -50,9 +53,11 @@ def fit(
 
     from rich.console import Console
 
-    from archord.output.output_file import check_output, writing
+    from archord.output.folder import FILES
+    from archord.output.output_file import check_target, writing
     from archord.postprocess.laws import fit_report
     from archord.postprocess.laws.calibration import calibrate
+    from archord.postprocess.laws.fitted_law import PYTHON_BEGINS
     from archord.postprocess.run_curve import read_run
     from archord.scene.errors import InputError
 
@@ -70,6 +75,7 @@ def fit(
             law_file,
             json_file,
             picture,
+            force,
         )
     if csv_file or law_file or held_out is not None:
         raise InputError(f"{folders[0]}: --csv, --law and --held-out are for a sweep, and this is none.")
@@ -79,7 +85,9 @@ def fit(
     # checked and written before anything is printed: a file that cannot be written is one sentence alone
     files = [file for file in (json_file, python, picture) if file]
     for file in files:
-        check_output(file)
+        begins = {json_file: fit_report.JSON_BEGINS, python: PYTHON_BEGINS}.get(file)
+        inputs = [folder / name for folder in folders for name in FILES]
+        check_target(file, inputs, force=force or file == picture, begins=begins)
     if len({file.resolve() for file in files}) < len(files):
         raise InputError("--json, --python, --picture: must be different files.")
     if picture:

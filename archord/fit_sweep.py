@@ -41,15 +41,20 @@ def fit_sweep(
     law_file: Path | None,
     json_file: Path | None,
     picture: Path | None,
+    force: bool = False,
 ) -> int:
-    """Fit the sweep in the folder ``path``, or the stored table ``path``; print all, and write what is asked for."""
+    """Fit the sweep in the folder ``path``, or the stored table ``path``; print all, and write what is asked for.
+
+    Files that are there and do not begin like such output are overwritten only with ``force``.
+    """
     from rich.console import Console
 
-    from archord.output.output_file import check_output, writing
+    from archord.output.output_file import check_target, writing
     from archord.postprocess.laws.calibrated_fit import TooFewError
-    from archord.postprocess.laws.calibrated_report import case_table
+    from archord.postprocess.laws.calibrated_model import JSON_BEGINS as LAW_BEGINS
+    from archord.postprocess.laws.calibrated_report import JSON_BEGINS, case_table
     from archord.postprocess.laws.calibrated_study import study, usable
-    from archord.postprocess.laws.fitted_cases import write_cases
+    from archord.postprocess.laws.fitted_cases import CSV_BEGINS, write_cases
     from archord.scene.errors import InputError
 
     if not 0 <= held_out <= 0.5:
@@ -57,8 +62,11 @@ def fit_sweep(
     files = [file for file in (csv_file, law_file, json_file, picture) if file]
     if len({file.resolve() for file in files}) < len(files):
         raise InputError("--csv, --law, --json, --picture: must be different files.")
-    for file in files:
-        check_output(file)
+    table = path / TABLE if csv_file is None and path.is_dir() else csv_file
+    kinds = {table: CSV_BEGINS, law_file: LAW_BEGINS, json_file: JSON_BEGINS}
+    for file in (table, law_file, json_file, picture):
+        if file:
+            check_target(file, [path, path / FILE], force=force or file == picture, begins=kinds.get(file))
     found = _stored(path) if path.suffix == ".csv" else _solved(path, load_range, confidence)
     used, unfit = usable(found.cases)
     found.left_out += [(case.run, reason) for case, reason in unfit]
@@ -68,11 +76,10 @@ def fit_sweep(
         result, too_few = None, str(error)
     if law_file and result is None:
         raise InputError(f"{law_file}: no law to write: {too_few}.")
-    if csv_file is None and path.is_dir():
-        csv_file = path / TABLE
-        files.append(csv_file)
-    if csv_file:
-        write_cases(found.cases, found.notes, csv_file)
+    if table:
+        write_cases(found.cases, found.notes, table)
+        if csv_file is None:
+            files.append(table)
     model = None
     if result:
         from dataclasses import replace
@@ -237,9 +244,8 @@ def _notes(folder: Path, distinct: list[Case], cases: list[FittedCase]) -> dict[
     days = sorted({str(report.get("started", ""))[:10] for report in reports} - {""})
     command = [str(word) for word in (reports[0].get("command", []) if reports else [])]
     seconds = sum(report.get("seconds", {}).get("total", 0.0) for report in reports)
-    softer = {
-        case.scene.joint.W / case.scene.joint.radius: share for case in distinct if (share := _softer(case)) > 0.01
-    }
+    widths = {case.scene.joint.W / case.scene.joint.radius: _softer(case) for case in distinct}
+    softer = {width: share for width, share in widths.items() if share > 0.01}
     meshes = sorted({f"{case.mesh:.3g}" for case in cases})
     notes = {
         "archord": __version__,

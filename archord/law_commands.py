@@ -106,8 +106,11 @@ def law(
     rows = "load" if by_load or not all(entry.gives_displacement for entry in chosen) else "displacement"
     outside: Outside = "raise" if strict else "extrapolate" if extrapolate else "nan"
     if plot is not None:
+        from archord.output.output_file import check_target
         from archord.postprocess.laws.law_picture import draw_laws
+        from archord.scene.file import files_read
 
+        check_target(plot, files_read(scene, overrides or []) if scene else [], force=True)
         print(_warned(draw_laws, chosen, joint, plot, rows, to, outside))
         return 0
     _warned(_print_table, chosen, joint, rows, to, points, outside, units)

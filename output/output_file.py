@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from archord.output.folder import FILES
+from archord.output.folder import CHECKPOINT, FILES
 from archord.scene.errors import InputError
 
 
@@ -19,12 +19,28 @@ def check_output(path: Path) -> None:
         fault = f"{path.parent} is not a folder"
     elif path.is_dir():
         fault = "it is a folder"
-    elif path.name in FILES and (path.parent / "scene.toml").is_file():
+    elif path.name in (*FILES, CHECKPOINT) and (path.parent / "scene.toml").is_file():
         fault = f"it belongs to the run in {path.parent}"
     elif not os.access(path if path.exists() else path.parent, os.W_OK):
         fault = "permission denied"
     if fault:
         raise InputError(f"{path}: cannot be written: {fault}.")
+
+
+def check_target(path: Path, inputs: Iterable[Path], *, force: bool = False, begins: str | None = None) -> None:
+    """`check_output` for a file that the user names: raise `InputError` also for one of the ``inputs`` of the command.
+
+    Without ``force`` raise it, too, for a file that is there, unless it begins like those that the command writes.
+    """
+    check_output(path)
+    for given in inputs:
+        if path.exists() and given.exists() and path.samefile(given):
+            raise InputError(f"{path}: cannot be written: it is an input of the command.")
+    if force or not path.is_file():
+        return
+    with path.open("rb") as file:
+        if begins is None or file.read(len(begins.encode())) != begins.encode():
+            raise InputError(f"{path}: is there already; choose another file, or overwrite it with --force.")
 
 
 @contextmanager

@@ -32,6 +32,7 @@ Kind = tuple[str, str]  # plane; "both" or "block" yield
 KINDS: tuple[Kind, ...] = (("strain", "both"), ("strain", "block"), ("stress", "both"), ("stress", "block"))
 MIDDLE = 0.4  # of s: where x = 0
 SOFT = 0.5  # largest p m: beyond, the pin is soft and hardly compressible, and the pressure no parabola over the chord
+JSON_BEGINS = '{\n "form": {\n  "name": '  # by which a file of `CalibratedModel.to_json` is known
 
 
 @dataclass(frozen=True)

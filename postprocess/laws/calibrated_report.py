@@ -115,6 +115,9 @@ def words(case: FittedCase) -> str:
     return f"{case.run}: plane {case.plane}, {pin}, nu2 = {case.nu:.3g}, dR/R = {case.clearance:.3g}{s}"
 
 
+JSON_BEGINS = '{\n "from": {\n  "archord": '  # by which a file of `as_json` is known
+
+
 def as_json(
     cases: list[FittedCase],
     notes: dict[str, str],

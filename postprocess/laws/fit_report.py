@@ -102,6 +102,9 @@ def _orders(fits: Fits) -> dict[str, str]:
     }
 
 
+JSON_BEGINS = '{\n  "law": {\n    "k": '  # by which a file of `as_json` is known
+
+
 def as_json(calibration: Calibration) -> str:
     """Everything as JSON: the law (see `FittedLaw.from_json`), its variant per run, fits, residuals, notes."""
     low, high = calibration.load_range

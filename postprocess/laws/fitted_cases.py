@@ -103,6 +103,7 @@ class FittedCase:
                         yielding="both" if self.yielding == "none" else self.yielding)  # fmt: skip
 
 
+CSV_BEGINS = "# archord: "  # by which a file of `write_cases` is known
 _WORDS = ("run", "plane", "yielding")
 _CURVES = {"load": "delta/dR", "P": "P/(E* dR)"}
 _HEADINGS = {

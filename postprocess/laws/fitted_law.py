@@ -125,6 +125,8 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
+PYTHON_BEGINS = '"""Force of a pin joint over its displacement: '  # by which a module of `to_python` is known
+
 _MODULE = Template('''"""Force of a pin joint over its displacement: $note, calibrated by archord fit."""
 
 # runs: $sources, plane $plane

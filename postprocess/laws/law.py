@@ -195,10 +195,11 @@ class Law:
         about, most = joint.softer
         if about > _FELT:
             assert joint.block_size is not None
+            width = joint.block_size / joint.radius
             _tell(
-                f"{self.name}: is a law for a block of {LARGE:g} R; in this one of {joint.block_size / joint.radius:.4g} "
-                f"R the joint is softer, and its P about {about:.1%} smaller than the law's (up to {most:.1%} with a "
-                "rigid pin or beyond yield)",
+                f"{self.name}: is a law for a block of {LARGE:g} R; in this one of {width:.4g} R the joint is softer, "
+                f"and its P about {about:.1%} smaller than the law's (up to {most:.1%} with a rigid pin, or beyond "
+                "yield)",
                 outside,
             )
 

@@ -232,6 +232,15 @@ def test_the_command_writes_a_deck_and_bad_input_is_one_sentence(tmp_path):
         assert result.returncode == 2
         assert said in result.stderr
         assert len(result.stderr.splitlines()) == 1
+    (tmp_path / "cycle.csv").write_text("displacement\n2\n")
+    from_file = ["joint.toml", "--set", "load.path=cycle.csv", "--force", "-o"]
+    for arguments in (["joint.toml", "--force", "-o", "joint.toml"], [*from_file, "cycle.csv"]):
+        before = (tmp_path / arguments[-1]).read_text()
+        result = export(*arguments)
+        assert (result.returncode, result.stdout) == (2, "")
+        assert result.stderr == f"{arguments[-1]}: cannot be written: it is an input of the command.\n"
+        assert (tmp_path / arguments[-1]).read_text() == before
+    (tmp_path / "cycle.csv").unlink()
     assert export("joint.toml", "--elements", "cubic").returncode == 2
     assert sorted(os.listdir(tmp_path)) == ["joint.inp", "joint.toml"]
     assert (tmp_path / "joint.inp").read_text() == text

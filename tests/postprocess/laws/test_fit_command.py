@@ -36,6 +36,38 @@ def test_fit_prints_a_table_and_writes_what_is_asked_for(runs, tmp_path, capsys)
     np.testing.assert_allclose(forces, law.force(history.delta), rtol=1e-14)
 
 
+def test_files_of_others_and_of_runs_stay(runs, tmp_path, capsys):
+    """What fit wrote it writes anew; another file needs --force, and no force touches what a run is made of."""
+    law, module, picture = files = [tmp_path / name for name in ("law.json", "law.py", "law.png")]
+    words = ["fit", str(runs["elastic"]), "--json", str(law), "--python", str(module), "--picture", str(picture)]
+    assert run(words) == 0
+    written = [file.read_bytes() for file in files[:2]]
+    assert run(words) == 0
+    assert [file.read_bytes() for file in files[:2]] == written
+    picture.write_text("", encoding="utf-8")
+    for file, text in zip(files[:2], written, strict=True):
+        file.write_text("mine\n", encoding="utf-8")
+        capsys.readouterr()
+        assert run(words) == 2
+        said = f"{file}: is there already; choose another file, or overwrite it with --force.\n"
+        assert capsys.readouterr().err == said
+        assert file.read_text() == "mine\n"
+        assert not picture.read_bytes()
+        assert run([*words, "--force"]) == 0
+        assert file.read_bytes() == text
+        picture.write_text("", encoding="utf-8")
+    link = tmp_path / "link.json"
+    link.symlink_to(runs["elastic"] / "run.json")
+    assert run(["fit", str(runs["elastic"]), "--json", str(link), "--force"]) == 2
+    assert capsys.readouterr().err == f"{link}: cannot be written: it is an input of the command.\n"
+    for name in ("scene.toml", "history.csv", "run.json", "checkpoint.h5"):
+        before = (runs["elastic"] / name).read_bytes()
+        for option in ("--json", "--python"):
+            assert run(["fit", str(runs["plastic"]), option, str(runs["elastic"] / name), "--force"]) == 2
+            assert "it belongs to the run" in capsys.readouterr().err
+        assert (runs["elastic"] / name).read_bytes() == before
+
+
 def test_two_meshes_give_a_mesh_error(runs, capsys):
     """Order does not matter; the finer run is the law's."""
     assert run(["fit", str(runs["coarse"]), str(runs["elastic"]), "--range", "0.3", "2"]) == 0

@@ -85,6 +85,41 @@ def test_small_blocks_are_named(solved, tmp_path, capsys):
     assert said in capsys.readouterr().out
 
 
+def test_files_of_others_and_inputs_stay(tmp_path, capsys):
+    """Stored rows are not written over themselves; what fit wrote is written anew, another file needs --force."""
+    rows, link = tmp_path / "rows.csv", tmp_path / "link.json"
+    rows.write_text(ROWS.read_text())
+    link.symlink_to(rows)
+    for words in (["--csv", rows], ["--json", link], ["--law", rows]):
+        assert run(["fit", str(rows), *map(str, words), "--force"]) == 2
+        assert f"{words[1]}: cannot be written: it is an input of the command." in capsys.readouterr().err
+    assert rows.read_text() == ROWS.read_text()
+    files = [tmp_path / name for name in ("law.json", "again.csv", "all.json")]
+    words = ["fit", str(rows), "--law", str(files[0]), "--csv", str(files[1]), "--json", str(files[2])]
+    for _ in range(2):
+        assert run(words) == 0
+    for file in files:
+        text = file.read_text()
+        file.write_text("mine\n", encoding="utf-8")
+        assert run(words) == 2
+        assert file.read_text() == "mine\n"
+        file.write_text(text)
+
+
+def test_a_sweep_is_no_file_to_write_its_fit_to(solved, capsys):
+    """Nor is a table of that name which somebody else left there."""
+    text = (solved / "sweep.toml").read_text()
+    assert run(["fit", str(solved), "--json", str(solved / "sweep.toml"), "--force"]) == 2
+    assert "sweep.toml: cannot be written: it is an input" in capsys.readouterr().err
+    assert (solved / "sweep.toml").read_text() == text
+    kept = (solved / "fit.csv").read_text()
+    (solved / "fit.csv").write_text("mine\n", encoding="utf-8")
+    assert run(["fit", str(solved)]) == 2
+    assert (solved / "fit.csv").read_text() == "mine\n"
+    assert run(["fit", str(solved), "--force"]) == 0
+    assert (solved / "fit.csv").read_text() == kept
+
+
 def test_too_few_cases_write_no_law(solved, tmp_path, capsys):
     assert run(["fit", str(solved), "--law", str(tmp_path / "law.json")]) == 2
     assert "law.json: no law to write: 2 elastic cases are too few" in capsys.readouterr().err
