@@ -166,8 +166,8 @@ def _stored(path: Path) -> Found:
 
 def _solved(folder: Path, load_range: tuple[float, float], confidence: float) -> Found:
     """Fit k and c to every distinct case, on its finest mesh."""
+    from archord.postprocess.convergence import group
     from archord.postprocess.laws.fitted_cases import fit_case, rounded
-    from archord.postprocess.refinement import group
     from archord.scene.errors import InputError
     from archord.studies.cases import read_sweep
     from archord.studies.tables import entry, heading

@@ -6,9 +6,9 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.postprocess.arc_pressure import ArcPressure, read_arcs
+from archord.postprocess.convergence import Refined
 from archord.postprocess.laws.curve_fit import CurveFit, Residual, selected
 from archord.postprocess.laws.least_squares import fit
-from archord.postprocess.refinement import Refined
 from archord.postprocess.run_curve import RunCurve
 
 

@@ -20,12 +20,12 @@ from mpi4py import MPI
 from archord.output.disk import WriteError, naming, on_root, replace_text
 from archord.output.measures import Measures
 from archord.output.run import Outcome, solve_scene
+from archord.postprocess.convergence import Curve, mesh_error, step_error
 from archord.presets.joint import Joint
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.timer import Timer
-from archord.studies.error_estimate import Curve, mesh_error, step_error
 from archord.studies.mesh_family import RATIO, MeshFamily
 
 MOST_SUBSTEPS = 64

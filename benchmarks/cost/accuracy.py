@@ -14,9 +14,9 @@ from archord.benchmarks.paper.joint import E, paper_joint
 from archord.benchmarks.report_files import rows_table, write_files
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome, solve_scene
+from archord.postprocess.convergence import difference
 from archord.scene.scene import Scene
 from archord.studies.accuracy import Accuracy, solve_to_accuracy
-from archord.studies.error_estimate import difference
 from archord.studies.mesh_family import RATIO, MeshFamily
 
 ELASTIC = 1e-2, 3e-3, 1e-3, 3e-4, 1e-4

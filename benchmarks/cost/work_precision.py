@@ -12,7 +12,7 @@ from archord.benchmarks.cost.work_precision_codes import CALCULIX, archord_tasks
 from archord.benchmarks.cost.work_precision_reference import Reference, read_reference
 from archord.benchmarks.cost.work_precision_run import LIMIT, Point, Task, run_all
 from archord.benchmarks.paper.pressure_profile import profile_error
-from archord.benchmarks.verification.richardson import Limit, extrapolated
+from archord.postprocess.convergence import Limit, extrapolated
 from archord.scene.errors import InputError
 
 OWN_LIMIT = "own limit"

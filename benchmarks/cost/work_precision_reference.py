@@ -21,12 +21,12 @@ import numpy as np
 
 from archord.benchmarks.cost.work_precision_cases import CASES, Case, Kinematics, Series, families
 from archord.benchmarks.paper.pressure_profile import ANGLES, profile_error, sampled, smoothed
-from archord.benchmarks.verification.richardson import extrapolated
 from archord.geometry.basis import Array
 from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.run import solve_scene
 from archord.postprocess.arc_pressure import SIDES, read_arcs
+from archord.postprocess.convergence import extrapolated
 from archord.postprocess.run_curve import read_run
 from archord.scene.errors import InputError
 from archord.scene.file import resolved

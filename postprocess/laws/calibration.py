@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from archord.postprocess.convergence import Refined, group
 from archord.postprocess.laws.curve_fit import CurveFit, fit_curve
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.plateau import fit_plateau
-from archord.postprocess.refinement import Refined, group
 from archord.postprocess.run_curve import RunCurve
 from archord.scene.errors import InputError
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.postprocess.convergence import Order, Refined
 from archord.postprocess.laws.chord_laws import plastic_force, plastic_peak
 from archord.postprocess.laws.least_squares import Estimate, LeastSquares, fit
-from archord.postprocess.refinement import Order, Refined
 from archord.postprocess.run_curve import RunCurve
 from archord.scene.errors import InputError
 

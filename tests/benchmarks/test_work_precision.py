@@ -20,9 +20,9 @@ from archord.benchmarks.cost.work_precision_report import markdown, ratio_table,
 from archord.benchmarks.cost.work_precision_run import Point, RunFailure, Task, Values, run_all, run_once
 from archord.benchmarks.cost.work_precision_warm import curves, warm_seconds
 from archord.benchmarks.paper.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
-from archord.benchmarks.verification.richardson import extrapolated
 from archord.cli import run
 from archord.postprocess.arc_pressure import ArcPressure
+from archord.postprocess.convergence import extrapolated
 from archord.scene.errors import InputError
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="it starts processes of one rank")

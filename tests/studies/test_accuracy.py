@@ -14,12 +14,12 @@ from mpi4py import MPI
 from archord.benchmarks.paper.joint import paper_joint
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
+from archord.postprocess.convergence import mesh_error, step_error
 from archord.scene import geometry as scene_geometry
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
 from archord.studies import mesh_family
 from archord.studies.accuracy import solve_to_accuracy
-from archord.studies.error_estimate import mesh_error, step_error
 from archord.studies.mesh_family import MeshFamily
 from tests.output.run_files import accepted_steps, same_run
 

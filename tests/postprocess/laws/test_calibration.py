@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import linregress
 
 from archord.postprocess.arc_pressure import ArcPressure
+from archord.postprocess.convergence import group
 from archord.postprocess.laws.calibration import calibrate
 from archord.postprocess.laws.curve_fit import fit_curve
 from archord.postprocess.plateau import median_pressure
-from archord.postprocess.refinement import group
 from archord.postprocess.run_curve import read_run
 from archord.scene.errors import InputError
 from tests.postprocess.synthetic import LOADS, curve

@@ -1,0 +1,218 @@
+"""Orders of convergence and errors of discretisation, from results on several meshes or in steps of several lengths.
+
+All assume ``f(h) = f(0) + C h^p`` (Richardson 1911) and differ in what is known of the order p. `Refined` extrapolates
+the curves of runs, with the order of three meshes; `mesh_error` and `step_error` bound the error of a curve, for a
+solver that refines until it is small; `extrapolated` finds the limit of one number on many meshes, with the order free.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeVar
+
+import numpy as np
+
+from archord.geometry.basis import Array
+from archord.postprocess.run_curve import RunCurve
+from archord.scene.errors import InputError
+from archord.scene.scene import Scene
+
+Curve = Sequence[float]
+Real = TypeVar("Real", float, Array)
+
+_ASSUMED = 1.0  # P converges faster, but peak pressures and perfect plasticity do not for certain
+_LOWEST, _HIGHEST = 0.5, 2.0  # below, extrapolation multiplies noise; above, the error would be told too small
+_TELLABLE = 0.05, 12.0  # orders that three meshes can show
+_SLOWEST, _CAUTIOUS = 1.5, 2.0  # orders that `mesh_error` takes
+_USUAL = 3.0  # order of P on meshes that are refined everywhere (docs/accuracy.md)
+_FREE = 1.4, 4.0  # of a clamped corner's singularity, twice its exponent of 0.7, and of smooth solutions in P2
+
+
+def richardson(difference: Real, ratio: float, order: float) -> Real:
+    """Error of the finer of two results that differ by ``difference``, the element size by the factor ``ratio``."""
+    return difference / (ratio**order - 1)
+
+
+def observed_order(sizes: Sequence[float], finer: float, coarser: float) -> float:
+    """Order p of three results of the rising ``sizes`` h, the two ``finer`` and the two ``coarser`` so far apart.
+
+    p of ``(h3^p - h2^p)/(h2^p - h1^p) = coarser/finer`` (Roache 1998, section 5.10); -inf below 0.05 and inf above 12,
+    which differences cannot tell.
+    """
+    from scipy.optimize import brentq
+
+    h2, h3 = sizes[1] / sizes[0], sizes[2] / sizes[0]
+    goal = coarser / finer
+    low, high = ((h3**p - h2**p) / (h2**p - 1) for p in _TELLABLE)
+    if not low < goal < high:
+        return -math.inf if goal <= low else math.inf
+    return float(brentq(lambda p: (h3**p - h2**p) / (h2**p - 1) / goal - 1, *_TELLABLE))
+
+
+@dataclass(frozen=True)
+class Order:
+    """Order of convergence taken for a curve; ``estimate`` is what three meshes say, None if they cannot, or if there
+    are but two."""
+
+    value: float
+    estimate: float | None
+    meshes: int
+
+    @property
+    def words(self) -> str:
+        """The order and where it comes from."""
+        if self.meshes < 3:
+            return f"{self.value:g} (assumed)"
+        if self.estimate is None:
+            return f"{self.value:g} (assumed: the differences of three meshes show none)"
+        bounded = "" if self.value == self.estimate else f", which give {self.estimate:.1f}: bounded"
+        return f"{self.value:.2g} (from three meshes{bounded})"
+
+
+@dataclass(frozen=True)
+class Refined:
+    """The finest run of a scene, with the coarser ones of the same scene, finest first."""
+
+    run: RunCurve
+    coarser: tuple[RunCurve, ...] = ()
+
+    @property
+    def runs(self) -> tuple[RunCurve, ...]:
+        """All runs, finest first."""
+        return (self.run, *self.coarser)
+
+    def order(self, curves: Sequence[Array]) -> Order:
+        """Order of convergence of a curve, given on all meshes, finest first, each ``(n,)``.
+
+        `observed_order` of the three finest, from norms over the steps they have in common, bounded to 0.5 .. 2. The
+        first order is assumed with two meshes, and where the differences have no common sign or do not shrink.
+        """
+        if len(curves) < 3:
+            return Order(_ASSUMED, None, len(curves))
+        n = min(map(len, curves[:3]))
+        finer, coarser = curves[1][:n] - curves[0][:n], curves[2][:n] - curves[1][:n]
+        estimate = -math.inf
+        if finer @ coarser > 0:
+            sizes = [run.scene.joint.h for run in self.runs[:3]]
+            estimate = observed_order(sizes, float(np.linalg.norm(finer)), float(np.linalg.norm(coarser)))
+        if not math.isfinite(estimate):
+            return Order(_ASSUMED, None, len(curves))
+        return Order(min(max(estimate, _LOWEST), _HIGHEST), estimate, len(curves))
+
+    def shift(self, curves: Sequence[Array]) -> Array:
+        """What refinement still adds to the finest of ``curves`` ``(n,)``, by `richardson` from the next coarser run
+        with the order of `order`. Steps that run does not have get the relative shift of its last one."""
+        fine, coarse = curves[:2]
+        ratio = self.coarser[0].scene.joint.h / self.run.scene.joint.h
+        n = min(len(fine), len(coarse))
+        shift = richardson(fine[:n] - coarse[:n], ratio, self.order(curves).value)
+        relative = shift / np.where(fine[:n] == 0, 1.0, fine[:n])
+        return fine * np.append(relative, np.full(len(fine) - n, relative[-1]))
+
+
+def group(runs: list[RunCurve]) -> list[Refined]:
+    """Runs of one scene that differ only in element size, together; in the order of the first of each.
+
+    Raises `InputError` for two runs of the same scene on the same mesh.
+    """
+    scenes: dict[tuple, list[RunCurve]] = {}
+    for run in runs:
+        scenes.setdefault(_without_mesh(run.scene), []).append(run)
+    groups = []
+    for same in scenes.values():
+        same.sort(key=lambda run: run.scene.joint.h)
+        for a, b in pairwise(same):
+            if np.isclose(a.scene.joint.h, b.scene.joint.h, rtol=1e-9, atol=0):
+                raise InputError(f"{b.name}: is the same scene on the same mesh as {a.name}; give one of them.")
+        groups.append(Refined(same[0], tuple(same[1:])))
+    return groups
+
+
+def _without_mesh(scene: Scene) -> tuple:
+    """Everything of a scene but its element size and its words."""
+    g, analysis = scene.joint, scene.analysis
+    sizes = (g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.target)
+    rounded = tuple(float(f"{size:.9g}") for size in sizes)
+    return (*rounded, tuple(scene.load.leg_steps), tuple(scene.load.legs),
+            scene.pin.model_dump_json(), scene.block.model_dump_json(),
+            analysis.plane, analysis.kinematics, analysis.integration)  # fmt: skip
+
+
+def difference(one: Curve, other: Curve, largest: float) -> float:
+    """The largest difference of two curves over ``largest``; where that is nothing, 0 if they agree and 1 if not."""
+    apart = float(np.abs(np.subtract(one, other)).max())
+    return apart / largest if largest else float(apart > 0)
+
+
+def mesh_error(curves: Sequence[Curve], ratio: float) -> float | None:
+    """Relative error of the last of ``curves``, from coarse to fine, the element size falling by ``ratio`` each time.
+
+    A curve is one number for each output step: the forces on a pin that is displaced, its displacements under forces.
+    The order is 3 in the mean, but differences scatter by a factor of two or three, as the contact ends anywhere in an
+    element. So `richardson` takes that of the last two differences within 1.5 and 2, 2 if there is one; and where the
+    last difference is small by luck, the one before, at order 3, says what the error is at least. None with one curve.
+    """
+    if len(curves) < 2:
+        return None
+    largest = float(np.abs(curves[-1]).max())
+    d = [difference(a, b, largest) for a, b in pairwise(curves)]
+    p = _CAUTIOUS
+    if len(d) > 1 and d[-2] and d[-1]:
+        p = min(_CAUTIOUS, max(_SLOWEST, observed_order((1, ratio, ratio**2), d[-1], d[-2])))
+    last = richardson(d[-1], ratio, p)
+    return max([last, *(richardson(b / ratio**_USUAL, ratio, _CAUTIOUS) for b in d[-2:-1])])
+
+
+def step_error(coarse: Curve, fine: Curve) -> float:
+    """Relative error of ``fine``, whose steps are half as long as those of ``coarse``, by backward Euler, of first
+    order: their difference. That of ``coarse`` is twice as much."""
+    return difference(coarse, fine, float(np.abs(fine).max()))
+
+
+@dataclass(frozen=True)
+class Limit:
+    """``value`` at size zero, the ``order`` of convergence, and ``error``: how far the value moves if any one of the
+    sizes is left out."""
+
+    value: float
+    order: float
+    error: float
+
+
+def extrapolated(sizes: Sequence[float], values: Sequence[float]) -> Limit:
+    """Fit ``values`` = limit + c ``sizes``^order by least squares, the order between 1.4 and 4.
+
+    The order is free: that of unlike meshes scatters. Raises ValueError for fewer than three different sizes.
+    """
+    from scipy.optimize import minimize_scalar
+
+    h, v = np.asarray(sizes, dtype=float), np.asarray(values, dtype=float)
+    if len(np.unique(h)) < 3:
+        raise ValueError("an extrapolation needs three element sizes")
+    spread = np.ptp(v)
+    if spread == 0:
+        return Limit(float(v[0]), _FREE[1], 0.0)
+    h = h / h.max()
+
+    def misfit(order: float) -> float:
+        return float(np.log10(_fit(h, v, order)[1] / spread + 1e-300))
+
+    # the misfit over the order can have several minima: the best of a scan, then its neighbourhood
+    scan = np.linspace(*_FREE, 33)
+    best = int(np.argmin([misfit(order) for order in scan]))
+    bounds = scan[max(0, best - 1)], scan[min(len(scan) - 1, best + 1)]
+    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-9})
+    order = float(min(found.x, scan[best], key=misfit))
+    limit = _fit(h, v, order)[0]
+    others = [_fit(np.delete(h, i), np.delete(v, i), order)[0] for i in range(len(h))]
+    return Limit(limit, order, float(np.abs(np.array(others) - limit).max()))
+
+
+def _fit(h: Array, v: Array, order: float) -> tuple[float, float]:
+    """Limit and root mean square residual at a given order."""
+    A = np.stack([np.ones_like(h), h**order], axis=1)
+    found = np.linalg.lstsq(A, v, rcond=None)[0]
+    return float(found[0]), float(np.sqrt(np.mean((A @ found - v) ** 2)))
