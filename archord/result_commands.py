@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from archord.plain_typer import typer
 
 _WIDE = 10_000  # characters
+_MOST_FITS = 200  # runs of a sweep; an elastic fit takes some milliseconds
 
 if TYPE_CHECKING:
     from archord.postprocess.run_result import Run
@@ -76,6 +77,7 @@ def _show_run(run: Run, target: Path, pictures: bool) -> int:
 
 def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
     from archord.postprocess import sweep_tables
+    from archord.postprocess.laws.calibration import winkler_coefficients
 
     files, left_out = [], "no picture: no case has an accepted step."
     if pictures and sweep.runs:
@@ -89,7 +91,9 @@ def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
     if constant := sweep_tables.constant_line(sweep):
         print(constant)
     print()
-    wide_console().print(sweep_tables.case_table(sweep, sweep_tables.winkler_coefficients(sweep)), markup=False)
+    runs = sweep.runs.values() if len(sweep.runs) <= _MOST_FITS else ()
+    k = winkler_coefficients(run.curve for run in runs)
+    wide_console().print(sweep_tables.case_table(sweep, k), markup=False)
     if len(sweep) > sweep_tables.MOST_ROWS:
         print(f"{sweep_tables.MOST_ROWS} of {len(sweep)} cases; {sweep.folder / 'cases.csv'} has all of them")
     for message in sweep_tables.messages(sweep):

@@ -11,7 +11,6 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.output.folder import no_run
 from archord.output.history import read_history
-from archord.postprocess.laws.law_joint import LawJoint
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
 from archord.scene.scene import Scene
@@ -66,10 +65,6 @@ class RunCurve:
             first[i] = going_on = deeper[i] and (going_on or stronger[i])
         curves = {name: getattr(self, name)[first] for name in ("delta", "P", "p0", "eps", "peeq_max")}
         return replace(self, **curves)
-
-    def joint(self, k: float, c: float | None = None) -> LawJoint:
-        """The joint with these coefficients; elastic without ``c``."""
-        return LawJoint(self.R, self.dR, self.E_star, self.sigY if c else None, k=k, c=c or 1.0)
 
     @property
     def plane(self) -> str:

@@ -8,10 +8,8 @@ from rich.table import Table
 
 from archord.postprocess.run_tables import plain_table, shown_rows
 from archord.postprocess.sweep_result import Sweep, short
-from archord.scene.errors import InputError
 
 MOST_ROWS = 60
-_MOST_FITS = 200  # runs; an elastic fit takes some milliseconds
 _COST = ("steps", "iterations", "cutbacks", "seconds [s]")
 
 
@@ -63,21 +61,3 @@ def _shown(heading: str, text: str) -> str:
     if heading == "eps [rad]":
         return f"{math.degrees(value):.2f}"
     return f"{value:.3g}" if heading in ("peeq_max", "seconds [s]") else f"{value:.6g}"
-
-
-def winkler_coefficients(sweep: Sweep) -> dict[str, float]:
-    """Winkler's k from P(delta) by the name of the run, of runs that have not yielded: the fit of those takes
-    milliseconds. Empty for more than 200 runs."""
-    from archord.postprocess.laws.calibration import calibrate
-
-    found: dict[str, float] = {}
-    runs = sweep.runs
-    for run in runs.values() if len(runs) <= _MOST_FITS else ():
-        if run.scene.joint.model == "block" and not any(run.columns["peeq_max"]):
-            try:
-                k = calibrate([run.curve.loading()]).joint.P.k
-            except InputError:
-                continue
-            if k is not None:
-                found[run.folder.name] = k.value
-    return found

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from archord.postprocess.convergence import Refined, group
-from archord.postprocess.laws.curve_fit import CurveFit, fit_curve
+from archord.postprocess.laws.curve_fit import CurveFit, fit_curve, fit_plateau
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.law_joint import LawJoint
-from archord.postprocess.plateau import fit_plateau
 from archord.postprocess.run_curve import RunCurve
 from archord.scene.errors import InputError
 
@@ -143,3 +143,18 @@ def _fits(
     force, peak = (fit_curve(curve, groups, load_range, confidence, hold_k) for curve in ("P", "p0"))
     plateau = fit_plateau(force, groups, load_range, confidence)
     return Fits(tuple(g.run for g in groups), force, peak, plateau, finer)
+
+
+def winkler_coefficients(runs: Iterable[RunCurve]) -> dict[str, float]:
+    """Winkler's k from P(delta) by the name of the run folder, of runs that have not yielded: the fit of those takes
+    milliseconds."""
+    found = {}
+    for run in runs:
+        if run.scene.joint.model == "block" and run.folder and not run.peeq_max.any():
+            try:
+                k = calibrate([run.loading()]).joint.P.k
+            except InputError:
+                continue
+            if k is not None:
+                found[run.folder.name] = k.value
+    return found

@@ -13,7 +13,9 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.postprocess.convergence import Order, Refined
 from archord.postprocess.laws.chord_laws import plastic_force, plastic_peak
+from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.laws.least_squares import Estimate, LeastSquares, fit
+from archord.postprocess.plateau import plateau_pressure
 from archord.postprocess.run_curve import RunCurve
 from archord.scene.errors import InputError
 
@@ -181,7 +183,7 @@ class _Problem:
         A falling slope alone is no plateau: that of an elastic p0(delta) falls too.
         """
         return sum(
-            int(((r.delta > r.joint(k, c).first_yield) & (r.peeq_max > 0))[rows].sum())
+            int(((r.delta > joint_of(r, k, c).first_yield) & (r.peeq_max > 0))[rows].sum())
             for r, rows in zip(self.runs, self.chosen, strict=True)
             if r.sigY
         )
@@ -195,7 +197,12 @@ def dimensionless_law(quantity: str, run: RunCurve, delta: Array, k: float | Non
     if k is None:
         return np.full(delta.shape, (c or np.nan) * (run.sigY or np.nan)) / _scale(quantity, run)
     law = plastic_force if quantity == "P" else plastic_peak
-    return law(run.joint(k, c), delta) / _scale(quantity, run)
+    return law(joint_of(run, k, c), delta) / _scale(quantity, run)
+
+
+def joint_of(run: RunCurve, k: float, c: float | None = None) -> LawJoint:
+    """The joint of ``run`` with these coefficients; elastic without ``c``."""
+    return LawJoint(run.R, run.dR, run.E_star, run.sigY if c else None, k=k, c=c or 1.0)
 
 
 def selected(run: RunCurve, load_range: tuple[float, float]) -> Array:
@@ -214,3 +221,42 @@ def selected(run: RunCurve, load_range: tuple[float, float]) -> Array:
 def _scale(quantity: str, run: RunCurve) -> float:
     """What makes a quantity dimensionless."""
     return {"P": run.E_star * run.dR, "p0": run.E_star * run.dR / run.R}[quantity]
+
+
+def fit_plateau(
+    force: CurveFit, groups: list[Refined], load_range: tuple[float, float], confidence: float
+) -> CurveFit | None:
+    """Mean of (median pressure)/sigY over the steps whose plateau, by the fit to P, covers half of the chord.
+
+    That is where ``s = sqrt(1 - delta0/delta) > 1/2``, ``delta > 4/3 delta0``. None with fewer than two such steps.
+    """
+    if force.k is None or force.c is None:
+        return None
+    residuals, shifted, flat, orders = [], [], [], []
+    for g in groups:
+        run = g.run
+        if run.sigY is None or run.folder is None:
+            continue
+        wide = run.delta > 4 / 3 * joint_of(run, force.k.value, force.c.value).first_yield
+        rows = selected(run, load_range) & wide
+        if not rows.any():
+            continue
+        median, flatness = plateau_pressure(run)
+        values = median[rows] / run.sigY
+        shift = np.zeros(len(values))
+        if g.coarser:
+            curves = [median, *(plateau_pressure(coarse)[0] for coarse in g.coarser)]
+            shift = g.shift(curves)[rows] / run.sigY
+            orders.append((run.name, g.order(curves)))
+        residuals.append(Residual(run.name, run.delta[rows] / run.dR, values, values))
+        shifted.append(values + shift)
+        flat.append(flatness[rows])
+    if sum(len(r.data) for r in residuals) < 2:
+        return None
+    data = np.concatenate([r.data for r in residuals])
+    mean = fit(lambda v: np.full(len(data), v[0]), [[float(data.mean())]], data)
+    error = abs(float(np.concatenate(shifted).mean() - data.mean())) if orders else None
+    residuals = [Residual(r.name, r.load, r.data, np.full(len(r.data), mean.parameters[0])) for r in residuals]
+    flats = np.concatenate(flat)
+    c, limits = mean.estimate(0, confidence, error), (float(flats.min()), float(flats.max()))
+    return CurveFit("plateau", None, c, mean.r2, mean.dof, tuple(residuals), len(orders), limits, tuple(orders))

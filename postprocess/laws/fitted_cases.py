@@ -18,9 +18,8 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.output.output_file import writing
 from archord.postprocess.convergence import Refined
-from archord.postprocess.laws.curve_fit import CurveFit, fit_curve
+from archord.postprocess.laws.curve_fit import CurveFit, fit_curve, fit_plateau
 from archord.postprocess.laws.law_joint import LawJoint
-from archord.postprocess.plateau import fit_plateau
 from archord.postprocess.run_curve import RunCurve
 from archord.scene.errors import InputError
 
