@@ -35,7 +35,7 @@ def comm() -> MPI.Comm:
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory):
     """Folders of small runs, solved once, by name: an elastic joint on two meshes, one of plane stress that yields."""
-    from archord.benchmarks.paper.joint import paper_joint
+    from archord.benchmarks.case import paper_joint
     from archord.output.folder import claim_folder
     from archord.output.run import solve_scene
 

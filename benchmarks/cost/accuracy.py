@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.benchmarks.paper.joint import E, paper_joint
+from archord.benchmarks.case import E, paper_joint
 from archord.benchmarks.report_files import rows_table, write_files
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome, solve_scene

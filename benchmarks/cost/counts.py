@@ -15,7 +15,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.output.run import solve_scene
 
 ALLOWED = 1.1  # of what is kept

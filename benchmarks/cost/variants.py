@@ -12,7 +12,7 @@ from statistics import median
 from time import perf_counter
 from typing import Any
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.benchmarks.report_files import rows_table, write_files
 from archord.output.folder import claim_folder
 from archord.scene.file import resolved

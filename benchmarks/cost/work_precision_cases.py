@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatch
 from typing import Any, Literal
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.deck_mesh import Elements
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene

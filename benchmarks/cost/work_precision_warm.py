@@ -8,8 +8,8 @@ from time import perf_counter
 
 from mpi4py import MPI
 
+from archord.benchmarks.case import paper_joint
 from archord.benchmarks.cost.work_precision_cases import edged
-from archord.benchmarks.paper.joint import paper_joint
 from archord.geometry.mesh_cache import MESHES
 from archord.output.run import solve_scene
 from archord.scene.scene import Scene

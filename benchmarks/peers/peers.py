@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.calculix import SecondOpinion, require_calculix, run_calculix
 from archord.benchmarks.peers.deck_mesh import Elements, deck_mesh
 from archord.output.measures import Measures

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from archord.benchmarks.paper.joint import E, paper_joint
+from archord.benchmarks.case import E, paper_joint
 from archord.benchmarks.verification.persson import persson_joint, theory
 from archord.scene.scene import Scene
 

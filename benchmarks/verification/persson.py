@@ -13,7 +13,7 @@ from time import perf_counter
 import numpy as np
 from scipy.optimize import brentq
 
-from archord.benchmarks.paper.joint import E
+from archord.benchmarks.case import E
 from archord.output.run import solve_scene
 from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.laws.persson_law import persson_pressure

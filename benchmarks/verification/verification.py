@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.benchmarks.report_files import markdown_table
 from archord.output.measures import Measures
 from archord.output.run import Outcome, solve_scene

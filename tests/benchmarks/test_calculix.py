@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.calculix import (
     axis_pressure,
     plastic_strain,

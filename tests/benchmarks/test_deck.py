@@ -8,7 +8,7 @@ import os
 import numpy as np
 import pytest
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.deck import contact_stiffness, deck
 from archord.benchmarks.peers.deck_mesh import deck_mesh
 from archord.geometry.joint_mesh import Cells, Facets

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from archord.benchmarks.paper.joint import E, paper_joint
+from archord.benchmarks.case import E, paper_joint
 from archord.postprocess.laws.chord_laws import plastic_force, plastic_peak
 from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.run_curve import RunCurve

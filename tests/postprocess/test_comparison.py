@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.paper.joint import E, paper_joint
+from archord.benchmarks.case import E, paper_joint
 from archord.cli import run as command
 from archord.output.run import solve_scene
 from archord.postprocess.comparison import compare_runs, differing_keys, first_loading, short_names

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.postprocess.magnified import magnification, magnified, nominal, rigid_arc
 from archord.postprocess.run_fields import BODIES
 from archord.postprocess.run_result import Run

@@ -9,7 +9,7 @@ import matplotlib.image
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.cli import run as command
 from archord.output.run import solve_scene
 from archord.postprocess.run_result import Run

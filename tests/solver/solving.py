@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mpi4py import MPI
 
-from archord.benchmarks.paper.joint import E, paper_joint
+from archord.benchmarks.case import E, paper_joint
 from archord.output.measures import Measures, Work, arc_profiles, measure
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.geometry.curve import ProjectionError
 from archord.output.run import solve_scene
 from archord.scene.scene import Stepping

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.postprocess.convergence import mesh_error, step_error

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.presets import joint as joint_module
 from archord.presets.joint import Joint
 from archord.solver.linear import condensed as condensed_module

@@ -3,7 +3,7 @@
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.presets import joint as joint_module
 from archord.solver import newton as newton_module
 from archord.solver.linear.bordered import Bordered

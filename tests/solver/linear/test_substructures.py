@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from archord.benchmarks.paper.joint import paper_joint
+from archord.benchmarks.case import paper_joint
 from archord.presets.joint import Joint
 from archord.solver.linear import substructures as module
 from archord.solver.linear.elimination_order import before_corners, corners, nested_dissection

@@ -1,0 +1,145 @@
+"""The case of every benchmark: a named scene with what is expected of it; and the joint that most of them vary."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+from archord.output.folder import claim_folder
+from archord.output.measures import Measures
+from archord.output.run import Outcome, solve_scene
+from archord.scene.file import parse_scene, resolved
+from archord.scene.scene import Scene
+
+E = 2 * (1 - 0.3**2)  # E* = 1 for two like bodies in plane strain
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Expected:
+    """``quantity`` (a key of `quantities`) at the last step must be ``value`` within the relative ``tolerance``.
+
+    ``value`` is a number or, times ``factor``, that of another case by name. ``source`` says where it comes from.
+    """
+
+    quantity: str
+    value: float | str
+    tolerance: float
+    source: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene by name, in a ``group`` of its benchmark, and how its run must end.
+
+    With ``stops``, a part of the sentence that the run must end with (exit code 3); with ``warns``, a part of one of
+    its warnings. At most ``budget`` Newton iterations, failed attempts included, and ``seconds`` of wall time, where
+    the benchmark limits them.
+    """
+
+    name: str
+    scene: Scene
+    group: str = ""
+    expected: tuple[Expected, ...] = ()
+    stops: str = ""
+    warns: str = ""
+    budget: int = 300
+    seconds: float = 90.0
+
+    def folder(self, parent: Path) -> Path:
+        """The case's run folder below ``parent``."""
+        return parent / slug(self.name)
+
+    def is_done(self, parent: Path) -> bool:
+        """Whether the folder below ``parent`` holds this scene, solved to the end."""
+        try:
+            report = json.loads((self.folder(parent) / "run.json").read_text(encoding="utf-8"))
+            scene = (self.folder(parent) / "scene.toml").read_text(encoding="utf-8")
+        except (OSError, ValueError):
+            return False
+        return report.get("status") == "done" and scene == resolved(self.scene)
+
+    def attempt(self, parent: Path, comm: MPI.Comm = MPI.COMM_SELF, **hooks: Any) -> Outcome:
+        """Solve into the folder below ``parent``; ``hooks`` are those of `solve_scene`.
+
+        Raises KeyboardInterrupt if a signal interrupted the run, and `InputError` if the folder cannot be written.
+        Collective.
+        """
+        if comm.rank == 0:
+            claim_folder(self.folder(parent), force=True)
+        comm.Barrier()
+        outcome = solve_scene(self.scene, self.folder(parent), comm, **hooks)
+        if outcome.status == "interrupted":
+            raise KeyboardInterrupt
+        return outcome
+
+    def solve(self, parent: Path, comm: MPI.Comm = MPI.COMM_SELF, **hooks: Any) -> Outcome:
+        """`attempt`, to the end. Raises RuntimeError with a sentence if the run stopped before."""
+        outcome = self.attempt(parent, comm, **hooks)
+        if outcome.status != "done":
+            raise RuntimeError(f"{self.name}: {outcome.message}")
+        return outcome
+
+
+def paper_joint(
+    element_size: float = 0.04, steps: int = 4, yield_stress: float | None = None, **sections: dict
+) -> Scene:
+    """Plane strain, like bodies, nu = 0.3, dR/R = 0.5 %, block 100 R, delta = 2 dR, with R = E* = 1.
+
+    ``sections`` override keys of the scene's sections: ``joint={"clearance": 0.01}``.
+    """
+    solid = {"E": E, "nu": 0.3} | ({"yield_stress": yield_stress} if yield_stress else {})
+    data: dict = {
+        "joint": {"radius": 1.0, "clearance": 0.005, "element_size": element_size},
+        "pin": solid,
+        "block": solid,
+        "load": {"displacement": 2.0, "steps": steps},
+    }
+    return parse_scene(_overridden(data, sections))
+
+
+def varied(scene: Scene, **sections: dict) -> Scene:
+    """``scene`` with other keys in its ``sections``; None drops a key."""
+    return parse_scene(_overridden(scene.model_dump(exclude_unset=True), sections))
+
+
+def _overridden(data: dict[str, Any], sections: dict[str, dict]) -> dict[str, Any]:
+    """``data`` with the keys of ``sections``; a rigid pin has no other."""
+    return data | {name: keys if keys.get("rigid") else data.get(name, {}) | keys for name, keys in sections.items()}
+
+
+def quantities(scene: Scene, last: Measures) -> dict[str, float]:
+    """What cases are compared by at the step ``last``, without units."""
+    E_star, R = scene.E_star, scene.joint.radius
+    return {
+        "P/(E* R)": last.P / (E_star * R),
+        "p0/E*": last.p0 / E_star,
+        "eps": last.eps,
+        "delta/dR": last.delta / scene.joint.dR,
+        "p0/P": last.p0 * R / last.P if last.P else 0.0,
+    }
+
+
+def slug(name: str) -> str:
+    """``name`` as the name of a folder."""
+    return re.sub(r"[^\w.+-]+", "_", name.replace("%", "pc")).strip("_")
+
+
+def matches(pattern: str, *names: str) -> bool:
+    """Whether ``pattern`` (with * and ?) is one of ``names``, or part of one, in any case of letters."""
+    return any(pattern.lower() in name.lower() or fnmatch(name.lower(), pattern.lower()) for name in names)
+
+
+def side_by_side(comm: MPI.Comm, items: Sequence[Item], function: Callable[[Item], Result]) -> list[Result]:
+    """``function`` of every item, in order, the ranks taking turns; the same list on all ranks. Collective."""
+    parts = comm.allgather([function(item) for item in items[comm.rank :: comm.size]])
+    return [parts[k % comm.size][k // comm.size] for k in range(len(items))]
