@@ -1,23 +1,12 @@
-"""Isotropic linear elasticity in the plane.
-
-Strains are ``[eps_xx, eps_yy, gamma_xy]`` (engineering shear), stresses ``[s_xx, s_yy, s_zz, s_xy]``, tension positive.
-"""
+"""Isotropic linear elasticity in the plane; strains and stresses as in `Material`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Plane = Literal["strain", "stress"]
-
-
-def lame(E: float, nu: float) -> tuple[float, float]:
-    """Lame's constants ``(lambda, mu)`` of a solid with Young's modulus ``E`` and Poisson's ratio ``nu``."""
-    return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+from archord.materials.material import Array, Material, Plane, State
 
 
 def contact_modulus(E: float, nu: float, plane: Plane) -> float:
@@ -25,25 +14,8 @@ def contact_modulus(E: float, nu: float, plane: Plane) -> float:
     return E / (1 - nu**2) if plane == "strain" else E
 
 
-def elastic_tangent(E: float, nu: float, plane: Plane) -> Array:
-    """Elastic tangent ``(3, 3)`` from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx, s_yy, s_xy]``, in units of ``E``."""
-    lam, mu = lame(E, nu)
-    if plane == "stress":
-        lam = E * nu / (1 - nu**2)
-    return np.array([[lam + 2 * mu, lam, 0.0], [lam, lam + 2 * mu, 0.0], [0.0, 0.0, mu]])
-
-
-def elastic_stress(strain: Array, E: float, nu: float, plane: Plane) -> Array:
-    """Stress ``(n, 4)`` of elastic points with strain ``(n, 3)``."""
-    stress = np.zeros((len(strain), 4))
-    stress[:, [0, 1, 3]] = strain @ elastic_tangent(E, nu, plane)
-    if plane == "strain":
-        stress[:, 2] = nu * (stress[:, 0] + stress[:, 1])
-    return stress
-
-
 def von_mises(stress: Array) -> Array:
-    """Von Mises stress ``(n,)`` of ``(n, 4)`` stresses ``[s_xx, s_yy, s_zz, s_xy]``."""
+    """Von Mises stress ``(n,)`` of ``(n, 4)`` stresses."""
     xx, yy, zz, xy = stress.T
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
 
@@ -54,9 +26,39 @@ def mean_stress(stress: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Elastic:
+class Elastic(Material):
     """Linear elastic solid; ``E`` sets the unit of stress."""
 
     E: float
     nu: float
     plane: Plane
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lame's constants ``(lambda, mu)``."""
+        E, nu = self.E, self.nu
+        return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+
+    @property
+    def elastic_tangent(self) -> Array:
+        """Moduli ``(3, 3)`` in the plane, in units of ``E``."""
+        lam, mu = self.lame
+        if self.plane == "stress":
+            lam = self.E * self.nu / (1 - self.nu**2)
+        return np.array([[lam + 2 * mu, lam, 0.0], [lam, lam + 2 * mu, 0.0], [0.0, 0.0, mu]])
+
+    def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
+        """Hooke's law, with the stress out of the plane."""
+        moduli = self.elastic_tangent
+        stress = np.zeros((len(strain), 4))
+        stress[:, [0, 1, 3]] = strain @ moduli
+        if self.plane == "strain":
+            stress[:, 2] = self.nu * (stress[:, 0] + stress[:, 1])
+        return stress, np.broadcast_to(moduli, (len(strain), 3, 3)), state
+
+    def energy(self, stress: Array) -> Array:
+        """Half the stress times its elastic strain, in three dimensions."""
+        _, mu = self.lame
+        bulk, mean = self.E / (3 * (1 - 2 * self.nu)), mean_stress(stress)
+        deviator = stress - mean[:, None] * np.array([1.0, 1.0, 1.0, 0.0])
+        return mean**2 / (2 * bulk) + ((deviator[:, :3] ** 2).sum(axis=1) + 2 * deviator[:, 3] ** 2) / (4 * mu)

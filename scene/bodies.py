@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import model_validator
 
 from archord.materials.elasticity import Elastic
+from archord.materials.hardening import LinearHardening
+from archord.materials.material import Material, Plane
 from archord.scene.keys import Positive, Section, key
 
 _NU = -0.999, 0.499999  # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
@@ -31,13 +31,13 @@ class Solid(_Strength):
     E: Positive = key("Young's modulus", "stress", example=210000.0)
     nu: float = key("Poisson's ratio", ge=_NU[0], le=_NU[1], example=0.3)
 
-    def material(self, plane: Literal["strain", "stress"]):
+    def material(self, plane: Plane) -> Material:
         """The constitutive law: `Elastic`, or `J2Material` if there is a yield stress."""
         if self.yield_stress is None:
             return Elastic(self.E, self.nu, plane)
         from archord.materials.j2 import J2Material
 
-        return J2Material(self.E, self.nu, self.yield_stress, self.hardening, plane)
+        return J2Material(self.E, self.nu, plane, LinearHardening(self.yield_stress, self.hardening))
 
 
 class Pin(_Strength):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import basix.ufl
 import numpy as np
@@ -19,24 +18,22 @@ from dolfinx.mesh import MeshTags
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array, bulk_quadrature, bulk_quadrature_degree, cell_basis, strain
-from archord.materials.elasticity import Elastic, elastic_stress, elastic_tangent, mean_stress, von_mises
-from archord.solver.points import PlasticPoints, material_points
-
-if TYPE_CHECKING:
-    from archord.materials.j2 import J2Material
+from archord.materials.elasticity import mean_stress, von_mises
+from archord.materials.material import Material
+from archord.materials.points import Points
 
 
 @dataclass(frozen=True)
 class Body:
-    """One body: its cell tag and its material (`Elastic` or `J2Material`)."""
+    """One body: its cell tag and its material."""
 
     tag: int
-    material: Elastic | J2Material
+    material: Material
 
     @property
     def plastic(self) -> bool:
         """Whether the body carries plastic history."""
-        return not isinstance(self.material, Elastic)
+        return self.material.yields
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,7 @@ class _PlasticBody:
         self.dofs = V.dofmap.list[cells]
         self.gradient = basis.gradient
         self.weight = basis.measure * w
-        self.points = material_points(material, self.weight.size)
+        self.points = Points(material, self.weight.size)
         self.stress = np.zeros((self.weight.size, 4))
         self.yielding = cells[:0]  # cells that had a point off its elastic tangent at the last update
 
@@ -157,10 +154,8 @@ class Bulk:
 
     def _elastic_form(self, body: Body, u) -> ufl.Form:
         """Virtual work of the elastic stresses of ``u`` in ``body``."""
-        m, mesh = body.material, self.V.mesh
-        c11, c12, c33 = (
-            fem.Constant(mesh, float(value)) for value in elastic_tangent(m.E, m.nu, m.plane)[[0, 0, 2], [0, 1, 2]]
-        )
+        mesh, moduli = self.V.mesh, body.material.elastic_tangent
+        c11, c12, c33 = (fem.Constant(mesh, float(value)) for value in moduli[[0, 0, 2], [0, 1, 2]])
         domain, rule = [(1, self.cells[body.tag])], bulk_quadrature_degree(self.degree)
         dx = ufl.Measure("dx", mesh, subdomain_data=domain, metadata={"quadrature_degree": rule})
         eu, ev = _voigt(u), _voigt(ufl.TestFunction(self.V))
@@ -172,11 +167,11 @@ class Bulk:
         """Whether any body carries plastic history."""
         return bool(self._plastic)
 
-    def plastic_points(self) -> list[PlasticPoints]:
+    def plastic_points(self) -> list[Points]:
         """The points with history of all plastic bodies."""
         return [body.points for body in self._plastic.values()]
 
-    def histories(self) -> dict[int, tuple[np.ndarray, PlasticPoints]]:
+    def histories(self) -> dict[int, tuple[np.ndarray, Points]]:
         """Cells ``(n,)`` of this rank and their ``n q`` points with history, by the plastic body's tag."""
         return {tag: (body.cells, body.points) for tag, body in self._plastic.items()}
 
@@ -192,7 +187,7 @@ class Bulk:
             n, q = body.weight.shape
             sigma = self._sigma.x.array.reshape(-1, q, 3)
             sigma[body.cells] = body.stress[:, [0, 1, 3]].reshape(n, q, 3)
-            elastic = body.points.elastic_tangent
+            elastic = body.points.material.elastic_tangent
             stiffness = elastic.diagonal()  # that of points that do not flow
             a, b, c = (tangent[:, i, i] != stiffness[i] for i in range(3))
             flows = (a | b | c).reshape(n, q).any(axis=1)
@@ -253,8 +248,8 @@ class Bulk:
         stored = dissipated = 0.0
         for data in self._plastic.values():
             w, points = data.weight.ravel(), data.points
-            stored += float(w @ points.material.elastic_energy(data.stress))
-            dissipated += float(w @ points.material.dissipation(points.trial.peeq))
+            stored += float(w @ points.material.energy(data.stress))
+            dissipated += float(w @ points.material.dissipation(points.trial))
         if self.stiffness is not None:
             x, force = self.stiffness.createVecs()
             x.array[:] = u[: x.local_size // 2].ravel()
@@ -268,7 +263,7 @@ class Bulk:
         """Largest PEEQ at a quadrature point, and the integral of PEEQ over this rank's cells."""
         largest = integral = 0.0
         for data in self._plastic.values():
-            peeq = data.points.trial.peeq
+            peeq = data.points.peeq
             largest = max(largest, float(peeq.max(initial=0.0)))
             integral += float(data.weight.ravel() @ peeq)
         return largest, integral
@@ -281,8 +276,8 @@ class Bulk:
         for data in self._plastic.values():
             mises[data.cells] = _cell_mean(data.weight, von_mises(data.stress))
             mean[data.cells] = _cell_mean(data.weight, mean_stress(data.stress))
-            peeq[data.cells] = _cell_mean(data.weight, data.points.trial.peeq)
-            increment[data.cells] = _cell_mean(data.weight, data.points.trial.peeq - data.points.state.peeq)
+            peeq[data.cells] = _cell_mean(data.weight, data.points.peeq)
+            increment[data.cells] = _cell_mean(data.weight, data.points.increment)
         for cells, weight, sigma in self._elastic_points(u):
             mises[cells] = _cell_mean(weight, von_mises(sigma))
             mean[cells] = _cell_mean(weight, mean_stress(sigma))
@@ -292,12 +287,12 @@ class Bulk:
         """Cells ``(n,)``, weights ``(n, q)`` and stresses ``(n q, 4)`` of each elastic body."""
         X, w = bulk_quadrature(self.degree)
         for body in self.bodies:
-            m = body.material
-            if isinstance(m, Elastic):
+            if not body.plastic:
                 cells = self.cells[body.tag]
                 basis = cell_basis(self.V.mesh, self.degree, cells, X)
                 eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)
-                yield cells, basis.measure * w, elastic_stress(eps, m.E, m.nu, m.plane)
+                stress, _, _ = body.material.update(eps, body.material.state(len(eps)))
+                yield cells, basis.measure * w, stress
 
 
 def _cell_mean(weight: Array, values: Array) -> Array:

@@ -18,13 +18,12 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.fenicsx import create_vector
-from archord.materials.elasticity import elastic_tangent
+from archord.materials.points import Points
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.linear.bordered import Bordered
 from archord.solver.linear.tangent_matrix import TangentMatrix
-from archord.solver.points import PlasticPoints
 from archord.solver.timer import Timer
 
 
@@ -88,7 +87,7 @@ class Equilibrium:
         self.reaction_norm = self.noise = 0.0
         self.largest_reaction = 0.0  # norm, of all accepted states
         materials = [body.material for body in bulk.bodies]
-        stiffness = max(float(elastic_tangent(m.E, m.nu, m.plane)[0, 0]) for m in materials)
+        stiffness = max(float(m.elastic_tangent[0, 0]) for m in materials)
         self._stiffest, self._travel = stiffness, travel
         self.tangent = TangentMatrix(V, bulk, contact, self.fixed, self.rate, rigid_rate, self.timer, condense=condense)
         self.border: Bordered | None = None
@@ -208,7 +207,7 @@ class Equilibrium:
 
     # ------------------------------------------------------------------ state
 
-    def plastic_points(self) -> list[PlasticPoints]:
+    def plastic_points(self) -> list[Points]:
         """The points with history of bulk and contact."""
         return self.bulk.plastic_points() + (self.contact.plastic_points() if self.contact is not None else [])
 

@@ -14,8 +14,8 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
+from archord.materials.points import Points
 from archord.presets.joint import Joint
-from archord.solver.points import PlasticPoints
 
 Arrays = dict[str, np.ndarray]
 
@@ -91,7 +91,7 @@ class MeshOrder:
         """History of the points that have one, on rank 0: by place, their number and every array of their state."""
         mine = {}
         for place, (points, number) in self._points().items():
-            used = _used(points.state)
+            used = _used(points)
             mine[place] = {"point": number[used]} | {k: v[used] for k, v in _arrays(points.state).items()}
         parts = self.joint.comm.gather(mine)
         if parts is None:
@@ -109,7 +109,7 @@ class MeshOrder:
         stored_at: dict[str, Arrays] = self.joint.comm.bcast(whole)
         for place, (points, number) in self._points().items():
             stored = stored_at[place]
-            virgin = type(points.state).virgin(len(number))
+            virgin = points.material.state(len(number))
             at = np.searchsorted(stored["point"], number)
             at[at == len(stored["point"])] = 0
             here = stored["point"][at] == number if len(stored["point"]) else np.zeros(len(number), dtype=bool)
@@ -117,20 +117,19 @@ class MeshOrder:
                 values[here] = stored[name][at[here]]
             points.state = points.trial = virgin
 
-    def _points(self) -> dict[str, tuple[PlasticPoints, np.ndarray]]:
+    def _points(self) -> dict[str, tuple[Points, np.ndarray]]:
         """All points with history of this rank and their numbers ``(n,)``, by place."""
         found = {}
         for tag, (cells, points) in self.joint.bulk.histories().items():
             found[f"bulk {tag}"] = points, _through(self._cell_index[cells], points)
         for name, side in self.joint.sides.items():
-            if isinstance(side.points, PlasticPoints):
-                found[f"contact {name}"] = side.points, _through(side.facet, side.points)
-        return found
+            found[f"contact {name}"] = side.points, _through(side.facet, side.points)
+        return {place: entry for place, entry in found.items() if entry[0].state is not None}
 
 
-def _through(entity: np.ndarray, points: PlasticPoints) -> np.ndarray:
+def _through(entity: np.ndarray, points: Points) -> np.ndarray:
     """Numbers ``(n q,)`` of the points of the ``n`` cells or facets numbered ``entity``."""
-    q = len(points.state.peeq) // max(len(entity), 1)
+    q = points.n // max(len(entity), 1)
     return (entity.astype(np.int64)[:, None] * q + np.arange(q)).ravel()
 
 
@@ -138,8 +137,8 @@ def _arrays(state) -> Arrays:
     return {f.name: getattr(state, f.name) for f in fields(state)}
 
 
-def _used(state) -> np.ndarray:
+def _used(points: Points) -> np.ndarray:
     """Which points ``(n,)`` are not what they were at the beginning."""
-    virgin = _arrays(type(state).virgin(len(state.peeq)))
-    changed = [(v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in _arrays(state).items()]
+    virgin = _arrays(points.material.state(points.n))
+    changed = [(v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in _arrays(points.state).items()]
     return np.logical_or.reduce(changed)

@@ -352,7 +352,7 @@ class NewtonSolver:
             reason = (
                 "the joint has no stiffness left" if pressed else "nothing resists the force, the pin has come free"
             )
-        increment = max((p.increment() for p in at.plastic_points()), default=0.0)
+        increment = max((float(np.max(p.increment, initial=0.0)) for p in at.plastic_points()), default=0.0)
         increment = self.comm.allreduce(increment, op=MPI.MAX)
         return replace(result, reason=reason, worst=at.worst_place(), plastic_increment=increment)
 

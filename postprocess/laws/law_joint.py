@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from archord.materials.elasticity import Plane, contact_modulus
+from archord.materials.elasticity import contact_modulus
+from archord.materials.material import Plane
 from archord.scene.errors import InputError
 from archord.scene.geometry import Model
 from archord.scene.scene import Scene

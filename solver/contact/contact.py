@@ -33,12 +33,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from archord.geometry.curve import Array, ProjectionError, RigidCircle
+from archord.materials.points import Points
 from archord.solver.contact.pair import Kinematics, Pairing
 from archord.solver.contact.quadrature import segment_rule
 from archord.solver.contact.sparsity import ContactPattern
 from archord.solver.contact.surface import ContactSide
 from archord.solver.contact.tangent import ContactTangent, pressure_rate
-from archord.solver.points import PlasticPoints
 
 GAMMA_FACTOR = 0.5  # twice the bound of coercivity; larger values stiffen the edge of the contact and cost iterations
 
@@ -79,7 +79,7 @@ class Contact:
         self.comm = sides[0].comm
         opposites: list = [rigid] if rigid is not None else [sides[1], sides[0]]
         chosen = range(len(sides)) if one_sided is None else [one_sided]
-        compliance = np.array([1 / sides[i].points.elastic_tangent[0, 0] for i in chosen])
+        compliance = np.array([1 / sides[i].material.elastic_tangent[0, 0] for i in chosen])
         self.pairings: list[Pairing] = []
         self._unit_gammas: list[Array] = []  # gamma of each pairing's points for a factor of 1
         failure = None
@@ -193,9 +193,9 @@ class Contact:
             total += pair.forces.sum(0) * (1 if pair.side is self.sides[-1] else -1)
         return self.sides[0].sum_over_ranks(total)
 
-    def plastic_points(self) -> list[PlasticPoints]:
+    def plastic_points(self) -> list[Points]:
         """The points with history of all integrated sides."""
-        return [points for pair in self.pairings if isinstance(points := pair.side.points, PlasticPoints)]
+        return [pair.side.points for pair in self.pairings if pair.side.material.yields]
 
     def commit(self) -> None:
         """Accept the history of the contact points at the last evaluation."""

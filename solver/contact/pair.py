@@ -76,7 +76,7 @@ class Pairing:
         """
         side, outward = self.side, self.side.outward.reshape(-1, 2)
         displacement, stress, tangent = (values.reshape(-1, *values.shape[2:]) for values in side.deform(u))
-        self.tangent = tangent
+        self.tangent = np.ascontiguousarray(tangent)
         if self.kinematics == "current":
             self._pair_anew(side.point.reshape(-1, 2) + displacement, outward, motion)
             opening = self.separation

@@ -15,7 +15,8 @@ from dolfinx.mesh import MeshTags
 
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis, strain, strain_matrix
 from archord.geometry.curve import Curve
-from archord.solver.points import material_points
+from archord.materials.material import Material
+from archord.materials.points import Points
 
 
 class ContactSide:
@@ -28,7 +29,7 @@ class ContactSide:
     ``curve_cell_dofs`` holds the global cell dofs of every facet of the curve, on every rank.
     """
 
-    def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material) -> None:
+    def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material: Material) -> None:
         mesh = V.mesh
         self.comm = mesh.comm
         self.V = V
@@ -100,7 +101,7 @@ class ContactSide:
         self.point, self.gradient, self.shape = basis.point, basis.gradient, np.ascontiguousarray(basis.shape)
         along = np.broadcast_to(self.trace[:, None, :], (*self.weight.shape, self.trace.shape[1]))
         self.trace_shape = np.take_along_axis(self.shape, along, axis=2)
-        self.points = material_points(self.material, self.weight.size)
+        self.points = Points(self.material, self.weight.size)
 
     def _trace_inequality(self) -> Array:
         """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over the facet <= gamma a(v, v) over its cell`` for all
@@ -111,7 +112,7 @@ class ContactSide:
         """
         if not len(self.cells):
             return np.zeros(0)
-        C = self.points.elastic_tangent
+        C = self.material.elastic_tangent
         X, w = bulk_quadrature(self.degree)
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
         B = strain_matrix(basis.gradient)

@@ -16,6 +16,7 @@ from archord.geometry.fenicsx import create_vector, gmsh_to_mesh
 from archord.geometry.joint_mesh import Cells, Facets, on_circle
 from archord.geometry.quarter_joint import quarter_joint
 from archord.materials.elasticity import Elastic
+from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.bulk import Body, Bulk
 from archord.solver.contact.contact import Contact
@@ -26,9 +27,9 @@ from archord.solver.newton import NewtonSolver
 E, NU = 1.82, 0.3
 YIELD_STRESS = 0.01
 ELASTIC = Elastic(E, NU, "strain")
-PERFECT = J2Material(E, NU, YIELD_STRESS, 0.0, "strain")
-HARDENING = J2Material(E, NU, YIELD_STRESS, 0.1 * E, "strain")
-PLANE_STRESS = J2Material(E, NU, YIELD_STRESS, 0.02 * E, "stress")
+PERFECT = J2Material(E, NU, "strain", LinearHardening(YIELD_STRESS))
+HARDENING = J2Material(E, NU, "strain", LinearHardening(YIELD_STRESS, 0.1 * E))
+PLANE_STRESS = J2Material(E, NU, "stress", LinearHardening(YIELD_STRESS, 0.02 * E))
 R, DR = 1.0, 0.005
 
 
@@ -181,11 +182,15 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> tuple[Me
 
 
 def solve(V, bulk: Bulk, supports: list[Support], contact: Contact | None, loads) -> Equilibrium:
-    """Step through ``loads`` from rest and return the equilibrium at the last; every step must converge."""
+    """Step through ``loads`` from rest and return the equilibrium at the last; every step must converge.
+
+    Each starts from the last state in proportion to the load, and the first from afar.
+    """
     problem = Equilibrium(V, bulk, supports, contact)
     solver = NewtonSolver(problem)
     for load in loads:
-        result = solver.solve(load, problem.state())
+        ratio = load / problem.load if problem.load else 0.0
+        result = solver.solve(load, ratio * problem.state(), afar=not ratio)
         assert result.converged, result.reason
         problem.commit()
     return problem

@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.bulk import Body, Bulk
 from archord.solver.equilibrium import Equilibrium, Support
@@ -34,7 +35,7 @@ class Cylinder:
     def __init__(self, size: float, hardening: float = 0.0) -> None:
         mesh, self.cells, facets = quarter_annulus(MPI.COMM_SELF, A, B, size)
         self.V = V = space(mesh)
-        self.bulk = Bulk(V, self.cells, [Body(1, J2Material(E, NU, SIGY, hardening, "strain"))])
+        self.bulk = Bulk(V, self.cells, [Body(1, J2Material(E, NU, "strain", LinearHardening(SIGY, hardening)))])
         x = coordinates(V)
         self.inner, self.outer = edge_nodes(V, facets, INNER), edge_nodes(V, facets, OUTER)
         self.radial = np.zeros_like(x)

@@ -43,9 +43,9 @@ SCENE = """
 """
 PLACES = {
     "setup": ("solver.bulk", "Bulk", "__init__", 1),
-    "residual": ("solver.contact", "Contact", "evaluate", 7),
-    "tangent": ("solver.contact_tangent", "ContactTangent", "blocks", 4),
-    "return map": ("solver.points", "PlasticPoints", "update", 9),
+    "residual": ("solver.contact.contact", "Contact", "evaluate", 7),
+    "tangent": ("solver.contact.tangent", "ContactTangent", "blocks", 4),
+    "return map": ("materials.points", "Points", "update", 13),
     "output": ("solver.fields", "FieldWriter", "write", 2),
 }
 

@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.materials.elasticity import contact_modulus
+from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.bulk import Body, Bulk
 from archord.solver.contact.contact import Contact
@@ -102,7 +103,7 @@ def test_unlike_materials_slide_on_each_other():
 @every_kinematics
 def test_matching_plastic_blocks_pass(kinematics):
     """Beyond yield, with hardening: uniform pressure, stress and PEEQ."""
-    plastic = J2Material(E, NU, 0.005, 0.1 * E, "strain")
+    plastic = J2Material(E, NU, "strain", LinearHardening(0.005, 0.1 * E))
     blocks = Blocks(3, 3, plastic, plastic, kinematics=kinematics)
     u = blocks.press(DEPTH * np.array([0.5, 1.0, 1.5]))
     fields = blocks.bulk.cell_fields(u)

@@ -25,7 +25,7 @@ def trace_forms(side):
     """
     X, w = bulk_quadrature(2)
     basis = cell_basis(side.V.mesh, 2, side.cells, X)
-    C = side.points.elastic_tangent
+    C = side.material.elastic_tangent
     units = np.eye(12).reshape(12, 6, 2)
     n = side.outward
     sigma_n, eps = [], []
@@ -146,9 +146,9 @@ def test_points_see_the_strain_of_their_own_cell(material):
     A = 1e-3 * np.array([[1.0, 0.4], [-0.2, -0.5]])
     displacement, stress, tangent = side.deform(coordinates(side.V) @ A.T)
     np.testing.assert_allclose(displacement, side.point @ A.T, rtol=0, atol=1e-15)
-    expected = side.points.elastic_tangent @ [A[0, 0], A[1, 1], A[0, 1] + A[1, 0]]
+    expected = side.material.elastic_tangent @ [A[0, 0], A[1, 1], A[0, 1] + A[1, 0]]
     np.testing.assert_allclose(stress[..., [0, 1, 3]], np.broadcast_to(expected, (*stress.shape[:2], 3)), atol=1e-13)
-    np.testing.assert_array_equal(tangent, np.broadcast_to(side.points.elastic_tangent, tangent.shape))
+    np.testing.assert_array_equal(tangent, np.broadcast_to(side.material.elastic_tangent, tangent.shape))
 
 
 def test_a_contact_edge_with_a_hole_in_it_is_an_error():

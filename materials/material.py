@@ -1,0 +1,60 @@
+"""What the solver asks of a material: strain and state in, stress, tangent and state out.
+
+Arrays are those of ``n`` points: strains ``(n, 3)`` are ``[eps_xx, eps_yy, gamma_xy]`` (engineering shear), stresses
+``(n, 4)`` are ``[s_xx, s_yy, s_zz, s_xy]``, tension positive. A state is None (no history) or a dataclass of arrays
+whose first axis is that of the points, which is how checkpoints store it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Plane = Literal["strain", "stress"]
+State = Any
+
+
+class Material(Protocol):
+    """A constitutive law in the plane; every method is a pure function. What it does not define is that of a material
+    without history, to inherit."""
+
+    @property
+    def elastic_tangent(self) -> Array:
+        """The isotropic elastic moduli ``(3, 3)`` from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx, s_yy, s_xy]``."""
+        ...
+
+    def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
+        """Stress ``(n, 4)``, consistent tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from ``state``.
+
+        The tangent is symmetric, and equals `elastic_tangent` to the bit at points that do not flow; it may be a view,
+        not to be written to. A stress that does not exist is not a number: the solver takes the step back.
+        """
+        ...
+
+    def energy(self, stress: Array) -> Array:
+        """Elastic energy density ``(n,)`` of stresses ``(n, 4)``."""
+        ...
+
+    @property
+    def yields(self) -> bool:
+        """Whether it can ever leave its elastic tangent; a body that cannot is assembled once."""
+        return False
+
+    def elastic(self) -> Material:
+        """A material with the same states that answers from each as if it could not yield (further)."""
+        return self
+
+    def state(self, n: int) -> State:
+        """State of ``n`` points at the beginning."""
+        return None
+
+    def dissipation(self, state: State) -> Array | float:
+        """Density of the energy dissipated so far ``(n,)``."""
+        return 0.0
+
+    def peeq(self, state: State) -> Array | float:
+        """Equivalent plastic strain ``(n,)``."""
+        return 0.0
