@@ -36,10 +36,10 @@ def export_deck(
     checked = load_scene(scene, overrides or [])
     if checked.joint.model != "block":
         raise InputError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
-    from archord.benchmarks.peers.deck import write_deck
+    from archord.postprocess.deck import write_deck
 
     path = output or Path(f"{scene.stem}.inp")
-    check_target(path, files_read(scene, overrides or []), force=True)  # write_deck heeds force
-    write_deck(checked, path, elements.value, force=force)
+    check_target(path, files_read(scene, overrides or []), force=force)
+    write_deck(checked, path, elements.value)
     print(path)
     return 0

@@ -11,7 +11,7 @@ from fnmatch import fnmatch
 from typing import Any, Literal
 
 from archord.benchmarks.case import paper_joint
-from archord.benchmarks.peers.deck_mesh import Elements
+from archord.postprocess.deck import Elements
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 

@@ -18,18 +18,13 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 from archord.benchmarks.cost.work_precision_cases import DECKS, SERIES, Case, DeckSeries, Mesh, Series
 from archord.benchmarks.cost.work_precision_reference import profile_of, values_of
 from archord.benchmarks.cost.work_precision_run import LIMIT, RunFailure, Task, Values
 from archord.benchmarks.paper.pressure_profile import interpolated
-from archord.benchmarks.peers.calculix import read_contact_pressure, read_opinion
-from archord.benchmarks.peers.deck import deck
-from archord.benchmarks.peers.deck_mesh import PlaneMesh, deck_mesh
-from archord.geometry.basis import Array
-from archord.geometry.joint_mesh import Facets
+from archord.benchmarks.peers.calculix import read_opinion
 from archord.output.history import read_history
+from archord.postprocess.deck import PlaneMesh, deck, deck_mesh
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
 
@@ -128,8 +123,6 @@ def calculix_values(case: Case, scene: Scene, mesh: PlaneMesh, place: Path) -> V
         opinion = read_opinion(scene, mesh, place, said)
     except (RuntimeError, OSError) as error:
         raise RunFailure(str(error)) from None
-    pressure = read_contact_pressure((place / "joint.frd").read_text(), len(mesh.x))
-    angle, nodal = pin_pressure(scene, mesh, pressure)
     values = {"P": opinion.P, "p0": opinion.p0}
     if case.yield_stress:
         # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
@@ -139,18 +132,9 @@ def calculix_values(case: Case, scene: Scene, mesh: PlaneMesh, place: Path) -> V
         {name: value for name, value in values.items() if math.isfinite(value)},
         2 * len(mesh.x),
         iterations=said_iterations,
-        profile=interpolated(angle, nodal),
+        profile=interpolated(opinion.angle, opinion.pressure),
         side="pin",
     )
-
-
-def pin_pressure(scene: Scene, mesh: PlaneMesh, pressure: Array) -> tuple[Array, Array]:
-    """Growing angles ``(n,)`` from the contact axis of the nodes on the pin's arc, and their ``pressure`` ``(n,)``."""
-    nodes = np.unique(mesh.edge_nodes(Facets.PIN_ARC))
-    x, y = mesh.x[nodes].T
-    angle = np.arctan2(x, -y - scene.joint.dR)
-    order = np.argsort(angle)
-    return angle[order], pressure[nodes[order]]
 
 
 def _iterations(sta: Path) -> int | None:

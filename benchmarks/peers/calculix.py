@@ -1,4 +1,7 @@
-"""CalculiX run on a deck of `archord.benchmarks.peers.deck`, and what its result files say of the joint."""
+"""A second opinion: CalculiX on the deck of a scene, what its result files say, and a table of both.
+
+``python3 -m archord.benchmarks.peers.calculix`` prints the table of docs/peers.md.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,28 @@ import math
 import re
 import shutil
 import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
-from archord.benchmarks.peers.deck import deck, loaded_nodes, thickness
-from archord.benchmarks.peers.deck_mesh import Array, PlaneMesh
+from archord.benchmarks.case import Case, paper_joint
+from archord.geometry.basis import Array
 from archord.geometry.joint_mesh import Facets
+from archord.output.measures import Measures
+from archord.postprocess.deck import Elements, PlaneMesh, deck, deck_mesh, loaded_nodes, thickness
+from archord.report.table import Table
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
+HEADINGS = (
+    "case", "element", "dofs", "P/(E* R): archord", "CalculiX", "difference", "p0/E*: archord", "CalculiX",
+    "PEEQ max: archord", "CalculiX", "PEEQ integral/R2: archord", "CalculiX", "seconds: archord", "CalculiX",
+)  # fmt: skip
 _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")
 _EXPONENT = re.compile(r"(?<=\d)(?=[+-]\d{3}$)")  # Fortran leaves out the E before three digits
 _NEAR_THE_AXIS = 0.2  # radians
@@ -38,12 +51,14 @@ class SecondOpinion:
     """CalculiX's results for the whole joint at the last step, as in `archord.output.measures.Measures`.
 
     ``forces`` ``(steps,)`` is P at the end of every step, ``force_balance`` the largest difference between the
-    reactions of pin and block over P. The PEEQ are zero in elastic scenes.
+    reactions of pin and block over P, ``pressure`` ``(n,)`` that of the nodes on the pin's arc at the growing angles
+    ``angle`` ``(n,)`` from the contact axis. The PEEQ are zero in elastic scenes.
     """
 
     forces: Array
     force_balance: float
-    p0: float
+    angle: Array
+    pressure: Array
     peeq_max: float
     peeq_integral: float
     seconds: float
@@ -53,13 +68,20 @@ class SecondOpinion:
         """Force at the last step."""
         return float(self.forces[-1])
 
+    @property
+    def p0(self) -> float:
+        """Pressure on the contact axis: an even parabola through the nodes near it; nan if fewer than three are
+        pressed."""
+        near = (self.pressure > 0) & (self.angle <= max(_NEAR_THE_AXIS, 2.001 * math.pi / 2 / (len(self.angle) - 1)))
+        return float(np.polyfit(self.angle[near] ** 2, self.pressure[near], 1)[-1]) if near.sum() >= 3 else math.nan
+
 
 def require_calculix() -> None:
     """Raise `InputError` if there is no ``ccx`` to run."""
     if shutil.which("ccx") is None:
         raise InputError(
             "CalculiX (ccx) is not installed here: run ARCHORD_TARGET=peers docker/run python3 -m "
-            "archord.benchmarks.peers.peers, or install Debian's calculix-ccx."
+            "archord.benchmarks.peers.calculix, or install Debian's calculix-ccx."
         )
 
 
@@ -96,11 +118,15 @@ def read_opinion(
         errors = [line.strip() for line in said.splitlines() if "*ERROR" in line]
         raise RuntimeError("; ".join([f"CalculiX ended after step {len(pin)} of {len(scene.targets)}", *errors]))
     pressure = read_contact_pressure((folder / "joint.frd").read_text(), len(mesh.x))
+    arc = np.unique(mesh.edge_nodes(Facets.PIN_ARC))
+    angle = np.arctan2(mesh.x[arc, 0], -mesh.x[arc, 1] - scene.joint.dR)
+    order = np.argsort(angle)
     largest, integral = plastic_strain(printed, mesh)
     return SecondOpinion(
         forces=pin,
         force_balance=float(np.abs(pin + block).max() / pin[-1]),
-        p0=axis_pressure(scene, mesh, pressure),
+        angle=angle[order],
+        pressure=pressure[arc[order]],
         peeq_max=largest,
         peeq_integral=integral,
         seconds=seconds,
@@ -109,24 +135,14 @@ def read_opinion(
 
 def read_printed(text: str) -> list[PrintedBlock]:
     """All tables of the ``.dat`` file ``text``, in its order."""
-    blocks: list[PrintedBlock] = []
-    rows: list[list[float]] = []
-
-    def close() -> None:
-        if blocks:
-            last = blocks.pop()
-            blocks.append(PrintedBlock(last.quantity, last.name, last.time, np.array(rows, dtype=float)))
-
+    found: list[tuple[re.Match, list[list[float]]]] = []
     for line in text.splitlines():
         header = _HEADER.match(line)
         if header:
-            close()
-            rows = []
-            blocks.append(PrintedBlock(header[1], header[2], float(header[3]), np.empty((0, 0))))
-        elif line.strip() and blocks and not line.lstrip()[0].isalpha():
-            rows.append([float(_EXPONENT.sub("E", word)) for word in line.split()])
-    close()
-    return blocks
+            found.append((header, []))
+        elif found and line.strip() and not line.lstrip()[0].isalpha():
+            found[-1][1].append([float(_EXPONENT.sub("E", word)) for word in line.split()])
+    return [PrintedBlock(h[1], h[2], float(h[3]), np.array(rows, dtype=float)) for h, rows in found]
 
 
 def step_forces(printed: list[PrintedBlock], name: str, thick: float) -> Array:
@@ -155,7 +171,20 @@ def plastic_strain(printed: list[PrintedBlock], mesh: PlaneMesh) -> tuple[float,
     element = rows[:, 0].astype(int) - 1
     count = np.bincount(element, minlength=len(mesh.elements))
     total = np.bincount(element, rows[:, 2], minlength=len(mesh.elements))
-    return float(rows[:, 2].max()), 2 * float((total / np.maximum(count, 1)) @ mesh.areas())
+    return float(rows[:, 2].max()), 2 * float((total / np.maximum(count, 1)) @ areas(mesh))
+
+
+def areas(mesh: PlaneMesh) -> Array:
+    """Areas ``(m,)``, counting the curved edges' parabolic segments; positive if counterclockwise."""
+
+    def polygons(order: list[int]) -> Array:
+        x, y = np.moveaxis(mesh.x[mesh.elements[:, order]], 2, 0)
+        return 0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
+
+    corners = polygons([0, 1, 2])
+    if mesh.elements.shape[1] == 3:
+        return corners
+    return corners + 4 / 3 * (polygons([0, 3, 1, 4, 2, 5]) - corners)  # Archimedes: a segment has 4/3 of its triangle
 
 
 def read_contact_pressure(text: str, n_nodes: int) -> Array:
@@ -175,14 +204,58 @@ def read_contact_pressure(text: str, n_nodes: int) -> Array:
     return pressure
 
 
-def axis_pressure(scene: Scene, mesh: PlaneMesh, pressure: Array) -> float:
-    """Pressure ``p0`` on the contact axis: an even parabola through the ``pressure`` at the pin's nodes near it."""
-    nodes = np.unique(mesh.edge_nodes(Facets.PIN_ARC))
-    x, y = mesh.x[nodes].T
-    angle = np.arctan2(x, -y - scene.joint.dR)
-    order = np.argsort(angle)
-    pressed = order[pressure[nodes[order]] > 0]
-    near = pressed[angle[pressed] <= max(_NEAR_THE_AXIS, 2.001 * math.pi / 2 / (len(nodes) - 1))]
-    if len(near) < 3:
-        return math.nan
-    return float(np.polyfit(angle[near] ** 2, pressure[nodes[near]], 1)[-1])
+def cases() -> Iterator[Case]:
+    """The paper's joint, elastic and plastic (sigY/E* = 0.2 %, perfect), in plane strain and plane stress; E* = 1."""
+    for plane in ("strain", "stress"):
+        solid = {} if plane == "strain" else {"E": 2.0}
+        for name, steps, yield_stress in (("elastic", 4, None), ("plastic", 20 if plane == "strain" else 10, 0.002)):
+            scene = paper_joint(0.04, steps, yield_stress, pin=solid, block=solid, analysis={"plane": plane})
+            yield Case(f"plane {plane}, {name}", scene)
+
+
+def row(name: str, scene: Scene, elements: Elements, m: Measures, seconds: float, thick: float | None = None) -> list:
+    """One line of the table, which says so if CalculiX does not get to the end; ``thick`` as in `run_calculix`."""
+    mesh = deck_mesh(scene, elements)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            c = run_calculix(scene, mesh, Path(folder), thick=thick)
+    except RuntimeError as error:
+        return [name, elements, error] + [""] * (len(HEADINGS) - 3)
+    force, pressure, area = scene.E_star * scene.joint.radius, scene.E_star, scene.joint.radius**2
+    plane = "CPE" if scene.analysis.plane == "strain" else "CPS"
+    cells = [name, f"{plane}{mesh.elements.shape[1]}", 2 * len(mesh.x)]
+    cells += [f"{m.P / force:.6g}", f"{c.P / force:.6g}", f"{100 * (c.P / m.P - 1):+.2f} %"]
+    cells += [f"{m.p0 / pressure:.4g}", f"{c.p0 / pressure:.4g}"]
+    if scene.plastic:
+        cells += [f"{m.peeq_max:.2e}", f"{c.peeq_max:.2e}"]
+        cells += [f"{m.peeq_integral / area:.4g}", f"{c.peeq_integral / area:.4g}"]
+    else:
+        cells += ["-"] * 4
+    return [*cells, f"{seconds:.1f}", f"{c.seconds:.1f}"]
+
+
+def main() -> int:
+    """Solve the cases with both and print the table; returns the exit code."""
+    table = Table(*HEADINGS)
+    try:
+        require_calculix()
+        with tempfile.TemporaryDirectory() as folder:
+            for case in cases():
+                start = perf_counter()
+                last = case.solve(Path(folder)).steps[-1]
+                seconds, name, scene = perf_counter() - start, case.name, case.scene
+                kinds: list[tuple] = [(name, "quadratic", None), (name, "linear", None)]
+                if scene.plastic and scene.analysis.plane == "stress":
+                    kinds.append((f"{name}, R thick", "quadratic", scene.joint.radius))
+                for name, elements, thick in kinds:
+                    table.add(*row(name, scene, elements, last, seconds, thick))
+                    print(f"{name}, {elements} elements: {table.rows[-1][5] or table.rows[-1][2]}", file=sys.stderr)
+    except (InputError, RuntimeError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    print(table.markdown(), end="")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

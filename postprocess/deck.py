@@ -1,27 +1,89 @@
-"""The joint as an input deck for CalculiX, and but for the output requests for Abaqus: for a second opinion.
+"""The joint as an input deck for CalculiX, and but for the output requests for Abaqus: ``archord export-deck``.
 
-The deck is the half model of docs/theory.md, in unit thickness or, in plane stress, a thin slice: plane elements, small
-strains, bodies PIN and BLOCK, frictionless contact between PIN_ARC and HOLE_ARC on the deformed curves by a stiff
-linear penalty, one ``*STEP`` per output step. Its forces are half the joint's. A rigid pin is meshed and moved as a
-whole.
+The deck is the half model of docs/theory.md on archord's own mesh, in unit thickness or, in plane stress, a thin slice:
+plane elements, small strains, bodies PIN and BLOCK, frictionless contact between PIN_ARC and HOLE_ARC on the deformed
+curves by a stiff linear penalty, one ``*STEP`` per output step. Its forces are half the joint's. A rigid pin is meshed
+and moved as a whole.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
+from dolfinx.mesh import entities_to_geometry
+from mpi4py import MPI
 
-from archord.benchmarks.peers.deck_mesh import Elements, Ints, PlaneMesh, deck_mesh
+from archord.geometry.basis import Array
 from archord.geometry.joint_mesh import Cells, Facets
+from archord.geometry.quarter_joint import quarter_joint
 from archord.output.output_file import writing
-from archord.scene.errors import InputError
 from archord.scene.scene import Pin, Scene, Solid
+
+Ints = npt.NDArray[np.int64]
+Elements = Literal["quadratic", "linear"]
 
 PENETRATION = 1e-4  # in clearances, under a pressure E* dR/R
 SLICE = 0.1  # thickness of a slice in plane stress, in element sizes
-_SHAPES = {3: "3", 6: "6"}
+# dolfinx numbers the midpoint of an edge by the corner opposite to it, Abaqus by the corner it starts from.
+_COUNTERCLOCKWISE = [0, 1, 2, 5, 3, 4]
+_MIRRORED = [0, 2, 1, 4, 3, 5]
+# Quarter k of a triangle has its corner k, and half of its edge k as edge k.
+_QUARTERS = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
+
+
+@dataclass(frozen=True)
+class PlaneMesh:
+    """Triangles of the half model, numbered from 0, in the node order of Abaqus.
+
+    ``x`` ``(n, 2)`` nodes; ``elements`` ``(m, 3 or 6)`` their nodes, counterclockwise, corners before midpoints;
+    ``bodies`` ``(m,)`` their `Cells`; ``edges`` per tag of `Facets` the element and its edge ``(n, 2)``, edge i
+    going from corner i to the next.
+    """
+
+    x: Array
+    elements: Ints
+    bodies: Ints
+    edges: dict[Facets, Ints]
+
+    def edge_nodes(self, tag: Facets) -> Ints:
+        """Nodes ``(n, 2 or 3)`` of the tagged edges: start, end, midpoint."""
+        element, edge = self.edges[tag].T
+        local = [edge, (edge + 1) % 3, edge + 3][: self.elements.shape[1] // 3 + 1]
+        return np.stack([self.elements[element, i] for i in local], axis=1)
+
+
+def deck_mesh(scene: Scene, elements: Elements) -> PlaneMesh:
+    """The mesh that archord solves ``scene`` on, with a pin even if it is rigid, on this rank alone; each of its
+    triangles of six nodes cut into four of three nodes for linear ``elements``.
+
+    Raises `InputError` if the scene leaves the mesh open.
+    """
+    scene.require_mesh()
+    g = scene.joint
+    joint = quarter_joint(MPI.COMM_SELF, g.radius, g.dR, g.W, g.h, g.growth, size_ratio=g.size_ratio)
+    x = joint.mesh.geometry.x[:, :2].copy()
+    dofmap = np.asarray(joint.mesh.geometry.dofmap, dtype=np.int64)
+    turn = np.linalg.det(x[dofmap[:, 1:3]] - x[dofmap[:, :1]])
+    triangles = np.where((turn > 0)[:, None], dofmap[:, _COUNTERCLOCKWISE], dofmap[:, _MIRRORED])
+    bodies = joint.cells.values.astype(np.int64)  # every cell has a tag
+    joint.mesh.topology.create_connectivity(1, 2)
+    cells_of, edges = joint.mesh.topology.connectivity(1, 2), {}
+    for tag in Facets:
+        facets = joint.facets.find(tag)
+        cell = np.array([cells_of.links(facet)[0] for facet in facets])
+        ends = entities_to_geometry(joint.mesh, 1, facets)[:, None, :2]
+        opposite = (triangles[cell, :3, None] != ends).all(axis=2).argmax(axis=1)
+        edges[tag] = np.stack([cell, (opposite + 1) % 3], axis=1)
+    if elements == "quadratic":
+        return PlaneMesh(x, triangles, bodies, edges)
+    for tag, (cell, edge) in ((tag, found.T) for tag, found in edges.items()):
+        edges[tag] = np.concatenate([np.c_[4 * cell + half, edge] for half in (edge, (edge + 1) % 3)])
+    return PlaneMesh(x, triangles[:, _QUARTERS].reshape(-1, 3), np.repeat(bodies, 4), edges)
 
 
 def contact_stiffness(scene: Scene) -> float:
@@ -55,11 +117,8 @@ def deck(scene: Scene, mesh: PlaneMesh, thick: float | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_deck(scene: Scene, path: Path, elements: Elements, *, force: bool = False) -> None:
-    """Mesh ``scene`` and write its deck to ``path``. Raises `InputError` if that is not possible, or overwrites a file
-    without ``force``."""
-    if path.exists() and not path.is_dir() and not force:
-        raise InputError(f"{path}: is there already; choose another file with -o, or overwrite it with --force.")
+def write_deck(scene: Scene, path: Path, elements: Elements) -> None:
+    """Mesh ``scene`` and write its deck to ``path``. Raises `InputError` if that is not possible."""
     with writing(path):
         path.write_text(deck(scene, deck_mesh(scene, elements)), encoding="utf-8")
 
@@ -70,7 +129,7 @@ def _mesh_lines(scene: Scene, mesh: PlaneMesh, thick: float) -> Iterator[str]:
     yield f"archord: half a pin joint; {units.length}, {units.stress}; thickness {_number(thick)}"
     yield "*NODE, NSET=ALL_NODES"
     yield from (f"{i}, {_number(x)}, {_number(y)}" for i, (x, y) in enumerate(mesh.x, 1))
-    name = ("CPE" if scene.analysis.plane == "strain" else "CPS") + _SHAPES[mesh.elements.shape[1]]
+    name = ("CPE" if scene.analysis.plane == "strain" else "CPS") + str(mesh.elements.shape[1])
     for body in Cells:
         yield f"*ELEMENT, TYPE={name}, ELSET={body.name}"
         for e in np.flatnonzero(mesh.bodies == body):

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from archord.benchmarks.case import paper_joint
-from archord.benchmarks.peers.deck import contact_stiffness, deck
-from archord.benchmarks.peers.deck_mesh import deck_mesh
+from archord.benchmarks.peers.calculix import areas
 from archord.geometry.joint_mesh import Cells, Facets
+from archord.postprocess.deck import contact_stiffness, deck, deck_mesh
 from tests.forked import archord
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="decks are written by one rank")
@@ -78,7 +78,7 @@ def test_linear_elements_are_quarters_of_the_quadratic_ones():
     np.testing.assert_array_equal(quadratic.x, linear.x)
     assert len(linear.elements) == 4 * len(quadratic.elements)
     for body in Cells:
-        a, b = (m.areas()[m.bodies == body].sum() for m in (quadratic, linear))
+        a, b = (areas(m)[m.bodies == body].sum() for m in (quadratic, linear))
         assert a == pytest.approx(b, rel=5e-3)
 
 
@@ -93,7 +93,7 @@ def test_elements_turn_counterclockwise_and_fill_the_bodies(written):
     exact = {Cells.PIN: math.pi / 4, Cells.BLOCK: W**2 - math.pi / 4 * (1 + DR) ** 2}
     tolerance = 1e-4 if kind == "quadratic" else 5e-3
     for body, area in exact.items():
-        assert mesh.areas()[mesh.bodies == body].sum() == pytest.approx(area, rel=tolerance)
+        assert areas(mesh)[mesh.bodies == body].sum() == pytest.approx(area, rel=tolerance)
 
 
 def test_midpoints_belong_to_their_edges():
@@ -222,7 +222,7 @@ def test_the_command_writes_a_deck_and_bad_input_is_one_sentence(tmp_path):
     assert text.count("*STEP") == 2
     assert "TYPE=CPE3" in text
     faults = [
-        (["joint.toml"], "joint.inp: is there already; choose another file with -o, or overwrite it with --force."),
+        (["joint.toml"], "joint.inp: is there already; choose another file, or overwrite it with --force."),
         (["joint.toml", "-o", "no/x.inp"], "no/x.inp: cannot be written: no is not a folder."),
         (["joint.toml", "--set", "block.nu=2", "-o", "x.inp"], "--set block.nu=2: block.nu must be"),
         (["none.toml"], "none.toml: cannot be read"),
