@@ -84,9 +84,9 @@ def write(path: Path, checkpoint: Checkpoint) -> None:
         for place, arrays in checkpoint.history.items():
             for name, values in arrays.items():
                 file[f"history/{place}/{name}"] = values
-    body = memory.getbuffer()
+    body = memory.getvalue()
     line = f"archord checkpoint, format {FORMAT}, sha256 {hashlib.sha256(body).hexdigest()}\n"
-    replace_file(path, [(0, line.encode()), (_HEADER, body)], _HEADER + len(body), durable=True)
+    replace_file(path, line.encode().ljust(_HEADER, b"\0") + body, durable=True)
 
 
 def read(path: Path) -> Checkpoint:

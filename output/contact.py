@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from archord.output.step_file import Shapes, StepFile, open_or_create
+from archord.output.step_file import StepFile
 from archord.presets.arc import ArcProfile
 
 _FIXED = ("s", "angle", "weight")
@@ -18,22 +18,19 @@ _PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")
 
 
 class ContactWriter:
-    """Writes contact.h5 in ``folder``, with room for ``steps`` steps; used on rank 0 only."""
+    """Writes contact.h5 in ``folder``; used on rank 0 only."""
 
-    def __init__(self, folder: Path, steps: int) -> None:
-        self._path, self._steps = folder / "contact.h5", steps
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / "contact.h5"
         self._file: StepFile | None = None
 
-    def write(self, step: int, load: float, profiles: dict[str, ArcProfile], *, again: bool = False) -> None:
-        """Make this ``step`` the last one; ``again``, if it is not there yet.
+    def write(self, step: int, load: float, profiles: dict[str, ArcProfile]) -> None:
+        """Make this ``step`` the last one. The first call makes the file, or opens that of the steps before.
 
-        The first call makes the file, or opens that of the steps before. Raises `OSError`, and `InputError` if that
-        file is not this run's.
+        Raises `OSError`, and `InputError` if that file is not this run's.
         """
         arrays = {f"{name}/{key}": getattr(p, key) for name, p in profiles.items() for key in _PER_STEP}
         if self._file is None:
-            shapes: Shapes = {name: (values.shape, "<f8") for name, values in arrays.items()}
             fixed = {f"{name}/{key}": getattr(p, key) for name, p in profiles.items() for key in _FIXED}
-            self._file = open_or_create(self._path, self._steps, shapes, fixed, step - 1)
-        if not again or self._file.accepted < step:
-            self._file.write(step, load, arrays)
+            self._file = StepFile(self._path, fixed, list(arrays), after=step - 1)
+        self._file.write(load, arrays)

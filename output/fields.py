@@ -8,32 +8,30 @@ the contact are means over cells. The arrays are in the order of the mesh genera
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.output.disk import on_root, replace_text
+from archord.output.disk import on_root, replace_file
 from archord.output.second_order import SecondOrder
-from archord.output.step_file import Shapes, StepFile, open_or_create, step_name
+from archord.output.step_file import StepFile
 from archord.solver.mesh_order import MeshOrder
 
 _VTK_ORDER = [0, 1, 2, 5, 3, 4]  # VTK counts edge nodes from the edge between the first two vertices
 
 
 class FieldWriter:
-    """Writes ``folder``/fields.xdmf and .h5, with room for ``steps`` steps; goes on ``after`` some that are there.
+    """Writes ``folder``/fields.xdmf and .h5 (see `StepFile`); goes on ``after`` some steps that are there.
 
     With ``debug`` the files are debug.xdmf and .h5, and hold what tells why a solve fails. Collective.
     Raises `WriteError`, and `InputError` if the files that should go on are not this run's.
     """
 
-    def __init__(self, folder: Path, order: MeshOrder, steps: int, *, after: int = 0, debug: bool = False) -> None:
+    def __init__(self, folder: Path, order: MeshOrder, *, after: int = 0, debug: bool = False) -> None:
         joint = order.joint
         self.joint, self.order = joint, order
         self.path = folder / ("debug.xdmf" if debug else "fields.xdmf")
-        self._data_path = self.path.with_suffix(".h5")
         self.nodal = ["displacement", "residual"] if debug else ["displacement"]
         body_of = order.bodies()
         self.names = ["von_mises", "mean_stress", "contact_state", "contact_pressure"]
@@ -43,21 +41,18 @@ class FieldWriter:
         def make() -> StepFile:
             self._nodes = SecondOrder(order.nodes_of_cell, joint.scene.analysis.degree)
             cells, points = self._nodes.cells[:, _VTK_ORDER], self._nodes(order.coordinates)
-            shapes: Shapes = {name: ((len(cells),), "<f8") for name in self.names}
-            shapes |= {name: ((len(points), 3), "<f8") for name in self.nodal}
+            self._n_nodes, self._n_cells = len(points), len(cells)
             fixed = {"mesh/coordinates": points, "mesh/cells": cells, "mesh/body": body_of}
-            file = open_or_create(self._data_path, steps, shapes, fixed, after)
+            names = [*self.names, *self.nodal]
+            file = StepFile(self.path.with_suffix(".h5"), fixed, names, after=after, apart=not debug)
             if not after:
                 self._write_xdmf(file)
             return file
 
         self._file = on_root(joint.comm, make)
 
-    def write(self, step: int, load: float, *, again: bool = False) -> None:
-        """Make the last accepted state ``step``, the last one; ``again``, if it is not there yet. Collective.
-
-        Raises `WriteError`.
-        """
+    def write(self, load: float) -> None:
+        """Add the last accepted state as a step, reached at ``load``. Collective. Raises `WriteError`."""
         joint = self.joint
         u = joint.equilibrium.displacement()
         means = joint.bulk.cell_fields(u)
@@ -70,9 +65,8 @@ class FieldWriter:
 
         def write() -> None:
             assert self._file is not None
-            if not again or self._file.accepted < step:
-                vectors = {k: np.pad(self._nodes(v), ((0, 0), (0, 1))) for k, v in nodal.items()}
-                self._file.write(step, load, arrays | vectors)
+            vectors = {k: np.pad(self._nodes(v), ((0, 0), (0, 1))) for k, v in nodal.items()}
+            self._file.write(load, arrays | vectors)
             self._write_xdmf(self._file)
 
         on_root(joint.comm, write)
@@ -90,30 +84,28 @@ class FieldWriter:
 
     def _write_xdmf(self, file: StepFile) -> None:
         scene = self.joint.scene
-        times = file.loads if scene.monotonic and not scene.force_controlled else range(1, file.accepted + 1)
-        grids = [self._grid(file.shapes, k, float(time)) for k, time in enumerate(times, start=1)]
+        times = file.loads if scene.monotonic and not scene.force_controlled else range(1, len(file.loads) + 1)
+        grids = [self._grid(file, k, float(time)) for k, time in enumerate(times, start=1)]
         text = (
             '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
             '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
             + "".join(grids)
             + "</Grid>\n</Domain>\n</Xdmf>\n"
         )
-        replace_text(self.path, text)
+        replace_file(self.path, text)
 
-    def _grid(self, shapes: Shapes, step: int, time: float) -> str:
-        n_nodes, n_cells = shapes["displacement"][0][0], shapes["von_mises"][0][0]
-        at = step_name(step)
-        data = partial(_data, self._data_path.name)
-        cell = "".join(_attribute(n, "Scalar", "Cell", data(f"{n_cells}", f"{n}/{at}")) for n in self.names)
-        nodal = "".join(_attribute(n, "Vector", "Node", data(f"{n_nodes} 3", f"{n}/{at}")) for n in self.nodal)
+    def _grid(self, file: StepFile, step: int, time: float) -> str:
+        nodes, cells = f"{self._n_nodes} 3", f"{self._n_cells}"
+        nodal = "".join(_attribute(n, "Vector", "Node", _data(nodes, file.place(n, step))) for n in self.nodal)
+        cell = "".join(_attribute(n, "Scalar", "Cell", _data(cells, file.place(n, step))) for n in self.names)
         return (
             f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>\n'
-            f'<Topology TopologyType="Triangle_6" NumberOfElements="{n_cells}">'
-            f"{data(f'{n_cells} 6', 'mesh/cells', 'Int', 8)}</Topology>\n"
-            f'<Geometry GeometryType="XYZ">{data(f"{n_nodes} 3", "mesh/coordinates")}</Geometry>\n'
+            f'<Topology TopologyType="Triangle_6" NumberOfElements="{cells}">'
+            f"{_data(f'{cells} 6', file.place('mesh/cells'), 'Int')}</Topology>\n"
+            f'<Geometry GeometryType="XYZ">{_data(nodes, file.place("mesh/coordinates"))}</Geometry>\n'
             + nodal
             + cell
-            + _attribute("body", "Scalar", "Cell", data(f"{n_cells}", "mesh/body", "Char", 1))
+            + _attribute("body", "Scalar", "Cell", _data(cells, file.place("mesh/body"), "Char", 1))
             + "</Grid>\n"
         )
 
@@ -122,8 +114,8 @@ def _attribute(name: str, rank: str, centre: str, data: str) -> str:
     return f'<Attribute Name="{name}" AttributeType="{rank}" Center="{centre}">{data}</Attribute>\n'
 
 
-def _data(file: str, dimensions: str, path: str, kind: str = "Float", precision: int = 8) -> str:
+def _data(dimensions: str, place: str, kind: str = "Float", precision: int = 8) -> str:
     return (
         f'<DataItem Dimensions="{dimensions}" NumberType="{kind}" Precision="{precision}" Format="HDF">'
-        f"{file}:/{path}</DataItem>"
+        f"{place}</DataItem>"
     )

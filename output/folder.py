@@ -5,13 +5,14 @@ from __future__ import annotations
 import fcntl
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from archord.output.disk import new_name
 from archord.scene.errors import InputError
 
 FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
+APART = "fields"  # the folder of the files that fields.h5 has links to
 DEBUG = ("debug.xdmf", "debug.h5")
 CHECKPOINT = "checkpoint.h5"
 # drawn later, from a run's files
@@ -23,6 +24,10 @@ def clear(folder: Path) -> None:
     for name in (CHECKPOINT, *FILES, *DEBUG, *PICTURES):
         (folder / name).unlink(missing_ok=True)
         new_name(folder / name).unlink(missing_ok=True)
+    for file in (folder / APART).glob("[0-9]*.h5*"):
+        file.unlink()
+    with suppress(OSError):  # there is none, or it holds something else, too
+        (folder / APART).rmdir()
 
 
 @contextmanager

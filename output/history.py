@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from archord.output.disk import replace_text
+from archord.output.disk import replace_file
 from archord.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class History:
         """Replace the file in one move, so that a reader never sees half a row. Raises `OSError`."""
         text = io.StringIO(newline="")
         csv.writer(text).writerows(self._rows)
-        replace_text(self.path, text.getvalue())
+        replace_file(self.path, text.getvalue())
 
 
 def read_history(path: str | Path) -> dict[str, list[float]]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from archord.output.disk import replace_text
+from archord.output.disk import replace_file
 from archord.output.measures import Measures
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
@@ -112,7 +112,7 @@ class Report:
         """Replace run.json in one move, so that a reader never sees half of it. Raises `OSError`."""
         self.content |= {"totals": self._totals(), "seconds": self._seconds(), "error_estimates": self._errors()}
         self.content["peak_memory"] = self.peak_memory
-        replace_text(self.path, json.dumps(_finite(self.content), indent=1, allow_nan=False) + "\n")
+        replace_file(self.path, json.dumps(_finite(self.content), indent=1, allow_nan=False) + "\n")
 
     def _totals(self) -> dict[str, int]:
         counts, before = self.joint.timer.counts, self._before.get("totals", {})

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from archord.output.checkpoint import write as write_checkpoint
 from archord.output.contact import ContactWriter
-from archord.output.disk import WriteError, naming, on_root, replace_text
+from archord.output.disk import WriteError, naming, on_root, replace_file
 from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import History
 from archord.output.measures import Measures, Work, arc_profiles, measure
@@ -172,7 +172,7 @@ class _Output:
             if joint.scene.output.fields:
                 from archord.output.fields import FieldWriter
 
-                self._fields = FieldWriter(self.folder, self._order, len(joint.scene.targets), after=len(self.steps))
+                self._fields = FieldWriter(self.folder, self._order, after=len(self.steps))
             on_root(comm, self._write_scene)
         self._last = perf_counter()
         if not comm.bcast(start is not None):
@@ -180,7 +180,7 @@ class _Output:
             return None, Work()
         with joint.timer("checkpoint"):
             at = resume(self._order, self.folder / CHECKPOINT, start.checkpoint if start else None)
-        self._write(at.measures, at.step, arc_profiles(joint), again=True)
+        self._write(at.measures, at.step, arc_profiles(joint))
         return at.position, at.work
 
     def _prepare(self, start: Start | None) -> None:
@@ -192,10 +192,10 @@ class _Output:
         before = start.report if start else None
         self._history = History(self.folder / "history.csv", scene, self.steps)
         self._report = Report(self.folder / "run.json", self.joint, self._begun, self.steps, before)
-        self._contact = ContactWriter(self.folder, len(scene.targets))
+        self._contact = ContactWriter(self.folder)
 
     def _write_scene(self) -> None:
-        replace_text(self.folder / "scene.toml", resolved(self.joint.scene))
+        replace_file(self.folder / "scene.toml", resolved(self.joint.scene))
 
     def _write_tables(self) -> None:
         assert self._report is not None
@@ -216,19 +216,19 @@ class _Output:
         self._write(m, step, profiles)
         return m
 
-    def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile], *, again: bool = False) -> None:
-        """Make ``m`` the last step of all files but the checkpoint, ``again`` after a halt. Collective."""
+    def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
+        """Make ``m`` the last step of all files but the checkpoint. Collective."""
         core_peeq = self.joint.core_peeq()
 
         def add() -> None:
             assert self._report is not None
-            self._contact.write(m.step, m.delta, profiles, again=again)
+            self._contact.write(m.step, m.delta, profiles)
             self._history.add(m)
             self._report.add(m, step, profiles, core_peeq)
 
         with self.joint.timer("output"):
             if self._fields is not None:
-                self._fields.write(m.step, m.delta, again=again)
+                self._fields.write(m.delta)
             self._note_memory()
             on_root(self.joint.comm, add)
         self.steps.append(m)
@@ -242,7 +242,7 @@ class _Output:
         """Write the state that the last solve left, without success at ``load``. Collective."""
         from archord.output.fields import FieldWriter
 
-        FieldWriter(self.folder, self._order, 1, debug=True).write(1, load)
+        FieldWriter(self.folder, self._order, debug=True).write(load)
 
     def unseen(self) -> bool:
         """Whether the pin was pressed into the hole but no contact point ever noticed."""

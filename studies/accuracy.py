@@ -17,7 +17,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from archord.output.disk import WriteError, naming, on_root, replace_text
+from archord.output.disk import WriteError, naming, on_root, replace_file
 from archord.output.measures import Measures
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
@@ -240,7 +240,7 @@ class _Search:
         content |= {"status": outcome.status, "message": outcome.message, "warnings": outcome.warnings}
         content["accuracy"] = asdict(accuracy)
         content["error_estimates"] |= {"mesh": accuracy.mesh_error, "steps": accuracy.step_error}
-        replace_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+        replace_file(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
     def _shortfall(self, accuracy: Accuracy) -> str:
         """Why the estimate is not as small as asked, and what to do."""

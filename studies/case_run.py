@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from archord.output.disk import replace_text
+from archord.output.disk import replace_file
 from archord.output.folder import claim_folder
 from archord.output.stale_jit import forget_half_compiled
 from archord.scene.errors import InputError
@@ -155,7 +155,7 @@ def _failed(folder: Path, comm: MPI.Comm, error: Exception) -> Result:
     text = "".join(traceback.format_exception(error))
     if comm.size == 1 or comm.rank == 0:
         try:
-            replace_text(folder / FAILURE, f"{sentence}\n\n{text}")
+            replace_file(folder / FAILURE, f"{sentence}\n\n{text}")
         except OSError as unwritten:
             sentence += f" ({folder / FAILURE} cannot be written: {unwritten.strerror})"
     if comm.size > 1:

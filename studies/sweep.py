@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from archord.output.disk import replace_text
+from archord.output.disk import replace_file
 from archord.scene.errors import InputError
 from archord.studies import tables
 from archord.studies.case_run import Result, report_of, standing
@@ -76,7 +76,7 @@ def claim(sweep: Sweep, folder: Path) -> None:
                     f"{folder}: holds another sweep, which has no case in common with {sweep.path}; choose another "
                     "folder with -o, or remove this one."
                 )
-            replace_text(folder / FILE, text)
+            replace_file(folder / FILE, text)
     except OSError as error:
         raise InputError(f"{folder}: cannot be used for a sweep: {error.strerror}.") from None
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.output.disk import replace_file, replace_text
+from archord.output.disk import replace_file
 from archord.scene.reference import toml_value
 from archord.scene.scene import Scene
 from archord.studies.case_run import Result, report_of, standing
@@ -73,10 +73,9 @@ def write(sweep: Sweep, folder: Path, failed: Mapping[str, Result] | None = None
     """
     with alone(folder):
         tables = gather(sweep, folder, failed)
-        replace_text(folder / "sweep.csv", _csv(tables.steps, tables.step_rows))
-        replace_text(folder / "cases.csv", _csv(tables.cases, tables.case_rows))
-        content = _hdf5(tables)
-        replace_file(folder / "sweep.h5", [(0, content)], len(content))
+        replace_file(folder / "sweep.csv", _csv(tables.steps, tables.step_rows))
+        replace_file(folder / "cases.csv", _csv(tables.cases, tables.case_rows))
+        replace_file(folder / "sweep.h5", _hdf5(tables))
     return tables
 
 

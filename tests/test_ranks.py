@@ -154,7 +154,7 @@ def test_a_broken_run_cannot_be_drawn(folder, tmp_path, monkeypatch, capsys, nam
     """A sentence that names the file, no picture."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "run").mkdir()
-    for file in (folder / "run").iterdir():
+    for file in (folder / "run").glob("*.*"):
         (tmp_path / "run" / file.name).write_bytes(file.read_bytes())
     (tmp_path / "run" / name).unlink()
     if text is not None:

@@ -29,6 +29,7 @@ import h5py
 import numpy as np
 
 from archord.benchmarks.stability.mutations import base_scenes, mutate
+from archord.output.step_file import all_arrays
 
 _MEMORY, _FILE = 8 * 2**30, 2 * 2**30  # bytes that a case may use
 _GRACE = 10.0  # seconds between the time limit's SIGTERM and SIGKILL
@@ -180,17 +181,8 @@ def _bad(entry: str) -> bool:
 
 
 def _bad_datasets(path: Path) -> list[str]:
-    found = []
     with h5py.File(path, "r") as file:
-        accepted = int(file["accepted"][()])
-
-        def look(name: str, item) -> None:
-            step = name.rpartition("/")[2]
-            unused = step.isdigit() and int(step) > accepted
-            if isinstance(item, h5py.Dataset) and not unused and not np.isfinite(item[()]).all():
-                found.append(f"{name} in {path.name}")
-
-        file.visititems(look)
+        found = [f"{name} in {path.name}" for name, values in all_arrays(file) if not np.isfinite(values).all()]
     return found[:3]
 
 
@@ -222,7 +214,9 @@ def main() -> int:
             if case.faults or case.slow:
                 shutil.rmtree(keep / str(number), ignore_errors=True)
                 shutil.copytree(
-                    folder, keep / str(number), ignore=lambda _, names: [n for n in names if n == "fields.h5"]
+                    folder,
+                    keep / str(number),
+                    ignore=lambda _, names: [n for n in names if n in ("fields", "fields.h5")],
                 )
                 what = "; ".join(case.faults) or "slow"
                 print(f"case {number} ({case.base}, {case.kind}, {case.seconds:.1f} s): {what}", flush=True)

@@ -19,6 +19,7 @@ from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.measures import Measures
 from archord.output.run import Outcome, solve_scene
+from archord.output.step_file import all_arrays
 from archord.scene.scene import Scene
 from archord.solver.stepping import Step, StepFailure
 
@@ -154,12 +155,8 @@ def not_finite(folder: Path) -> list[str]:
     history = read_history(folder / "history.csv")
     found += [f"history.csv: {name}" for name, column in history.items() if not np.all(np.isfinite(column))]
 
-    def visit(name: str, item: h5py.Dataset | h5py.Group) -> None:
-        if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and not np.all(np.isfinite(item[()])):
-            found.append(f"{Path(data.filename).name}: {name}")
-
-    for file in (folder / "fields.h5", folder / "contact.h5"):
-        if file.exists():
-            with h5py.File(file) as data:
-                data.visititems(visit)
+    for path in (folder / "fields.h5", folder / "contact.h5"):
+        if path.exists():
+            with h5py.File(path) as file:
+                found += [f"{path.name}: {name}" for name, values in all_arrays(file) if not np.isfinite(values).all()]
     return found

@@ -11,6 +11,7 @@ import numpy as np
 
 from archord.output import checkpoint
 from archord.output.history import read_history
+from archord.output.step_file import all_arrays
 from archord.scene.file import load_scene
 
 
@@ -43,24 +44,17 @@ def _step_file(path: Path) -> int:
     with h5py.File(path) as file:
         accepted = int(file["accepted"][()])
         assert (np.diff(file["load"][:accepted]) != 0).all()
-        names: list[str] = []
-        file.visit(names.append)
-        for name in names:
-            if isinstance(file[name], h5py.Dataset):
-                last = name.rpartition("/")[2]
-                values = file[name][()]
-                if not last.isdigit() or int(last) <= accepted:
-                    assert np.isfinite(values).all(), name
+        for name, values in all_arrays(file):
+            assert np.isfinite(values).all(), name
     return accepted
 
 
 def _xdmf(path: Path) -> int:
     grids = ET.parse(path).getroot().findall(".//Grid[@GridType='Uniform']")
-    with h5py.File(path.with_suffix(".h5")) as file:
-        for item in (item for grid in grids for item in grid.iter("DataItem")):
-            name = str(item.text).partition(":")[2]
-            shape = tuple(int(n) for n in item.attrib["Dimensions"].split())
-            assert file[name].shape == shape, name
+    for item in (item for grid in grids for item in grid.iter("DataItem")):
+        name, _, dataset = str(item.text).partition(":")
+        with h5py.File(path.parent / name) as file:
+            assert file[dataset].shape == tuple(int(n) for n in item.attrib["Dimensions"].split()), item.text
     return len(grids)
 
 
@@ -82,12 +76,10 @@ def same_run(one: Path, other: Path, tolerance: float, fields: float = 0.0) -> N
             continue
         with h5py.File(one / name) as first, h5py.File(other / name) as second:
             assert first["accepted"][()] == second["accepted"][()] == len(a["step"])
-            names: list[str] = []
-            first.visit(names.append)
-            for key in (n for n in names if isinstance(first[n], h5py.Dataset)):
-                last = key.rpartition("/")[2]
-                if key != "load" and (not last.isdigit() or int(last) <= len(a["step"])):
-                    _agree(f"{name}/{key}", first[key][()], second[key][()], fields or tolerance)
+            arrays = [dict(all_arrays(file)) for file in (first, second)]
+            assert set(arrays[0]) == set(arrays[1])
+            for key, values in arrays[0].items():
+                _agree(f"{name}/{key}", values, arrays[1][key], tolerance if key == "load" else fields or tolerance)
 
 
 def _agree(name: str, a: np.ndarray, b: np.ndarray, tolerance: float) -> None:

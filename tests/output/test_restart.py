@@ -215,11 +215,11 @@ def test_a_path_that_does_not_go_on_is_refused(finished, load, said):
 
 def test_a_finished_run_is_left_alone(finished):
     """Nothing to restart."""
-    before = {path: path.read_bytes() for path in finished.iterdir()}
+    before = {path: path.read_bytes() for path in finished.rglob("*.*")}
     plan = plan_restart(finished)
     assert plan.finished
     assert "finished" in plan.said
-    assert {path: path.read_bytes() for path in finished.iterdir()} == before
+    assert {path: path.read_bytes() for path in finished.rglob("*.*")} == before
 
 
 @pytest.fixture(scope="module")
@@ -257,7 +257,8 @@ def test_only_step_control_may_change(crashed, halted):
     ("damage", "said"),
     [
         (lambda run: (run / "fields.h5").unlink(), r"fields\.h5: is missing"),
-        (lambda run: os.truncate(run / "fields.h5", 5000), r"fields\.h5: is damaged"),
+        (lambda run: os.truncate(run / "fields.h5", 1000), r"fields\.h5: is damaged"),
+        (lambda run: (run / "fields" / "0001.h5").unlink(), r"fields\.h5: is damaged"),
         (lambda run: (run / "contact.h5").unlink(), r"contact\.h5: is missing"),
         (lambda run: (run / "run.json").unlink(), r"run\.json: is missing"),
         (lambda run: (run / "run.json").write_text("{"), r"run\.json: does not hold the 1 step"),

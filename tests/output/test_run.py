@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from archord import cli
 from archord.output import run as run_module
-from archord.output.folder import CHECKPOINT, FILES, PICTURES, claim_folder
+from archord.output.folder import APART, CHECKPOINT, FILES, PICTURES, claim_folder
 from archord.output.history import read_history
 from archord.output.restart import plan_extension
 from archord.output.run import solve_scene
@@ -31,7 +31,7 @@ def run(tmp_path_factory):
 
 def test_all_files_are_there_and_say_done(run):
     """The run folder of a finished run."""
-    assert sorted(p.name for p in run.folder.iterdir()) == sorted((*FILES, CHECKPOINT))
+    assert sorted(p.name for p in run.folder.iterdir()) == sorted((*FILES, CHECKPOINT, APART))
     report = json.loads((run.folder / "run.json").read_text())
     assert report["status"] == "done"
     assert report["totals"]["accepted_steps"] == 4
@@ -62,7 +62,7 @@ def test_a_run_without_fields_is_the_same_but_for_them(tmp_path):
         curve.pop("seconds")
     assert curves[0] == curves[1]
     there, here = ({p.name for p in (tmp_path / name).iterdir()} for name in ("with", "without"))
-    assert there - here == {"fields.xdmf", "fields.h5"}
+    assert there - here == {"fields.xdmf", "fields.h5", "fields"}
     assert not here - there
     with pytest.raises(
         InputError, match=r"without: has no fields to draw: it was solved with output\.fields = false\."

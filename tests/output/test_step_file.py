@@ -1,4 +1,4 @@
-"""Files that grow in place: kept, grown and continued; a full disk costs at most the step in progress."""
+"""Files that grow step by step: kept and continued; a full disk costs at most the step in progress."""
 
 import errno
 import os
@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.output.disk import WriteError, on_root, replace_text
+from archord.output.disk import WriteError, on_root, replace_file
 from archord.output.history import read_history
 from archord.output.run import solve_scene
-from archord.output.step_file import StepFile, open_or_create
+from archord.output.step_file import StepFile
 from archord.scene.errors import InputError
 from tests.output.run_files import accepted_steps
 from tests.solver.solving import scene
@@ -52,50 +52,56 @@ def file_size_limit(size: int):
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
-def test_steps_are_kept_grown_and_overwritten(tmp_path):
-    """Room for three, grown to five after two; a run that goes on after one of them overwrites the rest."""
-    file = StepFile.create(tmp_path / "x.h5", 3, SHAPES, FIXED)
+@pytest.fixture(params=[False, True], ids=["in one file", "apart"])
+def file(tmp_path, request) -> StepFile:
+    return StepFile(tmp_path / "x.h5", FIXED, list(SHAPES), apart=request.param)
+
+
+def test_steps_are_kept_and_continued(file):
+    """A run that goes on after one of two steps forgets the other."""
     holds(file.path, 0)
     for step in (1, 2):
-        file.write(step, 0.1 * step, values(step))
+        file.write(0.1 * step, values(step))
         holds(file.path, step)
-    file = open_or_create(file.path, 5, SHAPES, FIXED, 2)
+    for after in (2, 1):
+        again = StepFile(file.path, FIXED, list(SHAPES), after=after, apart=file.place("a", 1).startswith("x/"))
+        holds(file.path, after)
+        assert again.loads == pytest.approx([0.1, 0.2][:after])
+        again.write(0.1 * (after + 1), values(after + 1))
+        holds(file.path, after + 1)
+    assert not list(file.path.parent.rglob("*.new"))
+
+
+def test_a_file_of_version_0_1_goes_on(file):
+    """It has room for steps to come, and all in one file."""
+    with h5py.File(file.path, "w") as old:
+        for name, array in FIXED.items():
+            old[name] = array
+        old["accepted"], old["load"] = np.int64(2), np.array([0.1, 0.2, 0.0])
+        for step in (1, 2, 3):
+            for name, array in values(step).items():
+                old[f"{name}/{step:04d}"] = array if step < 3 else 0 * array
+    file = StepFile(file.path, FIXED, list(SHAPES), after=2, apart=True)
     holds(file.path, 2)
-    assert file.steps == 5
-    for step in (3, 4, 5):
-        file.write(step, 0.1 * step, values(step))
-    holds(file.path, 5)
-    file = open_or_create(file.path, 4, SHAPES, FIXED, 1)
-    file.write(2, 0.1 * 2, values(2))
-    holds(file.path, 2)
-    assert file.loads == [0.1, 0.2]
-    assert os.listdir(tmp_path) == ["x.h5"]
+    file.write(0.1 * 3, values(3))
+    holds(file.path, 3)
 
 
-def test_a_reader_does_not_disturb_the_run(tmp_path):
-    """The file may be open in another program, which locks it for HDF5's own writers, while steps are written."""
-    file = StepFile.create(tmp_path / "x.h5", 3, SHAPES, FIXED)
+def test_what_is_written_grows_with_the_steps(file):
+    """XDMF finds every array; the file of a step that lies apart never changes again, and readers see whole files."""
     with h5py.File(file.path) as reader:
-        file.write(1, 0.1, values(1))
-        assert reader["load"].shape == (3,)
-    holds(file.path, 1)
-
-
-def test_no_byte_of_the_structure_changes(tmp_path):
-    """A step changes its own data, its load and the count, and nothing else: nothing to break in a kill."""
-    file = StepFile.create(tmp_path / "x.h5", 3, SHAPES, FIXED)
-    before = np.fromfile(file.path, dtype=np.uint8)
-    file.write(1, 0.1, values(1))
-    file.write(2, 0.2, values(2))
-    after = np.fromfile(file.path, dtype=np.uint8)
-    assert len(before) == len(after)
-    data = np.zeros(len(after), dtype=bool)
-    with h5py.File(file.path) as reader:
-        for name in ["load", "accepted", *(f"{n}/{s:04d}" for n in SHAPES for s in (1, 2))]:
-            start = reader[name].id.get_offset()
-            data[start : start + reader[name].nbytes] = True
-    assert (before[~data] == after[~data]).all()
-    assert (before[data] != after[data]).any()
+        for step in (1, 2):
+            file.write(0.1 * step, values(step))
+        assert reader["accepted"][()] == 0
+    path, _, name = file.place("pin/b", 1).partition(":")
+    with h5py.File(file.path.parent / path) as one:
+        assert np.array_equal(one[name][()], values(1)["pin/b"])
+    apart = {path: path.stat() for path in file.path.parent.glob("x/*.h5")}
+    file.write(0.1 * 3, values(3))
+    assert {path: path.stat() for path in apart} == apart
+    assert len(apart) in (0, 3)
+    if apart:
+        assert file.path.stat().st_size < sum(array.nbytes for array in values(1).values())
 
 
 @pytest.mark.parametrize(
@@ -104,33 +110,36 @@ def test_no_byte_of_the_structure_changes(tmp_path):
         (lambda path: path.unlink(), "is missing"),
         (lambda path: os.truncate(path, 3000), "is damaged"),
         (lambda path: path.write_bytes(b"text"), "is damaged"),
-        (lambda path: StepFile.create(path, 3, {"a": ((7,), "<f8")}, FIXED), "does not hold the first 1 steps"),
-        (lambda path: StepFile.create(path, 3, SHAPES, FIXED), "does not hold the first 1 steps"),
+        (lambda path: os.truncate(path.parent / "x" / "0001.h5", 3000), "is damaged"),
+        (lambda path: (path.parent / "x" / "0001.h5").unlink(), "is damaged"),
+        (lambda path: StepFile(path, FIXED | {"mesh/tag": np.arange(6)}, ["a"]), "does not hold the first 1 steps"),
+        (lambda path: StepFile(path, FIXED, list(SHAPES)), "does not hold the first 1 steps"),
     ],
 )
 def test_a_file_that_cannot_go_on_is_refused(tmp_path, damage, said):
-    """Missing, cut short, no HDF5, other fields, fewer steps."""
+    """Missing, cut short, no HDF5, a step missing or cut short, another mesh, fewer steps."""
     path = tmp_path / "x.h5"
-    StepFile.create(path, 3, SHAPES, FIXED).write(1, 0.1, values(1))
+    StepFile(path, FIXED, list(SHAPES), apart=True).write(0.1, values(1))
     damage(path)
     with pytest.raises(InputError, match=said):
-        open_or_create(path, 5, SHAPES, FIXED, 1)
+        StepFile(path, FIXED, list(SHAPES), after=1, apart=True)
 
 
-def test_a_file_that_cannot_be_replaced_stays(tmp_path):
+def test_a_file_that_cannot_be_replaced_stays(tmp_path, file):
     """The old content, no half successor, and an error that names the file; the same for a file that grows."""
     path = tmp_path / "x.txt"
-    replace_text(path, "old")
+    replace_file(path, "old")
     with file_size_limit(10), pytest.raises(OSError, match=r"x\.txt") as error:
-        replace_text(path, "new" * 10)
+        replace_file(path, "new" * 10)
     assert error.value.errno == errno.EFBIG
     assert path.read_text() == "old"
-    file = StepFile.create(tmp_path / "x.h5", 3, SHAPES, FIXED)
-    file.write(1, 0.1, values(1))
-    with file_size_limit(os.path.getsize(file.path)), pytest.raises(OSError, match=r"x\.h5"):
-        file.grow(20)
+    file.write(0.1, values(1))
+    with file_size_limit(9000), pytest.raises(OSError, match=r"x/0002\.h5|x\.h5"):
+        file.write(0.2, values(2))
     holds(file.path, 1)
-    assert sorted(os.listdir(tmp_path)) == ["x.h5", "x.txt"]
+    assert not list(tmp_path.rglob("*.new"))
+    file.write(0.1 * 2, values(2))
+    holds(file.path, 2)
 
 
 def test_a_missing_end_of_a_table_is_ignored(tmp_path):
@@ -153,21 +162,22 @@ def sizes(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     assert solve_scene(PROBLEM, folder, MPI.COMM_SELF).status == "done"
     assert accepted_steps(folder) == 4
-    return {path.name: path.stat().st_size for path in sorted(folder.iterdir(), key=lambda p: p.stat().st_size)}
+    files = sorted((path for path in folder.rglob("*") if path.is_file()), key=lambda path: path.stat().st_size)
+    return {f"{path.relative_to(folder)}": path.stat().st_size for path in files}
 
 
-@pytest.mark.parametrize("place", range(7))
+@pytest.mark.parametrize("place", range(12))
 def test_a_full_disk_stops_the_run_and_keeps_its_steps(tmp_path, sizes, place):
     """One byte too few for each of the files in turn: stopped with a sentence, all that is there opens."""
     with file_size_limit(list(sizes.values())[place] - 1):
         outcome = solve_scene(PROBLEM, tmp_path, MPI.COMM_SELF)
     assert outcome.status == "stopped"
-    found = re.fullmatch(r".*/(\S+) cannot be written: File too large", outcome.message)
+    found = re.fullmatch(rf"{tmp_path}/(\S+) cannot be written: File too large", outcome.message)
     assert found
     assert found[1] in sizes
     steps = accepted_steps(tmp_path)
     assert len(outcome.steps) <= steps <= len(outcome.steps) + 1
-    assert not list(tmp_path.glob("*.new"))
+    assert not list(tmp_path.rglob("*.new"))
 
 
 @pytest.mark.mpi

@@ -92,7 +92,8 @@ def test_a_killed_run_is_shown_as_far_as_it_came(copy, capsys):
 @pytest.mark.parametrize(
     ("name", "length", "said"),
     [
-        ("fields.h5", 5000, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
+        ("fields.h5", 1000, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
+        ("fields/0006.h5", None, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
         ("fields.h5", 0, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
         ("fields.h5", None, "{}: is not a complete run folder: fields.h5 is missing."),
         ("contact.h5", 3000, "{}/contact.h5: cannot be read as the contact of a run."),
