@@ -16,18 +16,18 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from archord.api import load, load_scene, solve
-    from archord.postprocess.run_result import Run
-    from archord.postprocess.sweep_result import Sweep
+    from archord.postprocess.run import Run
+    from archord.postprocess.sweep import Sweep
     from archord.scene.errors import InputError
     from archord.scene.scene import Scene
 
 __all__ = ["InputError", "Run", "Scene", "Sweep", "load", "load_scene", "solve"]
 
 _HOME = {
-    "Run": "archord.postprocess.run_result",
+    "Run": "archord.postprocess.run",
     "Scene": "archord.scene.scene",
     "InputError": "archord.scene.errors",
-    "Sweep": "archord.postprocess.sweep_result",
+    "Sweep": "archord.postprocess.sweep",
     "load": "archord.api",
     "load_scene": "archord.api",
     "solve": "archord.api",

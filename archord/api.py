@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from archord.output.folder import is_sweep
-from archord.postprocess.run_result import Run
-from archord.postprocess.sweep_result import Sweep
+from archord.postprocess.run import Run
+from archord.postprocess.sweep import Sweep
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene as load_scene_file
 from archord.scene.reference import toml_value

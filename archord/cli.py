@@ -160,7 +160,7 @@ def picture(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="file to draw [RUN/picture.png]")] = None,
 ) -> int:
     """Draw a run: plastic zone, contact pressure, P(delta)."""
-    from archord.postprocess.picture import draw
+    from archord.postprocess.pictures import draw
 
     print(draw(folder, output))
     return 0

@@ -55,10 +55,10 @@ def fit(
 
     from archord.output.folder import FILES
     from archord.output.output_file import check_target, writing
+    from archord.postprocess.curve import read_run
     from archord.postprocess.laws import fit_report
     from archord.postprocess.laws.calibration import calibrate
     from archord.postprocess.laws.fitted_law import PYTHON_BEGINS
-    from archord.postprocess.run_curve import read_run
     from archord.scene.errors import InputError
 
     if any(is_sweep(folder) for folder in folders):

@@ -199,7 +199,7 @@ def _shown(value: Any) -> str:
 
 def _runs(distinct: list[Case], folder: Path) -> tuple[list[tuple[Case, Any]], list[tuple[str, str]]]:
     """The curves of the cases whose joint has such a law, and the others with the reason."""
-    from archord.postprocess.run_curve import read_run
+    from archord.postprocess.curve import read_run
     from archord.scene.errors import InputError
     from archord.studies.case_run import standing
     from archord.studies.tables import of_case

@@ -9,7 +9,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from archord.postprocess.run_warnings import first_of_each_kind
 from archord.ranks import on_terminal
 from archord.scene.scene import Scene
 
@@ -44,6 +43,7 @@ def solve_with_progress(
     comm = MPI.COMM_WORLD
     scene = agreed(comm, claimed)
     from archord.output.run import solve_as_asked
+    from archord.postprocess.tables import first_of_each_kind
     from archord.solver.timer import Timer
 
     timer = Timer()

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from archord.plain_typer import typer
 
-_WIDE = 10_000  # characters
 _MOST_FITS = 200  # runs of a sweep; an elastic fit takes some milliseconds
 
 if TYPE_CHECKING:
-    from archord.postprocess.run_result import Run
-    from archord.postprocess.sweep_result import Sweep
+    from archord.postprocess.run import Run
+    from archord.postprocess.sweep import Sweep
 
 
 def register(app: typer.Typer) -> None:
@@ -34,83 +33,45 @@ def show(
     The pictures of a run are force.png, pressure.png, field.png and iterations.png.
     """
     from archord.output.folder import is_sweep
-    from archord.postprocess.sweep_result import Sweep
+    from archord.postprocess.sweep import Sweep
 
     if is_sweep(folder):
         return _show_sweep(Sweep(folder), output or folder, pictures)
-    from archord.postprocess.run_result import Run
+    from archord.postprocess.run import Run
 
     return _show_run(Run(folder), output or folder, pictures)
 
 
 def _show_run(run: Run, target: Path, pictures: bool) -> int:
-    from archord.postprocess import run_tables
+    from archord.postprocess.tables import run_text
 
-    files, left_out = [], ["no picture: no step was accepted."]
+    lines = ["no picture: no step was accepted."]
     if pictures and run.steps:
-        from archord.postprocess.export_files import make_folder
-        from archord.postprocess.run_pictures import draw_run
+        from archord.postprocess.pictures import draw_run
 
-        make_folder(target)
         files, left_out = draw_run(run, target)
-    console = wide_console()
-    print(run_tables.state_line(run))
-    print()
-    print(run_tables.paragraph(run_tables.joint_lines(run)))
-    if run.steps:
-        print()
-        console.print(run_tables.history_table(run), markup=False)
-        if run.steps > run_tables.MOST_ROWS:
-            print(f"{run_tables.MOST_ROWS} of {run.steps} steps; {run.folder / 'history.csv'} has all of them")
-        print()
-        print(run_tables.paragraph(run_tables.peak_lines(run)))
-    print()
-    print(run_tables.paragraph(run_tables.cost_lines(run)))
+        lines = [*left_out, *map(str, files)]
+    print(run_text(run))
     if pictures:
-        print()
-        for sentence in left_out:
-            print(sentence)
-        for file in files:
-            print(file)
+        print("", *lines, sep="\n")
     return 0
 
 
 def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
-    from archord.postprocess import sweep_tables
     from archord.postprocess.laws.calibration import winkler_coefficients
+    from archord.postprocess.tables import sweep_text
 
-    files, left_out = [], "no picture: no case has an accepted step."
+    lines = ["no picture: no case has an accepted step."]
     if pictures and sweep.runs:
-        from archord.postprocess.export_files import make_folder
-        from archord.postprocess.sweep_picture import draw_sweep
+        from archord.postprocess.pictures import draw_sweep
 
-        make_folder(target)
         file, left_out = draw_sweep(sweep, target / "sweep.png")
-        files = [file]
-    print(sweep_tables.state_line(sweep))
-    if constant := sweep_tables.constant_line(sweep):
-        print(constant)
-    print()
+        lines = [*([left_out] if left_out else []), str(file)]
     runs = sweep.runs.values() if len(sweep.runs) <= _MOST_FITS else ()
-    k = winkler_coefficients(run.curve for run in runs)
-    wide_console().print(sweep_tables.case_table(sweep, k), markup=False)
-    if len(sweep) > sweep_tables.MOST_ROWS:
-        print(f"{sweep_tables.MOST_ROWS} of {len(sweep)} cases; {sweep.folder / 'cases.csv'} has all of them")
-    for message in sweep_tables.messages(sweep):
-        print(message)
+    print(sweep_text(sweep, winkler_coefficients(run.curve for run in runs)))
     if pictures:
-        print()
-        for line in (left_out, *files):
-            if line:
-                print(line)
+        print("", *lines, sep="\n")
     return 0
-
-
-def wide_console() -> Any:
-    """A console that leaves rows whole: on a narrow terminal long ones wrap, rather than lose digits."""
-    from rich.console import Console
-
-    return Console(highlight=False, width=_WIDE)
 
 
 def compare(
@@ -124,30 +85,17 @@ def compare(
 
     Where R, dR or E* differ, they are compared in dimensionless form, too.
     """
-    from archord.postprocess import comparison_tables as tables
     from archord.postprocess.comparison import compare_runs
-    from archord.postprocess.run_result import Run
+    from archord.postprocess.run import Run
+    from archord.postprocess.tables import comparison_text
 
     comparison = compare_runs([Run(folder) for folder in folders])
     if pictures:
-        from archord.postprocess.comparison_picture import draw_comparison
+        from archord.postprocess.pictures import draw_comparison
 
         draw_comparison(comparison.runs, comparison.names, output, absolute=bool(comparison.absolute),
                         dimensionless=bool(comparison.dimensionless))  # fmt: skip
-    console = wide_console()
-    for compared in comparison.compared:
-        console.print(tables.quantity_table(compared, comparison.names), markup=False)
-        print()
-    for note in tables.notes(comparison):
-        print(note)
-    print()
-    scenes = tables.scene_table(comparison)
-    if scenes is None:
-        print("scenes: the same in every key")
-    else:
-        console.print(scenes, markup=False)
-    print()
-    console.print(tables.run_table(comparison), markup=False)
+    print(comparison_text(comparison))
     if pictures:
         print(f"\n{output}")
     return 0
@@ -168,7 +116,7 @@ def export(
     force: Annotated[bool, typer.Option("--force", help="overwrite files that are there")] = False,
 ) -> int:
     """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything else."""
-    from archord.postprocess.run_result import Run
+    from archord.postprocess.run import Run
     from archord.scene.errors import InputError
 
     if vtk is None and csv is None:
@@ -177,11 +125,11 @@ def export(
     files: list[Path] = []
     left_out: list[str] = []
     if vtk is not None:
-        from archord.postprocess.vtk_export import export_vtk
+        from archord.postprocess.export import export_vtk
 
         files += export_vtk(run, vtk, step, force=force)
     if csv is not None:
-        from archord.postprocess.csv_export import export_csv
+        from archord.postprocess.export import export_csv
 
         tables, left_out = export_csv(run, csv, step, force=force)
         files += tables

@@ -43,6 +43,14 @@ def check_target(path: Path, inputs: Iterable[Path], *, force: bool = False, beg
             raise InputError(f"{path}: is there already; choose another file, or overwrite it with --force.")
 
 
+def make_folder(folder: Path) -> None:
+    """Make ``folder`` unless it is there. Raises `InputError` if it cannot be made."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {error.strerror or error}.") from None
+
+
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Around the writing of ``path``: `check_output` before, and `InputError` for what the system refuses all the

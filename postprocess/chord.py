@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from archord.geometry.basis import Array
-from archord.postprocess.arc_pressure import read_arcs
-from archord.postprocess.run_curve import read_run
+from archord.postprocess.arc import read_arcs
+from archord.postprocess.curve import read_run
 from archord.scene.errors import InputError
 
 
@@ -121,5 +121,5 @@ def read_chord_pressure(folder: str | Path, step: int | None = None, side: str |
         raise InputError(f"{folder}: has no contact angle at step {number}.")
     try:
         return chord_projection(arc.angle, arc.pressure, eps, arc.radius, arc.weight)
-    except ValueError as error:  # a ring whose contact goes round, or a file that is not a run's
+    except ValueError as error:  # a ring's contact beyond a quarter circle, or a file that is not a run's
         raise InputError(f"{folder}: step {number} cannot be projected: {error}") from None

@@ -10,20 +10,19 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.run_result import Run
+from archord.postprocess.curve import RunCurve, gap_name
+from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
 
-QUANTITIES = ("P", "p0", "eps")
 _SAME = 1e-9  # relative difference up to which displacements, or sizes of the joint, are the same
 _NOTHING = 1e-9  # part of the largest value below which a relative difference says nothing
 
@@ -80,7 +79,7 @@ def compare_runs(runs: list[Run]) -> Comparison:
     if len(runs) < 2:
         raise InputError("compare: needs two runs or more.")
     curves = [run.curve for run in runs]
-    step_by_step = _alike([c.delta for c in curves], [c.dR for c in curves])
+    step_by_step = _alike(curves)
     scenes = [run.scene for run in runs]
     absolute = _quantities(curves, False, step_by_step) if same_units(scenes) else []
     dimensionless = [] if same_size(scenes) else _quantities(curves, True, step_by_step)
@@ -100,53 +99,43 @@ def same_size(scenes: list[Scene]) -> bool:
     return same_units(scenes) and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0)
 
 
-def first_loading(curve: RunCurve) -> RunCurve:
-    """The steps before the pin first goes back."""
-    back = np.flatnonzero(np.diff(curve.delta) <= 0)
-    n = int(back[0]) + 1 if len(back) else len(curve.delta)
-    cut = {name: getattr(curve, name)[:n] for name in ("delta", "P", "p0", "eps", "peeq_max")}
-    return replace(curve, **cut)
-
-
-def _alike(deltas: list[Array], gaps: list[float]) -> bool:
+def _alike(curves: list[RunCurve]) -> bool:
     """Whether all runs have the same displacements over the clearance."""
-    loads = [delta / abs(gap) for delta, gap in zip(deltas, gaps, strict=True)]
+    loads = [scaled(curve, "delta", True) for curve in curves]
     return all(len(load) == len(loads[0]) and np.allclose(load, loads[0], rtol=_SAME, atol=_SAME) for load in loads)
+
+
+def scaled(curve: RunCurve, name: str, dimensionless: bool) -> Array:
+    """A quantity of the ``curve``, or "delta", ``(n,)``; ``dimensionless`` over powers of E*, R and the clearance."""
+    gap = abs(curve.dR)
+    scale = {"delta": gap, "P": curve.E_star * gap, "p0": curve.E_star * gap / curve.R, "eps": 1.0}
+    return getattr(curve, name) / (scale[name] if dimensionless else 1.0)
 
 
 def _quantities(curves: list[RunCurve], dimensionless: bool, step_by_step: bool) -> list[Compared]:
     units, same_gap = curves[0].scene.units, np.ptp([c.dR for c in curves]) <= _SAME * abs(curves[0].dR)
     whole = step_by_step and (dimensionless or same_gap)
-    parts = curves if whole else [first_loading(c) for c in curves]
-    loads = [part.delta / (abs(part.dR) if dimensionless else 1.0) for part in parts]
+    parts = curves if whole else [c.first_loading() for c in curves]
+    loads = [scaled(part, "delta", dimensionless) for part in parts]
     load = loads[0] if whole else _common(loads)
     if not len(load):
         return []
-    found, gap = [], "dR" if min(c.dR for c in curves) > 0 else "|dR|"
-    for name in QUANTITIES:
-        values, between = [], []
-        for part, x in zip(parts, loads, strict=True):
-            y = getattr(part, name) / (_scale(part, name) if dimensionless else 1.0)
-            value, interpolated = (y, np.zeros(len(y), dtype=bool)) if whole else _at(load, x, y)
-            values.append(value)
-            between.append(interpolated)
-        shown, unit = _title(name, gap if dimensionless else "", units.force, units.stress)
-        load_name = f"delta/{gap}" if dimensionless else f"delta [{units.length}]"
-        found.append(Compared(shown, unit, load_name, load, np.array(values), np.array(between)))
+    gap = gap_name(min(c.dR for c in curves))
+    named = {"P": ("P", units.force), "p0": ("p0", units.stress), "eps": ("eps", "rad")}
+    load_name = f"delta [{units.length}]"
+    if dimensionless:
+        named |= {"P": (f"P/(E* {gap})", ""), "p0": (f"p0 R/(E* {gap})", "")}
+        load_name = f"delta/{gap}"
+    found = []
+    for name, (shown, unit) in named.items():
+        curves_of = [scaled(part, name, dimensionless) for part in parts]
+        pairs = [
+            (y, np.zeros(len(y), dtype=bool)) if whole else _at(load, x, y)
+            for x, y in zip(loads, curves_of, strict=True)
+        ]
+        values, between = (np.array(both) for both in zip(*pairs, strict=True))
+        found.append(Compared(shown, unit, load_name, load, values, between))
     return found
-
-
-def _scale(curve: RunCurve, quantity: str) -> float:
-    """What makes a quantity dimensionless."""
-    force = curve.E_star * abs(curve.dR)
-    return {"P": force, "p0": force / curve.R, "eps": 1.0}[quantity]
-
-
-def _title(quantity: str, gap: str, force: str, stress: str) -> tuple[str, str]:
-    """Name and unit; over powers of E*, R and ``gap``, if that is given."""
-    if gap and quantity != "eps":
-        return {"P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})"}[quantity], ""
-    return quantity, {"P": force, "p0": stress, "eps": "rad"}[quantity]
 
 
 def _common(loads: list[Array]) -> Array:
@@ -178,7 +167,7 @@ def short_names(folders: list[Path]) -> list[str]:
     return [name if names.count(name) == 1 else f"{name} ({n})" for name, n in zip(names, count, strict=True)]
 
 
-def scene_keys(scene: Scene) -> dict[str, Any]:
+def _scene_keys(scene: Scene) -> dict[str, Any]:
     """Every key of the resolved scene by its dotted name."""
     found: dict[str, Any] = {}
     for section, keys in tomllib.loads(resolved(scene)).items():
@@ -188,7 +177,7 @@ def scene_keys(scene: Scene) -> dict[str, Any]:
 
 def differing_keys(scenes: list[Scene]) -> dict[str, list[str]]:
     """Keys in which the ``scenes`` differ, and their values as TOML writes them; empty where a scene has none."""
-    tables = [scene_keys(scene) for scene in scenes]
+    tables = [_scene_keys(scene) for scene in scenes]
     names = list(dict.fromkeys(name for table in tables for name in table))
     rows = {name: [json.dumps(t[name], ensure_ascii=False) if name in t else "" for t in tables] for name in names}
     return {name: values for name, values in rows.items() if len(set(values)) > 1}

@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.postprocess.run_curve import RunCurve
+from archord.postprocess.curve import RunCurve
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 

@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from archord.postprocess.arc_pressure import ArcContact, undeformed
-from archord.postprocess.run_fields import BODIES, Fields
-from archord.postprocess.run_result import read_columns
+from archord.postprocess.arc import undeformed
+from archord.postprocess.curve import Columns
+from archord.postprocess.fields import BODIES, Fields
+from archord.presets.arc import ArcProfile
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
 _WHOLE = ("step", "iterations", "cutbacks")
+_BODY = {number: name for name, number in BODIES.items()}
 
 
 def with_units(frame: pd.DataFrame, units: dict[str, str]) -> pd.DataFrame:
@@ -36,14 +38,14 @@ def units_of_headings(path: Path) -> dict[str, str]:
     return {name: unit.removesuffix("]") for name, _, unit in parts}
 
 
-def history_frame(path: Path) -> pd.DataFrame:
-    """A history.csv, a row for each accepted step. Raises `InputError` if it is none."""
-    frame = pd.DataFrame(read_columns(path))
+def history_frame(path: Path, columns: Columns) -> pd.DataFrame:
+    """The ``columns`` of the history.csv ``path``, a row for each accepted step, with the units of its headings."""
+    frame = pd.DataFrame(columns)
     whole = [name for name in _WHOLE if name in frame]
     return with_units(frame.astype(dict.fromkeys(whole, int)), units_of_headings(path))
 
 
-def contact_frame(arcs: dict[str, ArcContact], scene: Scene) -> pd.DataFrame:
+def contact_frame(arcs: dict[str, ArcProfile], scene: Scene) -> pd.DataFrame:
     """The points of the arcs by side and, from the contact axis, by angle; x and y are undeformed coordinates.
 
     ``pressure`` is linear on each facet, ``raw_pressure`` as the solver integrates it, both positive in compression;
@@ -67,9 +69,8 @@ def contact_frame(arcs: dict[str, ArcContact], scene: Scene) -> pd.DataFrame:
 def node_frame(fields: Fields, scene: Scene) -> pd.DataFrame:
     """The nodes with their body, undeformed coordinates and displacement."""
     length = scene.units.length
-    names = {number: name for name, number in BODIES.items()}
     columns = {
-        "body": [names[number] for number in fields.body_of_node],
+        "body": [_BODY[number] for number in fields.body_of_node],
         **dict(zip(("x", "y"), fields.coordinates.T, strict=True)),
         **dict(zip(("ux", "uy"), fields.displacement.T, strict=True)),
     }
@@ -80,10 +81,9 @@ def node_frame(fields: Fields, scene: Scene) -> pd.DataFrame:
 def cell_frame(fields: Fields, scene: Scene) -> pd.DataFrame:
     """The triangles with their body, nodes (numbered from 1: three corners, three between), centre and mean fields."""
     stress = scene.units.stress
-    names = {number: name for name, number in BODIES.items()}
     centre = fields.coordinates[fields.cells[:, :3]].mean(axis=1)
     nodes = {f"node{k + 1}": fields.cells[:, k] + 1 for k in range(fields.cells.shape[1])}
-    columns = {"cell": np.arange(1, len(fields.cells) + 1), "body": [names[number] for number in fields.body]}
+    columns = {"cell": np.arange(1, len(fields.cells) + 1), "body": [_BODY[number] for number in fields.body]}
     frame = pd.DataFrame(columns | nodes | {"x": centre[:, 0], "y": centre[:, 1]} | fields.cell_fields())
     units = dict.fromkeys(("von_mises", "mean_stress", "contact_pressure"), stress)
     return with_units(frame, units | dict.fromkeys(("x", "y"), scene.units.length))

@@ -8,23 +8,18 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.chord import chord_projection
-from archord.postprocess.magnified import magnification, magnified, rigid_arc
-from archord.postprocess.run_fields import SUBTRIANGLES, Fields
-from archord.postprocess.run_result import Run
+from archord.postprocess.curve import gap_name
+from archord.postprocess.fields import SUBTRIANGLES, Fields, magnification, magnified, rigid_arc
+from archord.postprocess.run import Run
 from archord.scene.scene import Scene
 
 _EDGE_POINTS = 5  # along a curved edge
 _MANY_STEPS = 60  # whose bars touch
 
 
-def gap_name(clearances: list[float]) -> str:
-    """The clearance as it stands in labels: of its size alone, where it is an interference."""
-    return "ΔR" if min(clearances) > 0 else "|ΔR|"
-
-
 def load_label(scene: Scene, delta: float) -> str:
     """A displacement over the clearance, in words."""
-    return f"δ = {delta / abs(scene.joint.dR):.4g} {gap_name([scene.joint.dR])}"
+    return f"δ = {delta / abs(scene.joint.dR):.4g} {gap_name(scene.joint.dR, 'ΔR')}"
 
 
 def second_axis(axes: Any, direction: str, divisor: float, label: str, opposite: str) -> None:
@@ -51,7 +46,7 @@ def force_panel(axes: Any, run: Run) -> None:
     axes.set(xlim=(min(delta), None), ylim=(min(P), None))
     axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)
-    second_axis(axes, "x", abs(scene.joint.dR), f"δ / {gap_name([scene.joint.dR])}", "top")
+    second_axis(axes, "x", abs(scene.joint.dR), f"δ / {gap_name(scene.joint.dR, 'ΔR')}", "top")
     second_axis(axes, "y", scene.E_star * scene.joint.radius, "P / (E* R)", "right")
 
 

@@ -7,12 +7,15 @@ is built from them. Angles and arc lengths are measured on the undeformed arcs f
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.solver.contact.contact import Contact
-from archord.solver.contact.surface import ContactSide
+
+if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
+    from archord.solver.contact.contact import Contact
+    from archord.solver.contact.surface import ContactSide
 
 _PEAK_FRACTION = 0.25  # part of the contact angle over which the parabola of the peak is fitted
 _EDGE_FACETS = 4  # facets whose forces give the edge of the contact
@@ -20,13 +23,16 @@ _EDGE_FACETS = 4  # facets whose forces give the edge of the contact
 
 @dataclass(frozen=True)
 class ArcProfile:
-    """One side's contact state at ``q`` points of its ``n`` facets, ordered from the contact axis, on every rank."""
+    """One side's contact state at ``q`` points of its ``n`` facets, ordered from the contact axis, on every rank.
+
+    Of a joint cut in half. In the facet at the edge of the contact the line of `pressure` may dip below zero.
+    """
 
     radius: float
-    s: Array  # (n, q) arc position
+    s: Array  # (n, q) arc length from the contact axis
     weight: Array  # (n, q) measure
     coordinates: Array  # (n, q, 2) deformed
-    pressure: Array  # (n, q) projected: linear on each facet, with the facet's force
+    pressure: Array  # (n, q) positive in compression; projected: linear on each facet, with the facet's force
     raw_pressure: Array  # (n, q) as integrated by the solver
     gap: Array  # (n, q) positive when open
 
@@ -44,6 +50,16 @@ class ArcProfile:
     def in_contact(self) -> Array:
         """Share ``(n,)`` of each facet that carries pressure."""
         return (self.weight * (self.raw_pressure > 0)).sum(axis=1) / self.weight.sum(axis=1)
+
+    @property
+    def resultant(self) -> float:
+        """Vertical force of the whole joint, ``2 sum(weight pressure cos(angle))``, on the undeformed arc."""
+        return 2 * float((self.weight * self.pressure * np.cos(self.angle)).sum())
+
+    def facet_means(self) -> tuple[Array, Array]:
+        """Angle ``(n,)`` and pressure ``(n,)`` of the facets: their means, which do not scatter where it yields."""
+        total = self.weight.sum(axis=1)
+        return (self.weight * self.angle).sum(axis=1) / total, (self.weight * self.pressure).sum(axis=1) / total
 
 
 def arc_profile(contact: Contact, side: ContactSide, radius: float, axis_point: Array, u: Array) -> ArcProfile | None:

@@ -30,8 +30,8 @@ class Table:
         self.rows.append([str(cell) for cell in cells])
 
     def __str__(self) -> str:
-        """In columns two spaces apart."""
-        lines = [list(self.headings), *self.rows]
+        """In columns two spaces apart; without a line of headings where all are empty."""
+        lines = [list(self.headings), *self.rows] if any(self.headings) else self.rows
         width = [max(map(len, column)) for column in zip(*lines, strict=True)]
         return "\n".join(
             "  ".join(

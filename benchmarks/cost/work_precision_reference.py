@@ -25,9 +25,9 @@ from archord.geometry.basis import Array
 from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.run import solve_scene
-from archord.postprocess.arc_pressure import SIDES, read_arcs
+from archord.postprocess.arc import SIDES, read_arcs
 from archord.postprocess.convergence import extrapolated
-from archord.postprocess.run_curve import read_run
+from archord.postprocess.curve import read_run
 from archord.scene.errors import InputError
 from archord.scene.file import resolved
 from archord.scene.scene import Scene

@@ -14,7 +14,7 @@ from archord.benchmarks.paper.figures import FULL_YIELD, Runs, Table, fig2, fig4
 from archord.benchmarks.paper.first_yield import first_yields
 from archord.benchmarks.paper.runs import MESHES, PAIRS, PLANES, Plane, plastic
 from archord.geometry.basis import Array
-from archord.postprocess.arc_pressure import read_arcs
+from archord.postprocess.arc import read_arcs
 from archord.postprocess.laws.calibration import calibrate
 from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.laws.laws import find_law

@@ -11,10 +11,10 @@ import numpy as np
 from archord.benchmarks.paper.figures import LABELS, MILD_YIELD, STYLES, Runs, Table, stacked
 from archord.benchmarks.paper.runs import PLANES, Plane, plastic
 from archord.output.step_file import step_name
+from archord.postprocess.curve import RunCurve
+from archord.postprocess.fields import SUBTRIANGLES, read_fields
 from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.laws.laws import find_law
-from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.run_fields import SUBTRIANGLES, read_fields
 
 STAGES = (1.25, 1.6, 2.0)  # A, B and C in clearances: just after the paper's first yield, and on to its end
 _BODIES = {1: "pin", 2: "block"}

@@ -6,12 +6,12 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from archord.geometry.basis import Array
-from archord.postprocess.arc_pressure import ArcPressure
+from archord.presets.arc import ArcProfile
 
 ANGLES = np.linspace(0.0, np.pi / 2, 401)  # from the contact axis
 
 
-def sampled(arc: ArcPressure) -> Array:
+def sampled(arc: ArcProfile) -> Array:
     """Pressure ``(401,)`` of a run's side at `ANGLES`: linear between the points that contact.h5 holds."""
     order = np.argsort(arc.angle, axis=None)
     return interpolated(arc.angle.ravel()[order], arc.pressure.ravel()[order])

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from archord.postprocess.convergence import Refined, group
+from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.curve_fit import CurveFit, fit_curve, fit_plateau
 from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.law_joint import LawJoint
-from archord.postprocess.run_curve import RunCurve
 from archord.scene.errors import InputError
 
 _LIKE = 0.01  # share of P by which the blocks of runs of one fit may change it

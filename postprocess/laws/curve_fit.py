@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.postprocess.arc import plateau_pressure
 from archord.postprocess.convergence import Order, Refined
+from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.chord_laws import plastic_force, plastic_peak
 from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.laws.least_squares import Estimate, LeastSquares, fit
-from archord.postprocess.plateau import plateau_pressure
-from archord.postprocess.run_curve import RunCurve
 from archord.scene.errors import InputError
 
 _STARTS_OF_C = (0.7, 1.0, 1.5, 2.5)  # p0 has a kink at the onset: one start may miss the best side of it

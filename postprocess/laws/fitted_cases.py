@@ -18,9 +18,9 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.output.output_file import writing
 from archord.postprocess.convergence import Refined
+from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.curve_fit import CurveFit, fit_curve, fit_plateau
 from archord.postprocess.laws.law_joint import LawJoint
-from archord.postprocess.run_curve import RunCurve
 from archord.scene.errors import InputError
 
 _TOLD = 0.65  # of the largest load: where the plateau must have begun for c to count

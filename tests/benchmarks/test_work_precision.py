@@ -21,9 +21,9 @@ from archord.benchmarks.cost.work_precision_run import Point, RunFailure, Task, 
 from archord.benchmarks.cost.work_precision_warm import curves, warm_seconds
 from archord.benchmarks.paper.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
 from archord.cli import run
-from archord.postprocess.arc_pressure import ArcPressure
 from archord.postprocess.convergence import extrapolated
 from archord.scene.errors import InputError
+from tests.postprocess.synthetic import arc
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="it starts processes of one rank")
 
@@ -91,8 +91,8 @@ def test_a_profile_has_no_error_against_itself_and_errors_scale():
 def test_sampling_keeps_a_linear_profile():
     """Of a run's side in whatever order its points are, and of nodal values."""
     angle = np.linspace(0, np.pi / 2, 60).reshape(20, 3)
-    arc = ArcPressure(1.0, angle[:, ::-1], np.ones_like(angle), 2 - angle[:, ::-1])
-    np.testing.assert_allclose(sampled(arc), 2 - ANGLES, atol=1e-12)
+    side = arc(angle[:, ::-1], 2 - angle[:, ::-1], np.ones_like(angle))
+    np.testing.assert_allclose(sampled(side), 2 - ANGLES, atol=1e-12)
     np.testing.assert_allclose(interpolated(angle.ravel(), 2 - angle.ravel()), 2 - ANGLES, atol=1e-12)
 
 

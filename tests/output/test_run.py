@@ -16,7 +16,7 @@ from archord.output.folder import APART, CHECKPOINT, FILES, PICTURES, claim_fold
 from archord.output.history import read_history
 from archord.output.restart import plan_extension
 from archord.output.run import solve_scene
-from archord.postprocess.picture import draw
+from archord.postprocess.pictures import draw
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, resolved
 from tests.solver.solving import scene

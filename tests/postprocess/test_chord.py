@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from archord.postprocess.arc_pressure import read_arcs
+from archord.postprocess.arc import read_arcs
 from archord.postprocess.chord import arc_angle, chord_coordinate, chord_projection, read_chord_pressure
-from archord.postprocess.run_curve import read_run
+from archord.postprocess.curve import read_run
 from archord.scene.errors import InputError
 
 

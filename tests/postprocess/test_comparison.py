@@ -7,9 +7,9 @@ from mpi4py import MPI
 from archord.benchmarks.case import E, paper_joint
 from archord.cli import run as command
 from archord.output.run import solve_scene
-from archord.postprocess.comparison import compare_runs, differing_keys, first_loading, short_names
-from archord.postprocess.run_curve import RunCurve
-from archord.postprocess.run_result import Run
+from archord.postprocess.comparison import compare_runs, differing_keys, short_names
+from archord.postprocess.curve import RunCurve
+from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 
 
@@ -95,7 +95,7 @@ def test_the_first_loading_ends_where_the_pin_goes_back():
     """Also if it later goes further than before."""
     delta = np.array([1.0, 2.0, 3.0, 2.0, 1.0, 4.0])
     curve = RunCurve("x", paper_joint(), delta, delta, delta, delta, delta)
-    assert list(first_loading(curve).P) == [1, 2, 3]
+    assert list(curve.first_loading().P) == [1, 2, 3]
 
 
 def test_nothing_has_no_relative_difference(runs):

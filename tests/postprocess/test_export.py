@@ -7,8 +7,8 @@ import pytest
 import pyvista
 
 from archord.cli import run as command
-from archord.postprocess.run_result import Run
-from archord.postprocess.vtk_export import export_vtk
+from archord.postprocess.export import export_vtk
+from archord.postprocess.run import Run
 
 _QUADRATIC_TRIANGLE = 22  # VTK's number
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from archord.benchmarks.case import paper_joint
-from archord.postprocess.magnified import magnification, magnified, nominal, rigid_arc
-from archord.postprocess.run_fields import BODIES
-from archord.postprocess.run_result import Run
+from archord.postprocess.fields import BODIES, magnification, magnified, nominal, rigid_arc
+from archord.postprocess.run import Run
 
 
 def test_without_magnification_nothing_is_moved(runs):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import archord
-from archord.postprocess.run_fields import BODIES
+from archord.postprocess.fields import BODIES
 
 
 def test_the_history_is_history_csv(runs):

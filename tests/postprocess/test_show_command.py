@@ -12,7 +12,7 @@ from mpi4py import MPI
 from archord.benchmarks.case import paper_joint
 from archord.cli import run as command
 from archord.output.run import solve_scene
-from archord.postprocess.run_result import Run
+from archord.postprocess.run import Run
 
 PICTURES = ["force.png", "pressure.png", "field.png", "iterations.png"]
 

@@ -10,7 +10,7 @@ import pytest
 
 import archord
 from archord.cli import run as command
-from archord.postprocess.sweep_result import short
+from archord.postprocess.sweep import short
 
 NAMES = {"elastic": "48976689e411", "coarse": "000123456789"}  # as hashes may be: they look like numbers
 

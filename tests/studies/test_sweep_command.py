@@ -10,7 +10,7 @@ import pytest
 
 from archord.cli import run
 from archord.output.history import read_history
-from archord.postprocess.run_curve import read_run
+from archord.postprocess.curve import read_run
 from archord.studies.case_run import standing
 from archord.studies.cases import read_sweep
 from tests.studies.parts import SOFT, STUCK, numbers, sweep, table, times, written

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
-from archord.postprocess.arc_pressure import ArcPressure
+from archord.postprocess.arc import median_pressure
 from archord.postprocess.convergence import group
+from archord.postprocess.curve import read_run
 from archord.postprocess.laws.calibration import calibrate
 from archord.postprocess.laws.curve_fit import fit_curve
-from archord.postprocess.plateau import median_pressure
-from archord.postprocess.run_curve import read_run
 from archord.scene.errors import InputError
-from tests.postprocess.synthetic import LOADS, curve
+from tests.postprocess.synthetic import LOADS, arc, curve
 from tests.solver.solving import scene
 
 DRAWS = 80
@@ -223,9 +222,9 @@ def test_the_median_of_a_cut_off_pressure_is_the_plateau():
     angle = (np.outer(edges[:-1], [0.75, 0.25]) + np.outer(edges[1:], [0.25, 0.75])).reshape(-1, 2)
     weight = np.repeat(np.diff(edges)[:, None] / 2, 2, axis=1)
     parabola = np.maximum(0, 1 - (np.sin(angle) / 0.8) ** 2)
-    assert median_pressure(ArcPressure(1.0, angle, weight, parabola)) == pytest.approx(0.75, rel=1e-3)
-    assert median_pressure(ArcPressure(1.0, angle, weight, np.minimum(parabola, 0.5))) == pytest.approx(0.5, rel=1e-12)
-    assert median_pressure(ArcPressure(1.0, angle, weight, 0 * parabola)) == 0
+    assert median_pressure(arc(angle, parabola, weight)) == pytest.approx(0.75, rel=1e-3)
+    assert median_pressure(arc(angle, np.minimum(parabola, 0.5), weight)) == pytest.approx(0.5, rel=1e-12)
+    assert median_pressure(arc(angle, 0 * parabola, weight)) == 0
 
 
 def test_solved_runs(runs):

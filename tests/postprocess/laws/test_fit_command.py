@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from archord.cli import run
+from archord.postprocess.curve import read_run
 from archord.postprocess.laws.fitted_law import FittedLaw
-from archord.postprocess.run_curve import read_run
 from tests.postprocess.synthetic import curve
 
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from archord.cli import run
+from archord.postprocess.curve import read_run
 from archord.postprocess.laws.calibrated_law import ROWS, TABLE
 from archord.postprocess.laws.calibrated_model import CalibratedModel
 from archord.postprocess.laws.calibration import calibrate
 from archord.postprocess.laws.fitted_cases import read_cases
-from archord.postprocess.run_curve import read_run
 from archord.studies.cases import read_sweep
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="the whole command, on one rank")

@@ -1,7 +1,15 @@
-"""The fields of a run at a step, as fields.h5 holds them: displacement at nodes, stress and plastic strain of cells."""
+"""The fields of a run at a step, as fields.h5 holds them, and the deformed joint drawn so that its clearance is seen.
+
+Displacements alone cannot be magnified: bodies that touch would overlap, as the gap between their circles would stay
+what it is. So the clearance is magnified with them. Every point counts as displaced from its place in a joint without
+clearance, in which both arcs are the circle of radius R around the origin: the pin centred there, the block drawn in by
+dR along its radii. Magnified by m, a gap is m times as wide, and what touches touches, but for ``(m s)^2/(2 R)`` where
+one body has slid by s along the other; that is why m is kept moderate.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +26,9 @@ BODIES = {"pin": 1, "block": 2}
 CELL_FIELDS = ("von_mises", "mean_stress", "peeq", "contact_state", "contact_pressure")
 SUBTRIANGLES = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]  # of a VTK second-order triangle
 _EDGES = [[0, 3, 1], [1, 4, 2], [2, 5, 0]]  # of a VTK second-order triangle, along it
+_VISIBLE = 0.1  # clearance over R, as drawn
+_FARTHEST = 0.2  # displacement and clearance over R, as drawn
+_NEAR = 3.0  # radii within which displacements count
 
 
 @dataclass(frozen=True)
@@ -80,7 +91,8 @@ def read_fields(folder: str | Path, scene: Scene, step: int) -> Fields:
         with h5py.File(path) as file:
             accepted = int(file["accepted"][()])
             if not 1 <= step <= accepted:
-                raise InputError(f"{path}: has no step {step}; it holds {_counted(accepted)}.")
+                held = f"steps 1 to {accepted}" if accepted > 1 else "step 1 alone" if accepted else "none"
+                raise InputError(f"{path}: has no step {step}; it holds {held}.")
             values = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
             return Fields(
                 step=step,
@@ -97,5 +109,41 @@ def read_fields(folder: str | Path, scene: Scene, step: int) -> Fields:
         raise InputError(f"{path}: cannot be read as the fields of a run: it is damaged.") from None
 
 
-def _counted(steps: int) -> str:
-    return f"steps 1 to {steps}" if steps > 1 else "step 1 alone" if steps else "none"
+def magnification(scene: Scene, fields: Fields) -> float:
+    """Factor 1, 2, 3, 5, 10, ... that makes the clearance of ``scene`` visible and leaves the shape recognisable."""
+    R, dR = scene.joint.radius, abs(scene.joint.dR)
+    near = np.hypot(*fields.coordinates.T) < _NEAR * R
+    farthest = dR + max(float(np.abs(fields.displacement[near]).max()), abs(fields.delta))
+    wanted = min(_VISIBLE * R / dR, _FARTHEST * R / farthest)
+    if wanted <= 1:
+        return 1.0
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    return max(step * decade for step in (1, 2, 3, 5) if step * decade <= wanted * (1 + 1e-9))
+
+
+def pin_centre(scene: Scene, delta: float = 0.0) -> float:
+    """Height of the centre of a rigid pin pressed by ``delta``, or of an elastic one before it is pressed; that of the
+    hole is 0."""
+    return -delta - (scene.joint.dR if scene.joint.model == "block" else 0.0)
+
+
+def nominal(scene: Scene, fields: Fields) -> Array:
+    """Places ``(n, 2)`` of the nodes in the joint without clearance."""
+    X, pin = fields.coordinates, fields.body_of_node == BODIES["pin"]
+    places = X * (1 - scene.joint.dR / np.maximum(np.hypot(*X.T), scene.joint.radius / 2))[:, None]
+    places[pin] = X[pin] - [0.0, pin_centre(scene)]
+    return places
+
+
+def magnified(scene: Scene, fields: Fields, factor: float, displaced: bool = True) -> Array:
+    """Points ``(n, 2)`` at which the nodes are drawn: with ``factor`` times their displacement from `nominal`; or the
+    joint before it is loaded, if not ``displaced``."""
+    start = nominal(scene, fields)
+    return start + factor * ((fields.deformed if displaced else fields.coordinates) - start)
+
+
+def rigid_arc(scene: Scene, delta: float, factor: float) -> Array:
+    """Points ``(91, 2)`` along the quarter arc of a rigid pin pressed by ``delta``, as drawn."""
+    angle = np.linspace(0, math.pi / 2, 91)
+    R = scene.joint.radius
+    return np.stack([R * np.sin(angle), factor * pin_centre(scene, delta) - R * np.cos(angle)], axis=1)

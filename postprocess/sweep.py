@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from archord.output.folder import is_sweep
-from archord.postprocess.run_result import Run
+from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,16 +58,20 @@ class Sweep:
 
     def __repr__(self) -> str:
         """Folder, keys and number of cases by status."""
+        return f"<Sweep {self.folder}: {len(self)} cases over {', '.join(self.keys)}; {self.states}>"
+
+    @property
+    def states(self) -> str:
+        """Number of cases by status, in words."""
         states = [row["status"] for row in self.rows]
-        counted = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
-        return f"<Sweep {self.folder}: {len(self)} cases over {', '.join(self.keys)}; {counted}>"
+        return ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
 
     @property
     def keys(self) -> list[str]:
         """The varied keys, without units."""
         return [heading.partition(" [")[0] for heading in self.varied]
 
-    @property
+    @cached_property
     def moving(self) -> list[str]:
         """Headings of those varied keys that are not the same in all cases."""
         return [heading for heading in self.varied if len({row[heading] for row in self.rows}) > 1]

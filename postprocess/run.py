@@ -6,26 +6,21 @@ Arrays and tables are read when they are asked for, and pandas is imported only 
 from __future__ import annotations
 
 import json
-import math
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from archord.output.folder import no_run
-from archord.output.history import read_history
+from archord.postprocess.arc import read_arcs
+from archord.postprocess.curve import Columns, RunCurve, curve_of, read_columns
+from archord.postprocess.fields import Fields, read_fields
+from archord.presets.arc import ArcProfile
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
 from archord.scene.scene import Scene
 
-_NEEDED = {"step", "delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "iterations", "cutbacks",
-           "seconds"}  # fmt: skip
-
 if TYPE_CHECKING:
     import pandas as pd
-
-    from archord.postprocess.arc_pressure import ArcContact
-    from archord.postprocess.run_curve import RunCurve
-    from archord.postprocess.run_fields import Fields
 
 
 class Run:
@@ -72,7 +67,7 @@ class Run:
         return len(self._columns["step"])
 
     @property
-    def columns(self) -> dict[str, list[float]]:
+    def columns(self) -> Columns:
         """The columns of history.csv by name without unit, as plain lists."""
         return self._columns
 
@@ -81,23 +76,19 @@ class Run:
         """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of every column."""
         from archord.postprocess.frames import history_frame
 
-        return history_frame(self.folder / "history.csv")
+        return history_frame(self.folder / "history.csv", self._columns)
 
     @cached_property
     def curve(self) -> RunCurve:
         """P, p0 and eps over delta as arrays, for laws and fits. Raises `InputError` without an accepted step."""
-        from archord.postprocess.run_curve import read_run
+        return curve_of(self.folder, self.scene, self._columns)
 
-        return read_run(self.folder)
-
-    def contact(self, step: int | None = None) -> dict[str, ArcContact]:
+    def contact(self, step: int | None = None) -> dict[str, ArcProfile]:
         """The contact along the arcs at ``step`` (the last), arrays by side: "pin", "hole".
 
         A side whose arc is not integrated is absent. Raises `InputError` without such a step.
         """
-        from archord.postprocess.arc_pressure import read_contact
-
-        return read_contact(self.folder, self.scene, self.number(step), self.steps)
+        return read_arcs(self.curve, self.number(step))
 
     def pressure(self, step: int | None = None, side: str | None = None) -> pd.DataFrame:
         """`contact` as a table with a row for each point, sorted by side and angle; of one ``side`` if given.
@@ -116,8 +107,6 @@ class Run:
 
         Raises `InputError` without such a step, and if the run wrote no fields.
         """
-        from archord.postprocess.run_fields import read_fields
-
         return read_fields(self.folder, self.scene, self.number(step))
 
     def number(self, step: int | None) -> int:
@@ -129,20 +118,6 @@ class Run:
         if not 1 <= step <= self.steps:
             raise InputError(f"{self.folder}: has no step {step}; its accepted steps are 1 to {self.steps}.")
         return int(step)
-
-
-def read_columns(path: Path) -> dict[str, list[float]]:
-    """The columns of the history.csv ``path`` by name without unit. Raises `InputError` if it is none."""
-    try:
-        columns = read_history(path)
-        finite = all(math.isfinite(value) for name in _NEEDED & columns.keys() for value in columns[name])
-        if finite and not columns.keys() >= _NEEDED:
-            raise KeyError("columns")
-    except (ValueError, IndexError, KeyError, OSError):
-        raise InputError(f"{path}: cannot be read as the history of a run.") from None
-    if not finite:
-        raise InputError(f"{path}: holds numbers that are not finite.")
-    return columns
 
 
 def _read_report(path: Path) -> dict[str, Any]:

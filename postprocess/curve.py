@@ -1,4 +1,4 @@
-"""The curves of a run, P and p0 over delta, with the joint they belong to."""
+"""The curves of a run, P, p0 and eps over delta, with the joint they belong to."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ from archord.scene.errors import InputError
 from archord.scene.file import load_scene
 from archord.scene.scene import Scene
 
+_CURVES = ("delta", "P", "p0", "eps", "peeq_max")
+_NEEDED = (*_CURVES, "step", "delta/dR", "P/(E* R)", "p0/E*", "iterations", "cutbacks", "seconds")
 _SAME = 1e-6  # relative difference of two forces that are the same but for what Newton leaves
+
+Columns = dict[str, list[float]]
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,20 @@ class RunCurve:
         given = [s.yield_stress for s in (self.scene.pin, self.scene.block) if s.yield_stress is not None]
         return min(given, default=None)
 
+    @property
+    def plane(self) -> str:
+        """Plane of the analysis: "strain" or "stress"."""
+        return self.scene.analysis.plane
+
+    def at(self, steps: np.ndarray | slice) -> RunCurve:
+        """The chosen ``steps`` alone."""
+        return replace(self, **{name: getattr(self, name)[steps] for name in _CURVES})
+
+    def first_loading(self) -> RunCurve:
+        """The steps before the pin first goes back."""
+        back = np.flatnonzero(np.diff(self.delta) <= 0)
+        return self.at(slice(int(back[0]) + 1 if len(back) else None))
+
     def loading(self) -> RunCurve:
         """The steps at which the pin is deeper in the hole than ever before; unloading and what it repeats left out.
 
@@ -63,13 +81,34 @@ class RunCurve:
         first, going_on = np.zeros(len(self.delta), dtype=bool), True
         for i in range(len(first)):
             first[i] = going_on = deeper[i] and (going_on or stronger[i])
-        curves = {name: getattr(self, name)[first] for name in ("delta", "P", "p0", "eps", "peeq_max")}
-        return replace(self, **curves)
+        return self.at(first)
 
-    @property
-    def plane(self) -> str:
-        """Plane of the analysis: "strain" or "stress"."""
-        return self.scene.analysis.plane
+
+def gap_name(dR: float, symbol: str = "dR") -> str:
+    """A clearance as it stands in names of quantities: of its size alone, where it is an interference."""
+    return symbol if dR > 0 else f"|{symbol}|"
+
+
+def read_columns(path: Path) -> Columns:
+    """The columns of the history.csv ``path`` by name without unit. Raises `InputError` if it is none."""
+    try:
+        columns = read_history(path)
+        present = [columns[name] for name in _NEEDED if name in columns]
+        finite = np.isfinite(present).all()
+        if finite and len(present) < len(_NEEDED):
+            raise KeyError("columns")
+    except (ValueError, IndexError, KeyError, OSError):
+        raise InputError(f"{path}: cannot be read as the history of a run.") from None
+    if not finite:
+        raise InputError(f"{path}: holds numbers that are not finite.")
+    return columns
+
+
+def curve_of(folder: Path, scene: Scene, columns: Columns) -> RunCurve:
+    """The curves among the ``columns`` of a run of ``scene``. Raises `InputError` if it has no accepted step."""
+    if not columns["delta"]:
+        raise InputError(f"{folder}: holds no accepted step.")
+    return RunCurve(str(folder), scene, *(np.array(columns[name]) for name in _CURVES), folder)
 
 
 def read_run(folder: str | Path) -> RunCurve:
@@ -78,14 +117,4 @@ def read_run(folder: str | Path) -> RunCurve:
     for name in ("scene.toml", "history.csv"):
         if not (folder / name).is_file():
             raise no_run(folder, name)
-    scene = load_scene(folder / "scene.toml")
-    try:
-        history = read_history(folder / "history.csv")
-        delta, P, p0, eps, peeq = [np.array(history[name]) for name in ("delta", "P", "p0", "eps", "peeq_max")]
-    except (ValueError, IndexError, KeyError, OSError):
-        raise InputError(f"{folder / 'history.csv'}: cannot be read as the history of a run.") from None
-    if not np.isfinite([delta, P, p0, eps, peeq]).all():
-        raise InputError(f"{folder / 'history.csv'}: holds numbers that are not finite.")
-    if not len(delta):
-        raise InputError(f"{folder}: holds no accepted step.")
-    return RunCurve(str(folder), scene, delta, P, p0, eps, peeq, folder)
+    return curve_of(folder, load_scene(folder / "scene.toml"), read_columns(folder / "history.csv"))
