@@ -34,7 +34,7 @@ def stability(
     """
     from mpi4py import MPI
 
-    from archord.benchmarks.stability import stability as table
+    from archord.benchmarks.stability import run as table
 
     begun, comm = perf_counter(), MPI.COMM_WORLD
     names = table.chosen(only)
@@ -52,12 +52,11 @@ def stability(
     lines = table.run(names, output / "runs", comm, said)
     wrong = [line for line in lines if line.faults]
     if comm.rank == 0:
-        from archord.benchmarks.stability.report import summary, write_report
+        from archord.benchmarks.stability.report import markdown, write
 
-        files = write_report(lines, output)
+        files = write(lines, output)
         if not quiet:
-            _print_table(lines)
-            print(summary(lines))
+            print(markdown(lines))
             for file in files:
                 print(file)
         for line in wrong:
@@ -166,21 +165,6 @@ def accuracy(
     for fault in faults:
         print(f"archord: {fault}.", file=sys.stderr)
     return 1 if faults else 0
-
-
-def _print_table(lines) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    from archord.benchmarks.stability.report import row
-
-    shown = ("case", "status", "steps", "iterations", "cutbacks", "force balance", "energy error", "deviation",
-             "tolerance", "seconds", "verdict")  # fmt: skip
-    table = Table(*shown, box=None, pad_edge=False)
-    for line in lines:
-        entries = row(line)
-        table.add_row(*(entries[name] for name in shown[:-1]), "as it should be" if not line.faults else "WRONG")
-    Console(highlight=False, width=None if sys.stdout.isatty() else 200).print(table, markup=False)
 
 
 @benchmark.command("work-precision")

@@ -95,7 +95,7 @@ def paper_joint(
 ) -> Scene:
     """Plane strain, like bodies, nu = 0.3, dR/R = 0.5 %, block 100 R, delta = 2 dR, with R = E* = 1.
 
-    ``sections`` override keys of the scene's sections: ``joint={"clearance": 0.01}``.
+    ``sections`` override keys of the scene's sections, as in ``joint={"clearance": 0.01}``; None drops a key.
     """
     solid = {"E": E, "nu": 0.3} | ({"yield_stress": yield_stress} if yield_stress else {})
     data: dict = {
@@ -113,8 +113,12 @@ def varied(scene: Scene, **sections: dict) -> Scene:
 
 
 def _overridden(data: dict[str, Any], sections: dict[str, dict]) -> dict[str, Any]:
-    """``data`` with the keys of ``sections``; a rigid pin has no other."""
-    return data | {name: keys if keys.get("rigid") else data.get(name, {}) | keys for name, keys in sections.items()}
+    """``data`` with the keys of ``sections``, without those that are None; a rigid pin has no other."""
+    merged = data | {name: keys if keys.get("rigid") else data.get(name, {}) | keys for name, keys in sections.items()}
+    return {
+        name: {key: value for key, value in keys.items() if value is not None} if isinstance(keys, dict) else keys
+        for name, keys in merged.items()
+    }
 
 
 def quantities(scene: Scene, last: Measures) -> dict[str, float]:

@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 _FORKS = multiprocessing.get_context("forkserver")
@@ -18,9 +19,12 @@ _FORKS.set_forkserver_preload(
 )
 
 
-def start(arguments: list[str], folder: Path, out: Path, err: Path) -> multiprocessing.process.BaseProcess:
-    """``archord`` with these ``arguments`` in ``folder``, told to write to the files ``out`` and ``err``."""
-    process = _FORKS.Process(target=_run, args=(arguments, str(folder), str(out), str(err)), daemon=True)
+def start(
+    arguments: list[str], folder: Path, out: Path, err: Path, before: Callable[[], None] | None = None
+) -> multiprocessing.process.BaseProcess:
+    """``archord`` with these ``arguments`` in ``folder``, told to write to the files ``out`` and ``err``, after a call
+    of ``before``."""
+    process = _FORKS.Process(target=_run, args=(arguments, str(folder), str(out), str(err), before), daemon=True)
     process.start()
     return process
 
@@ -35,7 +39,9 @@ def archord(*arguments: str, cwd: Path) -> subprocess.CompletedProcess:
         return subprocess.CompletedProcess(arguments, process.exitcode, out.read_text(), err.read_text())
 
 
-def _run(arguments: list[str], folder: str, out: str, err: str) -> None:
+def _run(arguments: list[str], folder: str, out: str, err: str, before: Callable[[], None] | None) -> None:
+    if before is not None:
+        before()
     for stream, name in ((1, out), (2, err)):
         os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_APPEND), stream)
     os.chdir(folder)

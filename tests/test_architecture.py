@@ -25,7 +25,6 @@ ROOMS = [
     "studies",
     "benchmarks",
     "benchmarks.paper",
-    "benchmarks.verification",
     "benchmarks.stability",
     "benchmarks.peers",
     "benchmarks.cost",
@@ -38,8 +37,6 @@ OPEN = {
     "solver",
     "output",
     "studies",
-    "benchmarks.paper",
-    "benchmarks.stability",
 }
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from archord.benchmarks.cost.envelope import Pairs, envelope, lasting
+from archord.benchmarks.cost.pressure_profile import profile_error
 from archord.benchmarks.cost.work_precision_cases import Case, matches
 from archord.benchmarks.cost.work_precision_codes import CALCULIX, archord_tasks, calculix_tasks, peer_tasks
 from archord.benchmarks.cost.work_precision_reference import Reference, read_reference
 from archord.benchmarks.cost.work_precision_run import LIMIT, Point, Task, run_all
-from archord.benchmarks.paper.pressure_profile import profile_error
 from archord.postprocess.convergence import Limit, extrapolated
 from archord.scene.errors import InputError
 

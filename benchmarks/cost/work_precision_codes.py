@@ -18,10 +18,10 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from archord.benchmarks.cost.pressure_profile import interpolated
 from archord.benchmarks.cost.work_precision_cases import DECKS, SERIES, Case, DeckSeries, Mesh, Series
 from archord.benchmarks.cost.work_precision_reference import profile_of, values_of
 from archord.benchmarks.cost.work_precision_run import LIMIT, RunFailure, Task, Values
-from archord.benchmarks.paper.pressure_profile import interpolated
 from archord.benchmarks.peers.calculix import read_opinion
 from archord.output.history import read_history
 from archord.postprocess.deck import PlaneMesh, deck, deck_mesh

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from archord.benchmarks.cost.pressure_profile import ANGLES, profile_error, sampled, smoothed
 from archord.benchmarks.cost.work_precision_cases import CASES, Case, Kinematics, Series, families
-from archord.benchmarks.paper.pressure_profile import ANGLES, profile_error, sampled, smoothed
 from archord.geometry.basis import Array
 from archord.output.folder import claim_folder
 from archord.output.history import read_history

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-import io
 import math
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
 
-from archord.benchmarks.report_files import markdown_table, write_files
-from archord.benchmarks.stability.stability import Comparison, Line
+from archord.benchmarks.stability.run import Line
+from archord.report.figure import new_figure, save
+from archord.report.files import write_report
+from archord.report.table import Table
 
 _PANELS = 3
 _COLUMNS = ("iterations\na step", "cutbacks", "forces", "energy", "expected")
 _NOTHING = ("check", None, "")
+_PRINTED = ("case", "status", "steps", "iterations", "cutbacks", "force balance", "energy error", "quantity", "value",
+            "expected", "by", "deviation", "seconds", "verdict")  # fmt: skip
 
 
 def row(line: Line) -> dict[str, str]:
     """The entries of a line by heading; what is not there is empty."""
     case, result = line.case, line.result
-    first = _worst(line)
-    solved = result.steps > 0
+    first, solved = line.worst, result.steps > 0
+    energy_known = solved and math.isfinite(result.energy_limit)
     return {
         "case": case.name,
         "group": case.group,
@@ -32,8 +36,8 @@ def row(line: Line) -> dict[str, str]:
         "dofs": str(result.dofs),
         "force balance": f"{result.balance:.0e}" if solved else "",
         "allowed balance": f"{result.balance_limit:.0e}" if solved else "",
-        "energy error": f"{result.energy:.0e}" if solved and math.isfinite(result.energy_limit) else "",
-        "allowed energy error": f"{result.energy_limit:.0e}" if solved and math.isfinite(result.energy_limit) else "",
+        "energy error": f"{result.energy:.0e}" if energy_known else "",
+        "allowed energy error": f"{result.energy_limit:.0e}" if energy_known else "",
         "quantity": first.expected.quantity if first else "",
         "value": f"{first.value:.8g}" if first else "",
         "expected": f"{first.reference:.8g}" if first else "",
@@ -46,12 +50,6 @@ def row(line: Line) -> dict[str, str]:
         "message": result.message,
         "warnings": " | ".join(result.warnings),
     }
-
-
-def write_report(lines: list[Line], folder: Path) -> list[Path]:
-    """Write stability.csv, stability.md and stability.png into ``folder``; returns the files."""
-    rows = [row(line) for line in lines]
-    return write_files(folder, "stability", rows, markdown(lines), lambda file: draw(lines, file))
 
 
 def summary(lines: list[Line]) -> str:
@@ -69,26 +67,25 @@ def summary(lines: list[Line]) -> str:
 
 def markdown(lines: list[Line]) -> str:
     """The table, group by group, and the sentences of the runs that stopped."""
-    headings = ("case", "status", "steps", "iterations", "cutbacks", "force balance", "energy error", "quantity",
-                "value", "expected", "by", "deviation", "seconds", "verdict")  # fmt: skip
-    out = [summary(lines)]
+    parts = [f"{summary(lines)}\n"]
     for group in dict.fromkeys(line.case.group for line in lines):
-        entries = [row(line) for line in lines if line.case.group == group]
-        cells = [[entry[name] for name in headings] for entry in entries]
-        out += ["", f"**{group}**", "", *markdown_table(headings, cells)]
-    said = [f"- {line.case.name}: {line.result.message}." for line in lines if line.result.message]
-    return "\n".join([*out, *(["", "What the runs that stopped said:", "", *said] if said else []), ""])
+        rows = [row(line) for line in lines if line.case.group == group]
+        table = Table(*_PRINTED, rows=[[entries[name] for name in _PRINTED] for entries in rows])
+        parts += [f"**{group}**\n", table.markdown()]
+    said = "".join(f"- {line.case.name}: {line.result.message}.\n" for line in lines if line.result.message)
+    return "\n".join([*parts, *(["What the runs that stopped said:\n", said] if said else [])])
 
 
-def draw(lines: list[Line], file: Path) -> None:
+def write(lines: list[Line], folder: Path) -> list[Path]:
+    """Write stability.csv, stability.md and stability.png into ``folder``; returns the files."""
+    rows = [row(line) for line in lines]
+    return write_report(folder, "stability", rows, markdown(lines), lambda file: draw(lines, file))
+
+
+def draw(lines: list[Line], file: Path) -> Path:
     """Draw the heat map: a row per case; iterations per step, cutbacks, and each check as error over limit."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from PIL import Image
-
     panels = np.array_split(np.arange(len(lines)), _PANELS if len(lines) >= 10 * _PANELS else 1)
-    figure = Figure(figsize=(5.2 * len(panels), 1.2 + 0.17 * len(panels[0])), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(5.2 * len(panels), 1.2 + 0.17 * len(panels[0]))
     for ax, panel in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True):
         some = [lines[i] for i in panel]
         cells = [_cells(line) for line in some]
@@ -106,16 +103,11 @@ def draw(lines: list[Line], file: Path) -> None:
             if some[i].case.group != some[i - 1].case.group:
                 ax.axhline(i - 0.5, color="black", linewidth=0.8)
         ax.spines[:].set_visible(False)
-    # a palette makes the file a third as large as matplotlib's own
-    buffer = io.BytesIO()
-    figure.savefig(buffer, dpi=110)
-    Image.open(buffer).convert("RGB").quantize(64).save(file, optimize=True)
+    return save(figure, file)
 
 
 def _colour(scale: str, value: float | None) -> tuple[float, ...]:
     """White for nothing, blue for cost, from green (error a millionth of the limit) to yellow (at it), red beyond."""
-    from matplotlib import colormaps
-
     if value is None:
         return (1.0, 1.0, 1.0, 1.0)
     if scale == "cost":
@@ -127,9 +119,8 @@ def _colour(scale: str, value: float | None) -> tuple[float, ...]:
 
 def _cells(line: Line) -> list[tuple[str, float | None, str]]:
     """Per column: its scale ("cost", or "check": the error over what is allowed), the value on it, and the words."""
-    result = line.result
+    result, worst = line.result, line.worst
     known = result.steps > 0 and 0 < result.energy_limit < math.inf
-    worst = _worst(line)
     return [
         ("cost", line.iterations_per_step, f"{line.iterations_per_step:.0f}"),
         ("cost", 3.0 * (1 + result.cutbacks), str(result.cutbacks or "")),
@@ -137,7 +128,3 @@ def _cells(line: Line) -> list[tuple[str, float | None, str]]:
         ("check", result.energy / result.energy_limit, f"{result.energy:.0e}") if known else _NOTHING,
         ("check", worst.share, f"{worst.deviation:.0e}") if worst else _NOTHING,
     ]
-
-
-def _worst(line: Line) -> Comparison | None:
-    return max(line.comparisons, key=lambda c: c.share) if line.comparisons else None

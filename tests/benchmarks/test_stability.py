@@ -9,10 +9,10 @@ from dataclasses import replace
 import h5py
 import pytest
 
+from archord.benchmarks.case import slug
 from archord.benchmarks.stability.cases import FINE, cases, same_as
 from archord.benchmarks.stability.fine import fine_scene, read_fine
-from archord.benchmarks.stability.run import Result, not_finite, slug, solve_case
-from archord.benchmarks.stability.stability import chosen, judge, with_references
+from archord.benchmarks.stability.run import Result, chosen, judge, not_finite, solve_case, with_references
 from archord.cli import run
 
 alone = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="only rank 0 prints")
@@ -35,9 +35,7 @@ def test_three_cases_through_the_command(tmp_path, capsys):
     assert "no case has such a name or group; groups are modulus ratio" in capsys.readouterr().err
 
 
-def done(name, **values):
-    """A faultless result with these quantities."""
-    return Result(name, "done", "", 1.0, steps=4, quantities={"P/(E* R)": 0.01} | values)
+DONE = Result("done", steps=4, quantities={"P/(E* R)": 0.01})
 
 
 def a_case(**changes):
@@ -80,7 +78,7 @@ def test_a_pattern_brings_what_it_is_compared_with():
 def test_verdicts():
     """Each check alone turns a good line into a wrong one."""
     other = a_case(name="b", expected=(same_as("a", 1e-3, "a law"),))
-    results = {"a": done("a"), "b": done("b")}
+    results = {"a": DONE, "b": DONE}
     assert judge(other, results, {}).verdict == "converges"
     for change, said in (
         ({"quantities": {"P/(E* R)": 0.0101}}, "P/\\(E\\* R\\) is 0.0101, not 0.01 \\(a law\\)"),
@@ -92,13 +90,13 @@ def test_verdicts():
         ({"status": "stopped", "message": "no equilibrium"}, "stopped: no equilibrium"),
         ({"status": "failed", "message": "TypeError: x"}, "failed: TypeError: x"),
     ):
-        line = judge(other, results | {"b": replace(done("b"), **change)}, {})
+        line = judge(other, results | {"b": replace(DONE, **change)}, {})
         assert len(line.faults) == 1
         assert re.search(said, line.verdict)
     assert judge(replace(other, warns="end of"), results, {}).faults == ['does not warn "end of"']
     stops = replace(other, stops="come free", expected=())
     assert judge(stops, results, {}).faults == ["went on"]
-    stopped = replace(done("b"), status="stopped", message="the pin has come free")
+    stopped = replace(DONE, status="stopped", message="the pin has come free")
     assert judge(stops, results | {"b": stopped}, {}).verdict == "stops, as it must"
 
 

@@ -13,13 +13,13 @@ import pytest
 from archord.benchmarks.cost import work_precision_codes as codes
 from archord.benchmarks.cost import work_precision_reference
 from archord.benchmarks.cost.envelope import envelope, lasting, seconds_at
+from archord.benchmarks.cost.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
 from archord.benchmarks.cost.work_precision import Line, chosen, envelopes, judge, own_limit
 from archord.benchmarks.cost.work_precision_cases import CASES, DECKS, SERIES, Series, chosen_cases, families, scaled
 from archord.benchmarks.cost.work_precision_reference import combined, read_reference, smooth_profile
 from archord.benchmarks.cost.work_precision_report import markdown, ratio_table, reference_table, row
 from archord.benchmarks.cost.work_precision_run import Point, RunFailure, Task, Values, run_all, run_once
 from archord.benchmarks.cost.work_precision_warm import curves, warm_seconds
-from archord.benchmarks.paper.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
 from archord.cli import run
 from archord.postprocess.convergence import extrapolated
 from archord.scene.errors import InputError

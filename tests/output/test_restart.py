@@ -8,7 +8,7 @@ import tomllib
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.verification.persson import persson_joint
+from archord.benchmarks.persson import persson_joint
 from archord.output.folder import claim_folder, occupied
 from archord.output.history import read_history
 from archord.output.restart import plan_extension, plan_restart

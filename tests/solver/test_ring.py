@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.verification.persson import DR, UNLIKE, persson_joint, theory, unlike
+from archord.benchmarks.persson import DR, UNLIKE, persson_joint, theory, unlike
 from archord.output.report import energy_balance
 from archord.output.run import solve_scene
 from archord.postprocess.laws.law_joint import LawJoint

@@ -6,14 +6,16 @@ import os
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 
-from archord.benchmarks.stability.fuzz import Case, faults, scene_of
-from archord.benchmarks.stability.mutations import KINDS, base_scenes
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
+from tests.fuzz.fuzzing import FuzzCase, faults, scene_of
+from tests.fuzz.mutations import KINDS, base_scenes
 
+ROOT = Path(__file__).parents[2]
 ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_"))}
 
 
@@ -41,18 +43,9 @@ def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
 @pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
 def test_the_command_ends_in_order_on_mutated_files(tmp_path):
     """Exit codes 0, 2 and 3 only, no traceback, no number that is none, nothing left of a refused scene."""
-    command = [
-        sys.executable,
-        "-m",
-        "archord.benchmarks.stability.fuzz",
-        "--seed",
-        "1",
-        "--cases",
-        "12",
-        "--keep",
-        str(tmp_path),
-    ]
-    result = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
+    options = ("--seed", "1", "--cases", "12", "--keep", str(tmp_path))
+    command = [sys.executable, "-m", "tests.fuzz", *options]
+    result = subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, result.stdout
     assert "12 cases, seed 1" in result.stdout
     assert "exit code 0" in result.stdout
@@ -86,13 +79,13 @@ def test_faults_are_seen(tmp_path, code, stderr, found):
     assert all(a.startswith(b) for a, b in zip(said, found, strict=True))
 
 
-def test_numbers_that_are_none_are_seen(tmp_path):
-    """In the table and in run.json; and a folder that a refused scene leaves."""
+def test_numbers_that_are_not_finite_are_seen(tmp_path):
+    """In a table and in run.json; and a folder that a refused scene leaves."""
     (tmp_path / "stderr").write_text("scene.toml: is wrong.\n")
     run = tmp_path / "run"
     run.mkdir()
     assert faults(tmp_path, 2) == ["refused, yet a run folder was left"]
     (run / "history.csv").write_text("step,P [N]\n1,2.0\n2,nan\n")
     (run / "run.json").write_text(json.dumps({"x": math.inf}))
-    assert faults(tmp_path, 0) == ["P [N] in history.csv", "Infinity in run.json"]
-    assert Case(0, "", "", 143, 1.0, []).slow
+    assert faults(tmp_path, 0) == ["run.json: Infinity", "history.csv: P"]
+    assert FuzzCase(0, "", "", 143, 1.0, []).slow

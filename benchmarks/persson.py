@@ -1,4 +1,4 @@
-"""Persson's joint against theory, as a table: ``python3 -m archord.benchmarks.verification.persson``.
+"""Persson's joint against theory, as a table: ``python3 -m archord.benchmarks.persson``.
 
 A pin in a ring of 100 R under a force at its core, in units of R = E* = 1, against Persson (1964) with the load-angle
 relation of Ciavarella and Decuzzi (2001).
@@ -13,11 +13,10 @@ from time import perf_counter
 import numpy as np
 from scipy.optimize import brentq
 
-from archord.benchmarks.case import E
-from archord.output.run import solve_scene
+from archord.benchmarks.case import Case, paper_joint, varied
 from archord.postprocess.laws.law_joint import LawJoint
 from archord.postprocess.laws.persson_law import persson_pressure
-from archord.scene.file import parse_scene
+from archord.report.table import Table
 from archord.scene.scene import Scene
 
 DR = 1e-4
@@ -28,15 +27,9 @@ UNLIKE = ((3.0, 0.2), (1.0, 0.4))  # shear modulus and nu of two bodies with Dun
 
 def persson_joint(load: float, element_size: float = 0.04, steps: int = 1, **sections: dict) -> Scene:
     """The joint at E* dR/P = ``load`` (negative: dR < 0); ``sections`` override keys of the scene's sections."""
-    data: dict = {
-        "joint": {"model": "ring", "radius": 1.0, "clearance": DR * np.sign(load), "element_size": element_size},
-        "pin": {"E": E, "nu": 0.3},
-        "block": {"E": E, "nu": 0.3},
-        "load": {"relative_force": DR / abs(load), "steps": steps},
-    }
-    for name, values in sections.items():
-        data[name] = data.get(name, {}) | values
-    return parse_scene(data)
+    ring = {"model": "ring", "clearance": DR * float(np.sign(load))}
+    force = {"displacement": None, "relative_force": DR / abs(load)}
+    return varied(paper_joint(element_size, steps, joint=ring, load=force), **sections)
 
 
 def unlike(pin: tuple[float, float], block: tuple[float, float]) -> tuple[dict[str, dict], float]:
@@ -58,35 +51,24 @@ def theory(load: float, alpha: float = 0.0) -> tuple[float, float]:
     return float(eps), float(peak)
 
 
-def _row(
-    name: str,
-    load: float,
-    element_size: float,
-    steps: int = 1,
-    alpha: float = 0.0,
-    bodies: dict[str, dict] | None = None,
-) -> str:
-    start = perf_counter()
-    with tempfile.TemporaryDirectory() as folder:
-        m = solve_scene(persson_joint(load, element_size, steps, **(bodies or {})), Path(folder)).steps[-1]
-    eps, peak = theory(load, alpha)
-    angle = f"{np.degrees(m.eps):.3f} | {np.degrees(eps):.3f} | {np.degrees(m.eps - eps):+.3f}"
-    pressure = f"{m.p0 / m.P:.6f} | {peak:.6f} | {m.p0 / m.P / peak - 1:+.1e}"
-    return f"| {name} | {load:g} | {element_size:g} | {pressure} | {angle} | {perf_counter() - start:.1f} s |"
-
-
 def main() -> None:
     """Solve and print."""
-    print("| case | E* dR/P | h/R | R p0/P | theory | difference | eps [deg] | theory | difference | time |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    for load in LOADS:
-        for size in (0.08, 0.04, 0.02):
-            print(_row("like bodies", load, size), flush=True)
-    for load in INTERFERENCE:
-        print(_row("interference", load, 0.04, 4), flush=True)
-    for pin, block in (UNLIKE, UNLIKE[::-1]):
-        bodies, alpha = unlike(pin, block)
-        print(_row(f"unlike, alpha = {alpha:+.3f}", 0.5, 0.04, alpha=alpha, bodies=bodies), flush=True)
+    cases = [("like bodies", load, size, 1, 0.0, {}) for load in LOADS for size in (0.08, 0.04, 0.02)]
+    cases += [("interference", load, 0.04, 4, 0.0, {}) for load in INTERFERENCE]
+    for pair in (UNLIKE, UNLIKE[::-1]):
+        bodies, alpha = unlike(*pair)
+        cases.append((f"unlike, alpha = {alpha:+.3f}", 0.5, 0.04, 1, alpha, bodies))
+    angles = ("eps [deg]", "theory", "difference")
+    table = Table("case", "E* dR/P", "h/R", "R p0/P", "theory", "difference", *angles, "time")
+    for name, load, size, steps, alpha, bodies in cases:
+        start = perf_counter()
+        with tempfile.TemporaryDirectory() as folder:
+            m = Case(name, persson_joint(load, size, steps, **bodies)).solve(Path(folder)).steps[-1]
+        eps, peak = theory(load, alpha)
+        pressure = f"{m.p0 / m.P:.6f}", f"{peak:.6f}", f"{m.p0 / m.P / peak - 1:+.1e}"
+        angle = (f"{np.degrees(value):{form}}" for value, form in ((m.eps, ".3f"), (eps, ".3f"), (m.eps - eps, "+.3f")))
+        table.add(name, f"{load:g}", f"{size:g}", *pressure, *angle, f"{perf_counter() - start:.1f} s")
+    print(table.markdown(), end="")
 
 
 if __name__ == "__main__":

@@ -1,1 +1,0 @@
-"""Our numbers against independent references."""
