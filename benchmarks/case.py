@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from archord.output.folder import claim_folder
-from archord.output.measures import Measures
 from archord.output.run import Outcome, solve_scene
+from archord.presets.measures import Measures
 from archord.scene.file import parse_scene, resolved
 from archord.scene.scene import Scene
 

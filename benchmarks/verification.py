@@ -13,7 +13,7 @@ from pathlib import Path
 from time import perf_counter
 
 from archord.benchmarks.case import Case, paper_joint
-from archord.output.measures import Measures
+from archord.presets.measures import Measures
 from archord.report.table import Table
 from archord.scene.scene import Scene
 

@@ -12,7 +12,8 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.fenicsx import gmsh_to_mesh
-from archord.geometry.joint_mesh import Cells, Facets, JointMesh, edges_on, on_circle, tag_and_size
+from archord.geometry.joint_mesh import Cells, Facets, edges_on, joint_mesh, on_circle, tag_and_size
+from archord.geometry.tagged_mesh import TaggedMesh
 
 
 def half_ring(
@@ -28,7 +29,7 @@ def half_ring(
     degree: int = 2,
     refinements: int = 0,
     partitioner=None,
-) -> JointMesh:
+) -> TaggedMesh:
     """Mesh the half joint with second-order curved triangles, ``element_size`` long on the hole's arc and
     ``size_ratio`` times that on the pin's.
 
@@ -75,4 +76,4 @@ def half_ring(
 
     key = ("half ring", hole, outer, size, growth, core, size_ratio)
     options = {"order": degree, "scale": radius, "refinements": refinements, "partitioner": partitioner}
-    return JointMesh(*gmsh_to_mesh(comm, build, exact, **options, key=key))
+    return joint_mesh(*gmsh_to_mesh(comm, build, exact, **options, key=key))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from dolfinx.mesh import Mesh, MeshTags
 
 from archord.geometry.basis import Array
+from archord.geometry.tagged_mesh import TaggedMesh
 
 
 class Cells(IntEnum):
@@ -32,13 +32,11 @@ class Facets(IntEnum):
 _CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
 
 
-@dataclass(frozen=True)
-class JointMesh:
-    """A mesh of the joint with its tags; all bodies live in one mesh."""
-
-    mesh: Mesh
-    cells: MeshTags
-    facets: MeshTags
+def joint_mesh(mesh: Mesh, cells: MeshTags, facets: MeshTags) -> TaggedMesh:
+    """The mesh of a joint with named sets: the facets "pin" and "hole" are the arcs, "block held" is the support."""
+    bodies = {"pin": Cells.PIN, "block": Cells.BLOCK}
+    names = ("pin", "hole", "pin top", "block held", "symmetry")
+    return TaggedMesh(mesh, cells, facets, bodies, dict(zip(names, Facets, strict=True)))
 
 
 def tag_and_size(gmsh, faces: dict[Cells, int], curves: dict[Facets, list[int]], sizes: dict[Cells, str]) -> None:

@@ -13,7 +13,8 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.fenicsx import gmsh_to_mesh
-from archord.geometry.joint_mesh import Cells, Facets, JointMesh, edges_on, on_circle, tag_and_size
+from archord.geometry.joint_mesh import Cells, Facets, edges_on, joint_mesh, on_circle, tag_and_size
+from archord.geometry.tagged_mesh import TaggedMesh
 
 _EDGE_GROWTH = 0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
 
@@ -32,7 +33,7 @@ def quarter_joint(
     rigid_pin: bool = False,
     refinements: int = 0,
     partitioner=None,
-) -> JointMesh:
+) -> TaggedMesh:
     """Mesh the quarter joint with second-order curved triangles.
 
     ``element_size`` is the edge length on the hole's arc, ``size_ratio`` times that the one on the pin's; away from
@@ -88,4 +89,4 @@ def quarter_joint(
 
     key = ("quarter joint", hole, width, size, growth, size_ratio, edge and (edge[0], edge[1] / radius), rigid_pin)
     options = {"order": degree, "scale": radius, "refinements": refinements, "partitioner": partitioner}
-    return JointMesh(*gmsh_to_mesh(comm, build, exact, **options, key=key))
+    return joint_mesh(*gmsh_to_mesh(comm, build, exact, **options, key=key))

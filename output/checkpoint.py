@@ -49,14 +49,14 @@ def collect(order: MeshOrder, step: int, scene: str, fields: dict[str, Array], s
     """The joint's history, nodal ``fields`` ``(n_local, 2)`` and ``scalars`` after ``step``; on rank 0. Collective."""
     whole = {name: order.collect(values) for name, values in fields.items()}
     history = order.collect_history()
-    mesh = order.mesh_digest() if order.joint.comm.rank == 0 else ""
+    mesh = order.mesh_digest() if order.system.comm.rank == 0 else ""
     return Checkpoint(step, scene, mesh, whole, history, scalars)
 
 
 def restore(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple[dict[str, Array], dict[str, Any]]:
     """Give the joint the history of ``checkpoint`` (known on rank 0, read from ``path``); returns this rank's nodal
     fields ``(n_local, 2)`` and the scalars. Collective. Raises `InputError` on every rank if it is of another mesh."""
-    comm = order.joint.comm
+    comm = order.system.comm
     fault = None
     if checkpoint is not None and checkpoint.mesh != order.mesh_digest():
         fault = (

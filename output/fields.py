@@ -29,7 +29,7 @@ class FieldWriter:
     """
 
     def __init__(self, folder: Path, order: MeshOrder, *, after: int = 0, debug: bool = False) -> None:
-        joint = order.joint
+        joint = order.system
         self.joint, self.order = joint, order
         self.path = folder / ("debug.xdmf" if debug else "fields.xdmf")
         self.nodal = ["displacement", "residual"] if debug else ["displacement"]
@@ -39,7 +39,7 @@ class FieldWriter:
             self.names[1:1] = ["peeq", "peeq_increment"] if debug else ["peeq"]
 
         def make() -> StepFile:
-            self._nodes = SecondOrder(order.nodes_of_cell, joint.scene.analysis.degree)
+            self._nodes = SecondOrder(order.nodes_of_cell, joint.problem.degree)
             cells, points = self._nodes.cells[:, _VTK_ORDER], self._nodes(order.coordinates)
             self._n_nodes, self._n_cells = len(points), len(cells)
             fixed = {"mesh/coordinates": points, "mesh/cells": cells, "mesh/body": body_of}

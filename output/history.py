@@ -13,7 +13,7 @@ from archord.output.disk import replace_file
 from archord.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from archord.output.measures import Measures
+    from archord.presets.measures import Measures
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.output.disk import replace_file
-from archord.output.measures import Measures
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
+from archord.presets.measures import Measures
 from archord.solver.stepping import Step
 from archord.solver.timer import BEFORE_SOLVING
 
@@ -119,7 +119,7 @@ class Report:
         return {
             "newton_iterations": sum(m.iterations for m in self.measures),
             "cutbacks": sum(m.cutbacks for m in self.measures),
-            "factorisations": self.joint.tangent_factorisations + before.get("factorisations", 0),
+            "factorisations": self.joint.factorisations + before.get("factorisations", 0),
             "residual_evaluations": counts.get("return mapping", 0) + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.measures),
         }

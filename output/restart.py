@@ -13,7 +13,7 @@ import numpy as np
 from archord.output import checkpoint as checkpoints
 from archord.output.checkpoint import Checkpoint
 from archord.output.folder import CHECKPOINT
-from archord.output.measures import Measures
+from archord.presets.measures import Measures
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
 from archord.scene.reference import toml_value

@@ -16,7 +16,6 @@ from archord.output.contact import ContactWriter
 from archord.output.disk import WriteError, naming, on_root, replace_file
 from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import History
-from archord.output.measures import Measures, Work, arc_profiles, measure
 from archord.output.memory import peak_memory
 from archord.output.report import Report
 from archord.output.restart import Start
@@ -24,13 +23,14 @@ from archord.output.run_state import Standing, halt, resume
 from archord.output.stale_jit import forget_half_compiled
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
+from archord.presets.measures import Measures, Work, arc_profiles, measure
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
 from archord.solver.coarse_start import coarse_start
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.load_path import Position
 from archord.solver.mesh_order import MeshOrder
-from archord.solver.stepping import Step, StepFailure, march
+from archord.solver.stepping import Step, StepFailure, StepRules, march
 from archord.solver.timer import Timer
 
 if TYPE_CHECKING:
@@ -102,9 +102,9 @@ def solve_scene(
                     on_step(output.add(step, position, work))
 
                 march(
-                    joint.walk(position, coarse),
+                    joint.load_path(position, coarse),
                     scene.targets,
-                    rules=scene.stepping,
+                    rules=StepRules(**scene.stepping.model_dump()),
                     substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
                     target_done=target_done,
                     attempted=on_attempt,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from archord.geometry.basis import Array
 from archord.output.checkpoint import Checkpoint, collect, restore
-from archord.output.measures import Measures, Work
+from archord.presets.measures import Measures, Work
 from archord.scene.file import resolved
 from archord.solver.load_path import Position
 from archord.solver.mesh_order import MeshOrder
@@ -29,7 +30,7 @@ class Standing:
 
 def halt(order: MeshOrder, standing: Standing) -> Checkpoint:
     """The checkpoint (on rank 0) from which `resume` goes on. Collective."""
-    joint, position = order.joint, standing.position
+    joint, position = order.system, standing.position
     state = joint.equilibrium.state()
     fields = {"displacement": _nodal(state)}
     scalars = {
@@ -38,7 +39,7 @@ def halt(order: MeshOrder, standing: Standing) -> Checkpoint:
         "work": vars(standing.work),
         "position": {name: value for name, value in vars(position).items() if name != "increment"},
         "largest_reaction": joint.equilibrium.largest_reaction,
-        "gamma_by_and_by": joint.solver.by_and_by,
+        "gamma_by_and_by": joint.solver.continues_gamma,
         "level": float(state[-1]),
     }
     if position.increment is not None:
@@ -59,11 +60,17 @@ def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> Stand
     work = Work()
     vars(work).update(scalars["work"])
     step = Step(**scalars["step"])
-    step.attempts = [Newton(**attempt) for attempt in scalars["step"]["attempts"]]
+    step.attempts = [_newton(attempt) for attempt in scalars["step"]["attempts"]]
     state = np.append(fields["displacement"], scalars["level"])
-    order.joint.solver.by_and_by = scalars.get("gamma_by_and_by", False)
-    order.joint.equilibrium.resume(position.load, state, scalars["largest_reaction"])
+    order.system.solver.continues_gamma = scalars.get("gamma_by_and_by", False)
+    order.system.equilibrium.resume(position.load, state, scalars["largest_reaction"])
     return Standing(Measures(**scalars["measures"]), step, position, work)
+
+
+def _newton(attempt: dict[str, Any]) -> Newton:
+    """A solve as a checkpoint holds it; version 0.1 called active-set changes flips."""
+    changes = {"active_set_changes": attempt.pop("flips")} if "flips" in attempt else {}
+    return Newton(**attempt, **changes)
 
 
 def _nodal(state: Array) -> Array:

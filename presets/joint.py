@@ -1,196 +1,141 @@
-"""The joint of a scene as a problem to solve: meshes, bodies, contact and supports."""
+"""The joint of a scene as a problem to solve, and what is measured of it.
+
+Half of the joint is modelled, cut at its symmetry axis. "block" is the paper's quarter joint, pressed at the pin's
+horizontal diameter; "ring" is half a whole pin in a ring, loaded by a force at the pin's core (Persson's joint).
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem
-from dolfinx.la import InsertMode
 from mpi4py import MPI
 
-from archord.geometry.basis import Array, bulk_quadrature, cell_basis
+from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.geometry.curve import RigidCircle
 from archord.geometry.half_ring import half_ring
-from archord.geometry.joint_mesh import Cells, Facets, JointMesh, refinements
+from archord.geometry.joint_mesh import refinements
 from archord.geometry.quarter_joint import quarter_joint
+from archord.geometry.tagged_mesh import TaggedMesh
 from archord.scene.scene import Scene
-from archord.solver.bulk import Body, Bulk
-from archord.solver.contact.contact import Contact
-from archord.solver.contact.surface import ContactSide
-from archord.solver.equilibrium import Equilibrium, Support
-from archord.solver.load_path import Position, Walk
-from archord.solver.newton import NewtonSolver
+from archord.solver.problem import Body, Guess, Interaction, Load, Problem, Rigid, Support
+from archord.solver.system import System
 from archord.solver.timer import Timer
 
-if TYPE_CHECKING:
-    from archord.solver.coarse_start import CoarseStart
-
-SIDES = ("pin", "hole")
-_MOST_CONDENSED = 8_000  # dofs
-_LARGE_GAMMA = 5.0
+_RATIO = 3.0  # element size over that of the next finer mesh
+_COARSEST = 0.2  # element size over R
+_STEEPEST = 1.0  # growth of the element size
+_COARSE_TOLERANCE = 1e-6  # residual over reaction: what is found is a guess
 
 
-class Joint:
-    """Half a joint, cut at its symmetry axis, ready to be loaded; forces and energies are reported for the whole.
+def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
+    """The problem that ``scene`` states; ``partitioner`` as for `quarter_joint`. Collective over ``comm``.
 
-    ``sides`` holds the contact edges by name ("pin" unless it is rigid, and "hole"). Collective over ``comm``. Raises
-    `InputError` if the scene leaves the mesh open.
+    Raises `InputError` if the scene leaves the mesh open.
     """
+    scene.require_mesh()
+    g, analysis, by_force = scene.joint, scene.analysis, scene.force_controlled
+    ring, rigid = g.model == "ring", scene.pin.rigid
+    mesh = _ring_mesh(scene, comm, partitioner) if ring else _block_mesh(scene, comm, partitioner)
+    solids = {"pin": scene.pin.solid, "block": scene.block}
+    supports = [Support("axis", "symmetry", 0), *(Support("block", "block held", axis) for axis in (0, 1))]
+    if not rigid and not ring:
+        supports.append(Support("pin", "pin top", 1, -1.0))
+    travel = abs(g.dR) + max(map(abs, scene.targets)) / (scene.E_star if by_force else 1.0)
+    contact = Interaction(
+        "contact",
+        (Rigid(RigidCircle(np.array([0.0, -g.dR]), g.radius), (0.0, -1.0)) if rigid else "pin", "hole"),
+        kinematics=analysis.kinematics,
+        gamma_factor=analysis.gamma_factor,
+        integrated={"both": "", "pin": "pin", "block": "hole"}[analysis.integration],
+        slide=travel - abs(g.dR),
+    )
+
+    def core(x):
+        return ufl.max_value(1 - ufl.dot(x, x) / (scene.load.core_radius * g.radius) ** 2, 0)
+
+    def guess(load: float) -> Guess:
+        """The pin moved down by the load, or by about what a force would press it, the block at rest."""
+        shift = (load / scene.E_star if by_force else load) + (max(g.dR, 0.0) if ring else 0.0)
+        return Guess(shift, {"pin": (0.0, -shift)})
+
+    return Problem(
+        mesh,
+        [Body(name, solid.material(analysis.plane)) for name, solid in solids.items() if solid is not None],
+        [contact],
+        supports,
+        [Load("pin", (0.0, -1.0), core)] if ring else [],
+        control="force" if by_force and not ring else "factor",
+        degree=analysis.degree,
+        symmetry=2.0,
+        load_name="P" if by_force else "delta",
+        travel=travel,
+        tolerance=analysis.tolerance,
+        max_iterations=analysis.max_iterations,
+        guess=guess,
+        from_rest=g.dR > 0,
+        coarser=(lambda: joint_problem(_coarser(scene), comm)) if analysis.coarse_start else None,
+    )
+
+
+def _block_mesh(scene: Scene, comm: MPI.Comm, partitioner) -> TaggedMesh:
+    g = scene.joint
+    edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
+    return quarter_joint(comm, *_sizes(scene), edge=edge, rigid_pin=scene.pin.rigid, **_options(scene, partitioner))
+
+
+def _ring_mesh(scene: Scene, comm: MPI.Comm, partitioner) -> TaggedMesh:
+    core = scene.load.core_radius * scene.joint.radius
+    return half_ring(comm, *_sizes(scene), core, **_options(scene, partitioner))
+
+
+def _sizes(scene: Scene) -> tuple[float, ...]:
+    g = scene.joint
+    return g.radius, g.dR, g.W, g.h, g.growth
+
+
+def _options(scene: Scene, partitioner) -> dict:
+    g = scene.joint
+    options = {"size_ratio": g.size_ratio, "degree": scene.analysis.degree, "partitioner": partitioner}
+    return options | {"refinements": refinements(g.expected_cells)}
+
+
+def _coarser(scene: Scene) -> Scene:
+    """``scene`` on a mesh with elements `_RATIO` times as large, all over."""
+    g = scene.joint
+    sizes = {
+        "element_size": max(g.h, min(_RATIO * g.h, _COARSEST * g.radius)),
+        "relative_element_size": None,
+        "growth": max(g.growth, min(_RATIO * g.growth, _STEEPEST)),
+    }
+    analysis = {"tolerance": max(scene.analysis.tolerance, _COARSE_TOLERANCE)}
+    return scene.model_copy(
+        update={"joint": g.model_copy(update=sizes), "analysis": scene.analysis.model_copy(update=analysis)}
+    )
+
+
+class Joint(System):
+    """The joint of ``scene``, ready to be solved. Collective over ``comm``; raises `InputError` as `joint_problem`."""
 
     def __init__(self, scene: Scene, comm: MPI.Comm, *, timer: Timer | None = None, partitioner=None) -> None:
-        scene.require_mesh()
-        self.scene, self.comm = scene, comm
-        self.timer = timer or Timer()
-        geometry, analysis = scene.joint, scene.analysis
-        with self.timer("mesh"):
-            self.model = self._mesh(partitioner)
-        with self.timer("setup"):
-            self.V = fem.functionspace(
-                self.model.mesh,
-                basix.ufl.element(
-                    "P", "triangle", analysis.degree, shape=(2,), lagrange_variant=basix.LagrangeVariant.equispaced
-                ),
-            )
-            solids = {Cells.PIN: scene.pin.solid, Cells.BLOCK: scene.block}
-            materials = {tag: s.material(analysis.plane) for tag, s in solids.items() if s is not None}
-            self.bulk = Bulk(self.V, self.model.cells, [Body(tag, m) for tag, m in materials.items()])
-            self.sides: dict[str, ContactSide] = {}
-            for name, cells, facets in zip(SIDES, Cells, (Facets.PIN_ARC, Facets.HOLE_ARC), strict=True):
-                if cells in materials:
-                    self.sides[name] = ContactSide(self.V, self.model.facets, facets, materials[cells])
-            rigid = RigidCircle(np.array([0.0, -geometry.dR]), geometry.radius) if scene.pin.rigid else None
-            one_sided = {"both": None, "pin": 0, "block": len(self.sides) - 1}[analysis.integration]
-            self.contact = Contact(
-                list(self.sides.values()),
-                rigid=rigid,
-                kinematics=analysis.kinematics,
-                gamma_factor=analysis.gamma_factor,
-                one_sided=one_sided,
-                slide=self._travel() - abs(geometry.dR),
-            )
-            self.equilibrium = Equilibrium(
-                self.V,
-                self.bulk,
-                self._supports(),
-                self.contact,
-                None if rigid is None else np.array([0.0, -1.0]),
-                applied=self._core_force() if geometry.model == "ring" else None,
-                by_force=0.5 if scene.force_controlled and geometry.model == "block" else None,
-                load_name="P" if scene.force_controlled else "delta",
-                travel=self._travel(),
-                condense=self._condensable(),
-                timer=self.timer,
-            )
-            self.solver = NewtonSolver(
-                self.equilibrium, tolerance=analysis.tolerance, max_iterations=analysis.max_iterations
-            )
-            self._in_core: np.ndarray | None = None  # which points of the pin; found when they are first asked for
-
-    def _mesh(self, partitioner) -> JointMesh:
-        g = self.scene.joint
-        sizes = (g.radius, g.dR, g.W, g.h, g.growth)
-        options = {"size_ratio": g.size_ratio, "degree": self.scene.analysis.degree, "partitioner": partitioner}
-        options["refinements"] = refinements(g.expected_cells)
-        if g.model == "ring":
-            return half_ring(self.comm, *sizes, self.scene.load.core_radius * g.radius, **options)
-        edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
-        return quarter_joint(self.comm, *sizes, edge=edge, rigid_pin=self.scene.pin.rigid, **options)
-
-    def _condensable(self) -> bool:
-        """Whether the linear systems shrink to the contact (`condensed`): the bodies are elastic and held, the mesh is
-        small (the work on contact dofs grows faster than a factorisation), gamma leaves the small system regular."""
-        held = self.scene.joint.model == "block" and not self.scene.force_controlled
-        small = self.n_dofs < _MOST_CONDENSED
-        return held and small and not self.bulk.plastic and self.scene.analysis.gamma_factor <= _LARGE_GAMMA
-
-    def _core_force(self) -> Array:
-        """Downward nodal forces ``(n_owned, 2)`` of half a unit force, spread over the core as ``1 - (r/core)^2``."""
-        core = self.scene.load.core_radius * self.scene.joint.radius
-        x, v = ufl.SpatialCoordinate(self.model.mesh), ufl.TestFunction(self.V)
-        bump = ufl.max_value(1 - ufl.dot(x, x) / core**2, 0)
-        dx = ufl.dx(subdomain_data=self.model.cells, subdomain_id=int(Cells.PIN), metadata={"quadrature_degree": 6})
-        total = self.comm.allreduce(fem.assemble_scalar(fem.form(bump * dx)))
-        vector = fem.assemble_vector(fem.form(-bump / (2 * total) * v[1] * dx))
-        vector.scatter_reverse(InsertMode.add)
-        self._core = -2 * vector.array[: 2 * self.V.dofmap.index_map.size_local].reshape(-1, 2)
-        return -self._core / 2
-
-    def _travel(self) -> float:
-        """Size of the displacements to be expected."""
-        largest = max(map(abs, self.scene.targets))
-        return abs(self.scene.joint.dR) + largest / (self.scene.E_star if self.scene.force_controlled else 1.0)
-
-    def _supports(self) -> list[Support]:
-        supports = [
-            Support("axis", 0, self._nodes(Facets.SYMMETRY)),
-            Support("block", 0, self._nodes(Facets.BLOCK_HELD)),
-            Support("block", 1, self._nodes(Facets.BLOCK_HELD)),
-        ]
-        if not self.scene.pin.rigid and self.scene.joint.model == "block":
-            supports.append(Support("pin", 1, self._nodes(Facets.PIN_TOP), -1.0))
-        return supports
-
-    def _nodes(self, tag: Facets) -> np.ndarray:
-        return fem.locate_dofs_topological(self.V, 1, self.model.facets.find(tag))
-
-    def rigid_translation(self, load: float) -> Array:
-        """A first guess of the state of the equilibrium: the pin moved down, the block at rest.
-
-        By the load, if that is a displacement; by about what a force would press it, if the load is one.
-        """
-        scene = self.scene
-        shift = load / scene.E_star if scene.force_controlled else load
-        if scene.joint.model == "ring":
-            shift += max(scene.joint.dR, 0.0)
-        u = np.zeros((self.equilibrium.n_local, 2))
-        if not scene.pin.rigid:
-            u[np.unique(self.V.dofmap.list[self.model.cells.find(Cells.PIN)]), 1] = -shift
-        return np.append(u, shift)
-
-    def walk(self, at: Position | None = None, coarse: CoarseStart | None = None) -> Walk:
-        """The way of this joint along its path of loads, from the position ``at`` or the beginning."""
-        return Walk(self.solver, self.rigid_translation, from_rest=self.scene.joint.dR > 0, at=at, coarse=coarse)
+        self.scene, timer = scene, timer or Timer()
+        with timer("mesh"):
+            problem = joint_problem(scene, comm, partitioner)
+        super().__init__(problem, timer=timer)
 
     def delta(self) -> float:
         """Displacement of the pin from first touch: of its diameter, or in a ring the mean over the core."""
-        if self.scene.joint.model == "block":
-            return self.equilibrium.level
-        u = self.equilibrium.displacement()[: self.equilibrium.n_owned]
-        return self.comm.allreduce(-float((self._core * u).sum())) - max(self.scene.joint.dR, 0.0)
+        return self.driven() - (max(self.scene.joint.dR, 0.0) if self.problem.loads else 0.0)
 
     def core_peeq(self) -> float:
         """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a block. Collective."""
-        if self.scene.joint.model != "ring" or self.scene.pin.yield_stress is None:
+        if not self.problem.loads or self.scene.pin.yield_stress is None:
             return 0.0
-        cells, points = self.bulk.histories()[Cells.PIN]
-        if self._in_core is None:
-            x = cell_basis(self.V.mesh, self.bulk.degree, cells, bulk_quadrature(self.bulk.degree)[0]).point
-            core = self.scene.load.core_radius * self.scene.joint.radius
-            self._in_core = (np.linalg.norm(x, axis=-1) < core).ravel()
-        return self.comm.allreduce(float(points.trial.peeq[self._in_core].max(initial=0.0)), op=MPI.MAX)
+        cells, points = self.bulk.histories()[self.problem.mesh.cell_sets["pin"]]
+        x = cell_basis(self.V.mesh, self.bulk.degree, cells, bulk_quadrature(self.bulk.degree)[0]).point
+        core = np.linalg.norm(x, axis=-1).ravel() < self.scene.load.core_radius * self.scene.joint.radius
+        return self.comm.allreduce(float(points.peeq[core].max(initial=0.0)), op=MPI.MAX)
 
     def forces(self) -> dict[str, float]:
         """Downward force of the whole joint at pin, contact and block's support, per unit thickness."""
-        contact = -2 * self.contact.resultant()[1]
-        block = 2 * self.equilibrium.reaction("block")[1]
-        ring = self.scene.joint.model == "ring"
-        pin = self.equilibrium.load if ring else 2 * self.equilibrium.force_on_level()
-        return {"pin": pin, "contact": contact, "block": block}
-
-    @property
-    def tangent_factorisations(self) -> int:
-        """Number of sparse factorisations so far."""
-        return self.equilibrium.tangent.factorisations
-
-    @property
-    def n_dofs(self) -> int:
-        """Number of displacement dofs, prescribed ones included."""
-        return 2 * self.V.dofmap.index_map.size_global
-
-    @property
-    def n_cells(self) -> int:
-        """Number of triangles."""
-        return self.model.mesh.topology.index_map(2).size_global
+        contact, block = -self.contact_force()[1], self.reaction("block")[1]
+        return {"pin": self.driving_force(), "contact": contact, "block": block}

@@ -1,7 +1,7 @@
 """Bulk terms: internal forces and tangents of elastic and elastic-plastic bodies, assembled by dolfinx.
 
 Elastic bodies contribute one constant stiffness matrix. Only cells of plastic bodies carry history, a return map and a
-tangent that changes; a joint without them compiles and stores none of it.
+tangent that changes; without them nothing of it is compiled or stored.
 """
 
 from __future__ import annotations
@@ -135,14 +135,14 @@ class Bulk:
             cell, metadata = V.mesh.basix_cell(), {"quadrature_degree": rule, "quadrature_rule": "default"}
             element = {shape: basix.ufl.quadrature_element(cell, shape, degree=rule) for shape in ((3,), (3, 3))}
             self._sigma = fem.Function(fem.functionspace(V.mesh, element[(3,)]))
-            self._softening = fem.Function(fem.functionspace(V.mesh, element[(3, 3)]))
+            self._correction = fem.Function(fem.functionspace(V.mesh, element[(3, 3)]))
             domain = [(1, np.sort(np.concatenate([p.cells for p in self._plastic.values()])))]
             dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
             self._force_forms.append(fem.form(ufl.inner(self._sigma, _voigt(v)) * dx))
-            self._softened = self._softening_form(ufl.TrialFunction(V), dx)
-            self._softening_kernel = fem.compile_form(V.mesh.comm, self._softened)
-        self._softened_cells: np.ndarray | None = None  # those of the form that was made last
-        self._softening_forms: list[fem.Form] = []
+            self._corrected = self._correction_form(ufl.TrialFunction(V), dx)
+            self._correction_kernel = fem.compile_form(V.mesh.comm, self._corrected)
+        self._corrected_cells: np.ndarray | None = None  # those of the form that was made last
+        self._correction_forms: list[fem.Form] = []
         self._action_forms: list[fem.Form] | None = None
         self._elastic_of = forms
         self.stiffness = None
@@ -191,10 +191,10 @@ class Bulk:
             stiffness = elastic.diagonal()  # that of points that do not flow
             a, b, c = (tangent[:, i, i] != stiffness[i] for i in range(3))
             flows = (a | b | c).reshape(n, q).any(axis=1)
-            softening = self._softening.x.array.reshape(-1, 9 * q)
-            softening[body.yielding] = 0.0
+            correction = self._correction.x.array.reshape(-1, 9 * q)
+            correction[body.yielding] = 0.0
             body.yielding = body.cells[flows]
-            softening[body.yielding] = (tangent.reshape(n, q, 3, 3)[flows] - elastic).reshape(-1, 9 * q)
+            correction[body.yielding] = (tangent.reshape(n, q, 3, 3)[flows] - elastic).reshape(-1, 9 * q)
 
     def add_force(self, u: PETSc.Vec, force: PETSc.Vec) -> None:
         """Add the internal force of the displacement ``u`` (last passed to `update`) to ``force``."""
@@ -211,32 +211,32 @@ class Bulk:
             self.stiffness.multAdd(direction.x.petsc_vec, out, out)
         if self._action_forms is None:
             elastic = [ufl.action(self._elastic_of[tag], direction) for tag in self._plastic]
-            softened = [ufl.action(self._softened, direction)] if self._plastic else []
-            self._action_forms = [fem.form(form) for form in elastic + softened]
+            corrected = [ufl.action(self._corrected, direction)] if self._plastic else []
+            self._action_forms = [fem.form(form) for form in elastic + corrected]
         for form in self._action_forms:
             with out.localForm() as local:
                 fem_petsc.assemble_vector(local, form)
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
-    def _softening_form(self, u, dx: ufl.Measure) -> ufl.Form:
+    def _correction_form(self, u, dx: ufl.Measure) -> ufl.Form:
         v = ufl.TestFunction(self.V)
-        return ufl.inner(ufl.dot(self._softening, _voigt(u)), _voigt(v)) * dx
+        return ufl.inner(ufl.dot(self._correction, _voigt(u)), _voigt(v)) * dx
 
     def assemble_elastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
         """Add the elastic stiffness of all bodies to ``A``."""
         assemble(A, self._elastic_forms, bcs)
 
-    def assemble_softening(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
-        """Add to ``A`` what the consistent tangent lacks to the elastic stiffness, in the cells that yield."""
+    def assemble_correction(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
+        """Add the tangent correction to ``A``: the consistent minus the elastic tangent, in the cells that yield."""
         if not self._plastic:
             return
         cells = np.sort(np.concatenate([body.yielding for body in self._plastic.values()]))
-        if self._softened_cells is None or not np.array_equal(cells, self._softened_cells):
+        if self._corrected_cells is None or not np.array_equal(cells, self._corrected_cells):
             domains = {fem.IntegralType.cell: [(1, cells)]}
-            coefficients = {self._softening: self._softening}
-            form = fem.create_form(self._softening_kernel, [self.V, self.V], self.V.mesh, domains, coefficients, {})
-            self._softened_cells, self._softening_forms = cells, [form]
-        assemble(A, self._softening_forms, bcs)
+            coefficients = {self._correction: self._correction}
+            form = fem.create_form(self._correction_kernel, [self.V, self.V], self.V.mesh, domains, coefficients, {})
+            self._corrected_cells, self._correction_forms = cells, [form]
+        assemble(A, self._correction_forms, bcs)
 
     def commit(self) -> None:
         """Accept the history of the last `update`."""

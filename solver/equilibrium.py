@@ -1,18 +1,18 @@
 """Static equilibrium at a given load: the residual and the tangent of bulk and contact.
 
-A load moves the supports and a rigid pin by its own value, or, as a force, by a level that is an unknown itself.
+The load factor moves supports and rigid discs by their rates and multiplies the loads (see `control`).
 
-The residual is internal minus contact forces; rows of prescribed displacements are left out of it, and out of the
-matrix with their columns, the contact's included. It is measured against the reaction of the supports, so that the
+The residual is internal minus contact forces and loads; rows of prescribed displacements are left out of it, and out of
+the matrix with their columns, the contact's included. It is measured against the reaction of the supports, so that the
 tolerance has no unit.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+import ufl
 from dolfinx import fem
+from dolfinx.la import InsertMode
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -21,121 +21,130 @@ from archord.geometry.fenicsx import create_vector
 from archord.materials.points import Points
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
+from archord.solver.control import FactorControl, ForceControl
 from archord.solver.interrupt import Interrupt, Interrupted
-from archord.solver.linear.bordered import Bordered
 from archord.solver.linear.tangent_matrix import TangentMatrix
+from archord.solver.problem import Load, Problem, Vector
 from archord.solver.timer import Timer
 
-
-@dataclass(frozen=True)
-class Support:
-    """A prescribed displacement: component ``axis`` of the block dofs ``dofs`` of this rank is ``rate * level``.
-
-    ``rate`` is a number or one per node; ``name`` addresses its reaction.
-    """
-
-    name: str
-    axis: int
-    dofs: np.ndarray
-    rate: float | Array = 0.0
+_LOAD_DEGREE = 6  # of the quadrature of distributed forces
+_MOST_CONDENSED = 8_000  # dofs
+_LARGE_GAMMA = 5.0
+_MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which supports do not hold it
 
 
 class Equilibrium:
-    """Equilibrium of ``bulk`` and, if given, ``contact`` under ``supports``.
+    """Equilibrium of ``bulk`` and, if given, ``contact`` under the supports and loads of ``problem``.
 
-    ``rigid_rate`` moves a rigid pin with the level; ``applied`` are nodal forces ``(n_owned, 2)`` per unit of load.
-    The level is the load, or with ``by_force`` what makes the forces of supports and rigid pin, along their rates,
-    sum up to ``by_force`` times the load. ``load_name`` is for messages, ``travel`` the displacement to be expected,
-    which limits what counts as round-off: an iterate that flew away is none. ``condense`` as for `TangentMatrix`.
+    ``rigid_rate`` moves rigid discs with the load factor. Collective.
     """
 
     def __init__(
         self,
+        problem: Problem,
         V: fem.FunctionSpace,
         bulk: Bulk,
-        supports: list[Support],
         contact: Contact | None = None,
-        rigid_rate: Array | None = None,
+        rigid_rate: Vector | None = None,
         *,
-        applied: Array | None = None,
-        by_force: float | None = None,
-        load_name: str = "delta",
-        travel: float = np.inf,
-        condense: bool = False,
         timer: Timer | None = None,
     ) -> None:
-        self.V, self.bulk, self.contact = V, bulk, contact
+        self.problem, self.V, self.bulk, self.contact = problem, V, bulk, contact
         self.comm = V.mesh.comm
-        self.supports = supports
-        self.rigid_rate, self.applied, self.by_force, self.load_name = rigid_rate, applied, by_force, load_name
+        self.rigid_rate = None if rigid_rate is None else np.array(rigid_rate)
         self.timer = timer or Timer()
         self.interrupt = Interrupt()
         self.u = fem.Function(V, name="displacement")
-        self.load = self.level = 0.0
+        self.load = self.factor = 0.0
         index_map = V.dofmap.index_map
         self.n_owned = index_map.size_local
         self.n_local = index_map.size_local + index_map.num_ghosts
         self.fixed = np.zeros((self.n_local, 2), dtype=bool)
         self.rate = np.zeros((self.n_local, 2))
-        for s in supports:
-            self.fixed[s.dofs, s.axis] = True
-            self.rate[s.dofs, s.axis] = s.rate
+        self._supported: list[tuple[str, int, np.ndarray]] = []  # name, axis and nodes of every support
+        x = V.tabulate_dof_coordinates()[:, :2]
+        for s in problem.supports:
+            nodes = fem.locate_dofs_topological(V, 1, problem.mesh.facets_of(s.facets))
+            self.fixed[nodes, s.axis] = True
+            self.rate[nodes, s.axis] = s.rate(x[nodes]) if callable(s.rate) else s.rate
+            self._supported.append((s.name, s.axis, nodes[nodes < self.n_owned]))
         self._free_owned = ~self.fixed[: self.n_owned].ravel()
+        self.applied = sum((self._nodal_forces(load) for load in problem.loads), np.zeros((self.n_owned, 2)))
         self._force = create_vector(index_map, 2)
         self._reaction = np.zeros((self.n_owned, 2))
-        self.flips = 0  # points that opened or closed at the last evaluation, over all ranks
+        self.changes = 0  # points that opened or closed at the last evaluation, over all ranks
         self.reaction_norm = self.noise = 0.0
         self.largest_reaction = 0.0  # norm, of all accepted states
-        materials = [body.material for body in bulk.bodies]
-        stiffness = max(float(m.elastic_tangent[0, 0]) for m in materials)
-        self._stiffest, self._travel = stiffness, travel
-        self.tangent = TangentMatrix(V, bulk, contact, self.fixed, self.rate, rigid_rate, self.timer, condense=condense)
-        self.border: Bordered | None = None
-        if by_force is not None:
-            self.border = Bordered(self.tangent.A, stiffness, V)
-            self._direction = fem.Function(V)
-            self._direction.x.array[:] = self.rate.ravel()
+        self._stiffest = max(float(body.material.elastic_tangent[0, 0]) for body in problem.bodies)
+        matrix = V, bulk, contact, self.fixed, self.rate, self.rigid_rate, self.timer
+        self.tangent = TangentMatrix(*matrix, condense=self._condensable())
+        self.control = FactorControl(V)
+        if problem.control == "force":
+            self.control = ForceControl(V, self.tangent, self.rate, self._stiffest)
+
+    def _condensable(self) -> bool:
+        """Whether the linear systems shrink to the contact (`condensed`): the bodies are elastic and held, the mesh is
+        small (the work on contact dofs grows faster than a factorisation), gamma leaves the small system regular."""
+        problem, n_dofs = self.problem, 2 * self.V.dofmap.index_map.size_global
+        if self.contact is None or self.bulk.plastic or problem.control == "force" or n_dofs >= _MOST_CONDENSED:
+            return False
+        regular = all(i.gamma_factor <= _LARGE_GAMMA and i.law == "frictionless" for i in problem.interactions)
+        return regular and all(self._held(problem.tag(body)) for body in problem.bodies)
+
+    def _held(self, tag: int) -> bool:
+        """Whether supports alone keep the body whose cells have this ``tag`` from moving rigidly. Collective."""
+        nodes = np.unique(self.V.dofmap.list[self.problem.mesh.cells.find(tag)])
+        x = self.V.tabulate_dof_coordinates()[nodes, :2]
+        x = x / self.comm.allreduce(np.abs(x).max(initial=0.0), op=MPI.MAX)
+        one, none = np.ones(len(x)), np.zeros(len(x))
+        along = np.stack([one, none, -x[:, 1]], axis=1), np.stack([none, one, x[:, 0]], axis=1)
+        rows = np.concatenate([modes[self.fixed[nodes, axis]] for axis, modes in enumerate(along)])
+        stiffness = np.linalg.eigvalsh(self.comm.allreduce(rows.T @ rows))
+        return bool(stiffness[0] > _MOVABLE * stiffness[-1])
+
+    def _nodal_forces(self, load: Load) -> Array:
+        """Forces ``(n_owned, 2)`` on the modelled part per unit of the load factor."""
+        V, mesh, problem = self.V, self.V.mesh, self.problem
+        tag = problem.mesh.cell_sets[load.cells]
+        measure = ufl.Measure(
+            "dx", mesh, subdomain_data=problem.mesh.cells, metadata={"quadrature_degree": _LOAD_DEGREE}
+        )
+        dx, force = measure(tag), fem.Constant(mesh, np.array(load.force))
+        density = fem.Constant(mesh, 1.0) if load.density is None else load.density(ufl.SpatialCoordinate(mesh))
+        total = self.comm.allreduce(fem.assemble_scalar(fem.form(density * dx)))
+        vector = fem.assemble_vector(fem.form(density * ufl.inner(force, ufl.TestFunction(V)) * dx))
+        vector.scatter_reverse(InsertMode.add)
+        return vector.array[: 2 * self.n_owned].reshape(-1, 2) / (problem.symmetry * total)
 
     # ------------------------------------------------------------------ unknowns
 
-    def vector(self) -> PETSc.Vec:
-        """A vector of all unknowns of this rank: displacements, and the level where it is one."""
-        return create_vector(self.V.dofmap.index_map, 2) if self.border is None else self.border.vector()
-
     def pack(self, state: Array, x: PETSc.Vec) -> None:
         """Put ``state``, shaped like `state`, with its prescribed values replaced, into the unknowns ``x``."""
-        self.level = self.load if self.border is None else float(state[-1])
+        self.factor = self.control.start(self.load, float(state[-1]))
         u = state[:-1].reshape(-1, 2).copy()
-        u[self.fixed] = self.level * self.rate[self.fixed]
-        if self.border is None:
-            x.array[:] = u[: self.n_owned].ravel()
-        else:
-            self.border.join(x, u[: self.n_owned].ravel(), self.level)
+        u[self.fixed] = self.factor * self.rate[self.fixed]
+        self.control.join(x, u[: self.n_owned].ravel(), self.factor)
 
     def unpack(self, x: PETSc.Vec) -> None:
-        """Take displacements and level from the unknowns ``x``. Collective."""
+        """Take displacements and load factor from the unknowns ``x``. Collective."""
         self.u.x.array[: 2 * self.n_owned] = x.array_r[: 2 * self.n_owned]
         self.u.x.scatter_forward()
-        if self.border is not None:
-            self.level = self.border.level(x)
-            self.u.x.array[self.fixed.ravel()] = self.level * self.rate[self.fixed]
+        self.factor = self.control.factor(self.load, x)
+        self.u.x.array[self.fixed.ravel()] = self.factor * self.rate[self.fixed]
 
     # ------------------------------------------------------------------ tangent
 
     def update_tangent(self, *, factorise: bool = True) -> None:
         """Assemble the tangent of the last evaluation, to be factorised or not. Collective."""
         self.tangent.update(factorise=factorise)
-        if self.border is not None:
-            with self.timer("assemble border"):
-                self.tangent.update_border(self.border, self._direction, factorise=factorise)
+        self.control.update(self.tangent, factorise=factorise)
 
     def _follow_pattern(self) -> bool:
-        """Make the matrix anew where the pairs of the last evaluation slid out of its pattern; returns whether."""
+        """Replace the matrix where the pairs of the last evaluation slid out of its pattern; returns whether."""
         if self._pattern_grew:
             self.tangent.destroy()
             self.tangent.renew()
-            if self.border is not None:
-                self.border.replace(self.tangent.A)
+            self.control.follow(self.tangent)
         return self._pattern_grew
 
     # ------------------------------------------------------------------ residual
@@ -149,10 +158,8 @@ class Equilibrium:
         self.evaluate()
         renewed = self._follow_pattern()
         free = np.where(self._free_owned, self._force.array_r, 0.0)
-        if self.border is None or self.by_force is None:
-            f.array[:] = free
-        else:
-            self.border.join(f, free, self.force_on_level() - self.by_force * self.load)
+        missing = self.force_on_factor() - self.load / self.problem.symmetry if self.control.border is not None else 0.0
+        self.control.join(f, free, missing)
         return renewed
 
     def evaluate(self) -> None:
@@ -169,17 +176,16 @@ class Equilibrium:
         with self.timer("contact"):
             if self.contact is not None:
                 if self.rigid_rate is not None:
-                    self.contact.rigid_motion = self.level * self.rigid_rate
+                    self.contact.rigid_motion = self.factor * self.rigid_rate
                 self._pattern_grew = self.contact.evaluate(u)
                 self.contact.add_force(self._force.array.reshape(-1, 2))
-        if self.applied is not None:
-            self._force.array[:] -= self.load * self.applied.ravel()
+        self._force.array[:] -= self.factor * self.applied.ravel()
         self._reaction = np.where(self._free_owned, 0.0, self._force.array_r).reshape(-1, 2)
         noise = 0.0 if self.contact is None else self.contact.round_off()
-        flips = 0 if self.contact is None else self.contact.flips
-        totals = np.array([(self._reaction**2).sum(), noise**2, self.interrupt.received > 0, flips])
+        changes = 0 if self.contact is None else self.contact.flips
+        totals = np.array([(self._reaction**2).sum(), noise**2, self.interrupt.received > 0, changes])
         self.comm.Allreduce(MPI.IN_PLACE, totals)
-        self.flips = int(totals[3])
+        self.changes = int(totals[3])
         self.reaction_norm, contact_noise = np.sqrt(totals[:2])
         self.noise = self._bulk_noise() + contact_noise
         if totals[2]:
@@ -188,18 +194,18 @@ class Equilibrium:
     def _bulk_noise(self) -> float:
         """Round-off of the bulk's residual: forces that a rigid motion of the size of the displacement leaves."""
         largest = self.comm.allreduce(np.abs(self.u.x.array).max(initial=0.0), op=MPI.MAX)
-        return 1e-13 * self._stiffest * min(largest, self._travel)
+        return 1e-13 * self._stiffest * min(largest, self.problem.travel)
 
     def reaction(self, name: str) -> Array:
-        """Force ``(2,)`` of the support ``name`` on the joint at the last evaluation, over all ranks."""
+        """Force ``(2,)`` of the supports ``name`` on the modelled part at the last evaluation, over all ranks."""
         total = np.zeros(2)
-        for s in self.supports:
-            if s.name == name:
-                total[s.axis] += self._reaction[s.dofs[s.dofs < self.n_owned], s.axis].sum()
+        for support, axis, nodes in self._supported:
+            if support == name:
+                total[axis] += self._reaction[nodes, axis].sum()
         return self.comm.allreduce(total)
 
-    def force_on_level(self) -> float:
-        """Force that works on the level: those of supports and rigid pin along their rates, over all ranks."""
+    def force_on_factor(self) -> float:
+        """Force that works on the load factor: those of supports and rigid discs along their rates, over all ranks."""
         total = self.comm.allreduce(float((self._reaction * self.rate[: self.n_owned]).sum()))
         if self.rigid_rate is not None and self.contact is not None:
             total += float(self.rigid_rate @ self.contact.resultant())
@@ -229,12 +235,12 @@ class Equilibrium:
         return self.u.x.array.reshape(-1, 2).copy()
 
     def state(self) -> Array:
-        """All that is solved for: nodal displacements ``(2 n_local,)`` of this rank and, behind them, the level."""
-        return np.append(self.u.x.array, self.level)
+        """All that is solved for: nodal displacements ``(2 n_local,)`` of this rank, then the load factor."""
+        return np.append(self.u.x.array, self.factor)
 
     def restore(self, load: float, state: Array) -> None:
         """Go back to an accepted state; the history was never touched."""
-        self.load, self.level = load, float(state[-1])
+        self.load, self.factor = load, float(state[-1])
         self.u.x.array[:] = state[:-1]
 
     def resume(self, load: float, state: Array, largest_reaction: float) -> None:

@@ -1,4 +1,4 @@
-"""One joint on its way along a path of loads: where it stands, and from which guess it takes the next step."""
+"""A path of loads and the equilibria on it: the state reached last, and the guesses for the next step."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ _PREDICTOR_LIMIT = 4.0  # an increment is not extrapolated to more than this man
 
 @dataclass
 class Position:
-    """Where a march stands between two steps: what it needs besides the state of the joint to go on as if never halted.
+    """The place on a path between two steps: what is needed besides the state of the equilibrium to go on from it.
 
     ``targets_done`` output targets were reached, the last step being of length ``stride`` in the load; ``increment`` is
-    what it changed in the state of the equilibrium. None before the first step.
+    what it changed in the state of the equilibrium. None before the first step. ``size`` is the length of the next
+    step, in output steps.
     """
 
     targets_done: int = 0
@@ -32,14 +33,13 @@ class Position:
     size: float | None = None
 
 
-class Walk:
-    """The walk of ``solver``'s equilibrium, whose state stands ``at`` a position, the beginning if absent.
+class LoadPath:
+    """The path that ``solver``'s equilibrium follows from the position ``at``, from the beginning if absent.
 
     The guess for a step is, where there is a ``coarse`` start, what a coarser mesh found. Else it extrapolates the last
-    increment; where that fails an elastic joint starts from the last state itself. Where the path starts or turns, the
-    guess comes from the elastic solution, at the start from ``first_guess(load)``. Without ``from_rest`` the joint is
-    not in equilibrium before the first step (a pin too large for its hole), whose increment then says nothing about the
-    next.
+    increment; where that fails elastic bodies start from the last state itself. Where the path starts or turns, the
+    guess comes from the elastic solution, at the start from ``first_guess(load)``. Without ``from_rest`` the bodies are
+    not in equilibrium before the first step (a press fit), whose increment then says nothing about the next.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Walk:
             return
         ratio = (load - self.at.load) / self.at.stride
         near = abs(ratio) <= _PREDICTOR_LIMIT
-        # where the path turns, the joint first goes back the way it came, elastically
+        # where the path turns, it first goes back elastically
         afar = ratio < 0
         yield self.state + self.at.increment * ratio if near else self.state, afar
         if near and not afar and self.solver.elastic:

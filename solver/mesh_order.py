@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.materials.points import Points
-from archord.presets.joint import Joint
+from archord.solver.system import System
 
 Arrays = dict[str, np.ndarray]
 
@@ -41,27 +41,27 @@ class Gather:
 
 
 class MeshOrder:
-    """The generator's order of the joint's nodes and cells. Collective.
+    """The generator's order of the nodes and cells of ``system``. Collective.
 
     ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, a)`` are the mesh in that order, on rank 0.
     """
 
-    def __init__(self, joint: Joint) -> None:
-        self.joint = joint
-        mesh, V = joint.model.mesh, joint.V
+    def __init__(self, system: System) -> None:
+        self.system = system
+        mesh, V = system.problem.mesh.mesh, system.V
         self.n_cells = mesh.topology.index_map(2).size_local
-        self._n_local = joint.equilibrium.n_local
+        self._n_local = system.equilibrium.n_local
         # displacement dof of every mesh node of this rank: both number the nodes of a cell alike
         self._dof = np.zeros(len(mesh.geometry.x), dtype=np.int64)
         self._dof[mesh.geometry.dofmap.ravel()] = V.dofmap.list.ravel()
         self._n_owned = mesh.geometry.index_map().size_local
         self._index = np.asarray(mesh.geometry.input_global_indices)
         self._cell_index = np.asarray(mesh.topology.original_cell_index)[: self.n_cells]
-        self._nodes = Gather(joint.comm, self._index[: self._n_owned])
-        self.cells = Gather(joint.comm, self._cell_index)
+        self._nodes = Gather(system.comm, self._index[: self._n_owned])
+        self.cells = Gather(system.comm, self._cell_index)
         self.coordinates = self._nodes(mesh.geometry.x[: self._n_owned])
         cells = self.cells(self._index[mesh.geometry.dofmap[: self.n_cells]])
-        root = joint.comm.rank == 0
+        root = system.comm.rank == 0
         self.nodes_of_cell = np.searchsorted(self._nodes.unique, cells) if root else cells
 
     def mesh_digest(self) -> str:
@@ -70,7 +70,7 @@ class MeshOrder:
 
     def bodies(self) -> np.ndarray:
         """Tag of the body of every cell ``(n,)`` on rank 0, nothing elsewhere. Collective."""
-        tags, body = self.joint.model.cells, np.zeros(self.n_cells, dtype=np.int8)
+        tags, body = self.system.problem.mesh.cells, np.zeros(self.n_cells, dtype=np.int8)
         own = tags.indices < self.n_cells
         body[tags.indices[own]] = tags.values[own]
         return self.cells(body)
@@ -81,7 +81,7 @@ class MeshOrder:
 
     def spread(self, whole: Array | None) -> Array:
         """The inverse of `collect`: this rank's nodal values ``(n_local, k)``, ghosts included. Collective."""
-        comm = self.joint.comm
+        comm = self.system.comm
         index, whole = comm.bcast((self._nodes.unique, whole) if comm.rank == 0 else None)
         u = np.zeros((self._n_local, whole.shape[1]))
         u[self._dof] = whole[np.searchsorted(index, self._index)]
@@ -93,7 +93,7 @@ class MeshOrder:
         for place, (points, number) in self._points().items():
             used = _used(points)
             mine[place] = {"point": number[used]} | {k: v[used] for k, v in _arrays(points.state).items()}
-        parts = self.joint.comm.gather(mine)
+        parts = self.system.comm.gather(mine)
         if parts is None:
             return {}
         whole = {}
@@ -106,7 +106,7 @@ class MeshOrder:
 
     def spread_history(self, whole: dict[str, Arrays] | None) -> None:
         """The inverse of `collect_history`: give every point its history. Collective."""
-        stored_at: dict[str, Arrays] = self.joint.comm.bcast(whole)
+        stored_at: dict[str, Arrays] = self.system.comm.bcast(whole)
         for place, (points, number) in self._points().items():
             stored = stored_at[place]
             virgin = points.material.state(len(number))
@@ -120,9 +120,9 @@ class MeshOrder:
     def _points(self) -> dict[str, tuple[Points, np.ndarray]]:
         """All points with history of this rank and their numbers ``(n,)``, by place."""
         found = {}
-        for tag, (cells, points) in self.joint.bulk.histories().items():
+        for tag, (cells, points) in self.system.bulk.histories().items():
             found[f"bulk {tag}"] = points, _through(self._cell_index[cells], points)
-        for name, side in self.joint.sides.items():
+        for name, side in self.system.sides.items():
             found[f"contact {name}"] = side.points, _through(side.facet, side.points)
         return {place: entry for place, entry in found.items() if entry[0].state is not None}
 

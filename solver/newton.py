@@ -17,24 +17,24 @@ from archord.solver.equilibrium import Equilibrium
 from archord.solver.linear.bordered import direct_solver
 from archord.solver.timer import BEFORE_SOLVING
 
-_STIFF_CONTACT = 5.0  # gamma factor above which it is raised by and by where a solve fails
+_STIFF_CONTACT = 5.0  # gamma factor above which it is raised in stages where a solve fails
 _GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
 _PATIENCE = 12  # Newton iterations in which the residual must halve
-_CIRCLING = 4  # the same where no contact point opens or closes
+_CIRCLING = 4  # the same where the active set stands still
 _ROUGH = 1e-3  # residual over reaction at which a solution is good enough for a guess
-_MANY_DOFS = 20_000  # of an elastic joint for which a factorisation takes longer than some solves with an old one
+_MANY_DOFS = 20_000  # of an elastic problem for which a factorisation takes longer than some solves with an old one
 _LINEAR_TOLERANCE = 1e-3  # residual of a linear system over its right-hand side, where it is solved so
 _NEVER = 1_000_000  # iterations
 _MANY_SOLVES = 12  # that cost what a factorisation does
-_MANY_FLIPS = 100  # contact points that open or close, which make so many solves
+_MANY_CHANGES = 100  # of the active set, which make so many solves
 
 
 @dataclass
 class Newton:
     """What a nonlinear solve did: whether it converged and why not, its iterations and residuals relative to reaction.
 
-    Of a solve that did not converge, ``worst`` is the place ``(2,)`` of the largest residual, ``flips`` the number of
-    contact points that changed between open and closed at each residual, ``plastic_increment`` the largest of PEEQ.
+    Of a solve that did not converge, ``worst`` is the place ``(2,)`` of the largest residual, ``active_set_changes``
+    the contact points that opened or closed at each residual, ``plastic_increment`` the largest increment of PEEQ.
     ``held``: contact points had to stay on their facets. ``evaluations`` are those of the residual.
     """
 
@@ -43,7 +43,7 @@ class Newton:
     iterations: int
     residuals: list[float]
     worst: tuple[float, float] | None = None
-    flips: list[int] = field(default_factory=list)
+    active_set_changes: list[int] = field(default_factory=list)
     plastic_increment: float = 0.0
     held: bool = False
     factorisations: int = 0
@@ -58,7 +58,7 @@ class Newton:
             self,
             iterations=iterations,
             residuals=residuals,
-            flips=before.flips + self.flips,
+            active_set_changes=before.active_set_changes + self.active_set_changes,
             held=before.held or self.held,
             factorisations=before.factorisations + self.factorisations,
             evaluations=before.evaluations + self.evaluations,
@@ -72,11 +72,11 @@ class NewtonSolver:
         self.equilibrium, self.tolerance, self.max_iterations = equilibrium, tolerance, max_iterations
         self.comm = equilibrium.comm
         self._goal = tolerance
-        self.by_and_by = False  # a large gamma has to be raised by and by
+        self.continues_gamma = False  # a large gamma has to be raised in stages
         self._raised: BaseException | None = None
         self._failure = ""
         self._renewed = True  # the last factorisation is of another matrix
-        self._flipped = 0  # contact points that opened or closed since
+        self._changed = 0  # active-set changes since
         many = 2 * equilibrium.V.dofmap.index_map.size_global >= _MANY_DOFS
         self._iterative = many and self.elastic and equilibrium.tangent.condensed is None
         with equilibrium.timer(BEFORE_SOLVING):
@@ -92,8 +92,8 @@ class NewtonSolver:
         snes.setOptionsPrefix("archord_")
         snes.setType("newtonls")
         tangent = self.equilibrium.tangent
-        system = self.equilibrium.border or tangent.condensed
-        self._x = self.equilibrium.vector()
+        system = self.equilibrium.control.border or tangent.condensed
+        self._x = self.equilibrium.control.vector()
         snes.setFunction(self._guarded(self._residual), self._x.duplicate())
         snes.setJacobian(self._guarded(self._jacobian), tangent.A if system is None else system.matrix)
         snes.setTolerances(max_it=self.max_iterations)
@@ -139,7 +139,7 @@ class NewtonSolver:
             f.set(np.nan)
             return
         tangent = self.equilibrium.tangent
-        if renewed and self.equilibrium.border is None and tangent.condensed is None:
+        if renewed and self.equilibrium.control.border is None and tangent.condensed is None:
             self._snes.setJacobian(self._guarded(self._jacobian), tangent.A)
             direct_solver(self._snes.getKSP(), tangent.A, self.equilibrium.V)
             self._iterate(self._snes.getKSP())
@@ -165,16 +165,16 @@ class NewtonSolver:
     def _factorise(self, snes: PETSc.SNES) -> bool:
         """Whether the next matrix is to be factorised, and not solved with by GMRES and the last factorisation.
 
-        With a good guess but few contact points change from one iteration to the next in a large elastic joint: GMRES
-        needs one to three iterations. From step to step there are too many of them, and plastic joints change all over.
+        With a good guess few contact points change from one iteration to the next of a large elastic problem: GMRES
+        needs one to three iterations. From step to step there are too many of them, and plastic bodies change all over.
         """
         if not self._iterative:
             return True
-        self._flipped += self._flips[-1]
-        many = snes.getKSP().getIterationNumber() > _MANY_SOLVES or self._flipped > _MANY_FLIPS
+        self._changed += self._changes[-1]
+        many = snes.getKSP().getIterationNumber() > _MANY_SOLVES or self._changed > _MANY_CHANGES
         factorise = self._renewed or many
         if factorise:
-            self._flipped = 0
+            self._changed = 0
         options = PETSc.Options("archord_")
         options["snes_lag_preconditioner"] = 1 if factorise else _NEVER
         snes.setFromOptions()
@@ -184,7 +184,7 @@ class NewtonSolver:
     def _close(self) -> bool:
         """Whether one more step with the last factorisation will do: Newton's method converges, and the residual that
         such a step leaves, smaller by the last reduction, is below the tolerance."""
-        if len(self._residuals) < 2 or self._flips[-1] or self._renewed:
+        if len(self._residuals) < 2 or self._changes[-1] or self._renewed:
             return False
         before, now = self._residuals[-2:]
         return now < _ROUGH * before and now * now / before < 0.1 * self._goal
@@ -194,9 +194,9 @@ class NewtonSolver:
         at = self.equilibrium
         reaction = max(at.reaction_norm, at.largest_reaction)
         scale = max(reaction, at.noise / self._goal)
-        self._flips.append(at.flips)
+        self._changes.append(at.changes)
         self._residuals.append(float(norm / reaction if reaction > 0 else norm))
-        if self._came_free():
+        if self._singular():
             return PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE
         if not np.isfinite(norm):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
@@ -210,20 +210,20 @@ class NewtonSolver:
         return PETSc.SNES.ConvergedReason.ITERATING
 
     def _stagnates(self) -> bool:
-        patience = _PATIENCE if any(self._flips[-_CIRCLING:]) else _CIRCLING
+        patience = _PATIENCE if any(self._changes[-_CIRCLING:]) else _CIRCLING
         recent, before = self._residuals[-patience:], self._residuals[:-patience]
         return bool(before) and min(recent) > 0.5 * min(before)
 
     def solve(self, load: float, guess: Array, *, afar: bool = False) -> Newton:
-        """Solve at ``load`` as `solve_at_once`; where a large gamma makes that fail, raise gamma to it by and by.
+        """Solve at ``load`` as `solve_at_once`; where a large gamma makes that fail, by continuation in gamma.
 
-        The limit hardly depends on gamma, but points open and close for many iterations where it is large.
+        The solution hardly depends on gamma, but points open and close for many iterations where it is large.
         """
         contact, result = self.equilibrium.contact, None
         wanted = 0.0 if contact is None else contact.gamma_factor
         if contact is None or wanted <= _STIFF_CONTACT:
             return self.solve_at_once(load, guess, afar=afar)
-        if not self.by_and_by:
+        if not self.continues_gamma:
             result = self.solve_at_once(load, guess, afar=afar)
             if result.converged:
                 return result
@@ -236,15 +236,15 @@ class NewtonSolver:
                 break
         contact.use_gamma_factor(wanted)
         assert result is not None
-        self.by_and_by |= result.converged
+        self.continues_gamma |= result.converged
         return result
 
     def solve_at_once(self, load: float, guess: Array, *, afar: bool = False) -> Newton:
         """Solve at ``load`` from ``guess``, shaped like `state`, whose prescribed values are replaced.
 
         A guess from ``afar`` is too stiff for a line search, which creeps there, and may yield far too much: full steps
-        come first, and before the equilibrium asked for that of points that cannot yield (further), roughly; if that
-        fails, the solve starts from the guess.
+        come first, and a rough equilibrium of points that cannot yield (further) comes before the one asked for; if
+        that fails, the solve starts from the guess.
         """
         self.equilibrium.load = load
         points = self.equilibrium.plastic_points()
@@ -274,7 +274,7 @@ class NewtonSolver:
         for kind in ("basic", "bt") if full_steps else ("bt", "basic"):
             self._line_search(kind)
             result = self._run(guess).after(result)
-            if result.converged or self._came_free():
+            if result.converged or self._singular():
                 break
         assert result is not None
         return result
@@ -291,7 +291,8 @@ class NewtonSolver:
         """
         result = self._newton(guess)
         contact = self.equilibrium.contact
-        circles = len(result.flips) > _CIRCLING and not any(result.flips[-_CIRCLING:])
+        changes = result.active_set_changes
+        circles = len(changes) > _CIRCLING and not any(changes[-_CIRCLING:])
         if result.converged or contact is None or contact.kinematics != "current" or not circles:
             return result
         self.equilibrium.unpack(self._x)
@@ -300,13 +301,11 @@ class NewtonSolver:
 
     def _newton(self, guess: Array, *, search: bool = True) -> Newton:
         self._residuals: list[float] = []
-        self._flips: list[int] = []
+        self._changes: list[int] = []
         self._failure = ""
         self._factorisations = self._evaluations = 0
         self._renewed = True
         at = self.equilibrium
-        if at.border is not None:
-            at.border.came_free = False
         at.pack(guess, self._x)
         if at.contact is not None and search:
             at.contact.search()
@@ -326,7 +325,7 @@ class NewtonSolver:
             "converged",
             iterations,
             self._residuals,
-            flips=self._flips,
+            active_set_changes=self._changes,
             factorisations=self._factorisations,
             evaluations=self._evaluations,
         )
@@ -336,8 +335,7 @@ class NewtonSolver:
         """Start with a new linear solver: after a singular matrix PETSc's interface to MUMPS may skip the factorisation
         of the next one, and fail."""
         at, x = self.equilibrium, self._x
-        if at.border is not None:
-            at.border.replace(at.tangent.A)
+        at.control.follow(at.tangent)
         self._snes.destroy()
         self._snes = self._make_snes()
         self._x.array[:] = x.array_r
@@ -347,18 +345,16 @@ class NewtonSolver:
         """A ``result`` without success, with the reason and the place of the largest residual."""
         at = self.equilibrium
         reason = self._failure or _REASONS.get(code, f"SNES reason {code}")
-        if self._came_free():
+        if self._singular():
             pressed = at.load > 0 and at.contact is not None and at.contact.n_active() > 0
-            reason = (
-                "the joint has no stiffness left" if pressed else "nothing resists the force, the pin has come free"
-            )
+            cause = "no stiffness is left" if pressed else "nothing resists the force"
+            reason = f"{cause} (singular mode)"
         increment = max((float(np.max(p.increment, initial=0.0)) for p in at.plastic_points()), default=0.0)
         increment = self.comm.allreduce(increment, op=MPI.MAX)
         return replace(result, reason=reason, worst=at.worst_place(), plastic_increment=increment)
 
-    def _came_free(self) -> bool:
-        border = self.equilibrium.border
-        return border is not None and border.came_free
+    def _singular(self) -> bool:
+        return self.equilibrium.control.singular
 
 
 _R = PETSc.SNES.ConvergedReason

@@ -126,6 +126,8 @@ class Problem:
             names = [part.name for part in getattr(self, kind)]
             if len(set(names)) < len(names):
                 raise ValueError(f"{kind} must have different names, these are {', '.join(names)}")
+        if self.control == "force" and self.loads:
+            raise ValueError('loads follow the load factor, which control = "force" does not know: use "factor"')
 
     def tag(self, body: Body) -> int:
         """Tag of the body's cells."""

@@ -1,7 +1,7 @@
 """Load stepping along a path: output targets are hit exactly, a step that fails is taken back with all history and cut.
 
-The path is a list of loads, reached one after the other on straight lines: displacements of the pin or forces on it,
-up, down and through zero. Lengths of steps are in output steps, whatever the load between two targets.
+The path is a list of loads, reached one after the other on straight lines, up, down and through zero. Lengths of steps
+are in output steps, whatever the load between two targets.
 """
 
 from __future__ import annotations
@@ -11,15 +11,31 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from archord.scene.scene import Stepping
-from archord.solver.load_path import Position, Walk
+from archord.solver.load_path import LoadPath, Position
 from archord.solver.newton import Newton
+from archord.solver.problem import Problem
 
 _SLIVER = 1e-3  # of an output step: a step that would leave less than this goes to the target
 
 
+@dataclass(frozen=True)
+class StepRules:
+    """How the length of a step follows Newton's method; lengths are in output steps.
+
+    The first step has the length ``initial``; it grows by ``growth`` after a solve in at most ``target_iterations``, is
+    cut by ``cutback`` after one that failed, and stays between ``minimum`` and ``maximum``.
+    """
+
+    initial: float = 1.0
+    minimum: float = 1e-3
+    maximum: float = 1.0
+    growth: float = 2.0
+    cutback: float = 0.5
+    target_iterations: int = 15
+
+
 class StepFailure(RuntimeError):
-    """Equilibrium was not found even with the smallest allowed step; the last accepted state stands.
+    """Equilibrium was not found even with the smallest allowed step; the last accepted state remains.
 
     ``attempt`` is the output step that failed.
     """
@@ -52,7 +68,7 @@ class Step:
 class StepSize:
     """The length of the next step, in output steps, adapted to how Newton's method fares."""
 
-    def __init__(self, rules: Stepping) -> None:
+    def __init__(self, rules: StepRules) -> None:
         self.rules = rules
         self.length = rules.initial
         self._just_cut = False
@@ -77,24 +93,24 @@ class StepSize:
 
 
 def march(
-    walk: Walk,
+    path: LoadPath,
     targets: Sequence[float],
     *,
-    rules: Stepping,
-    substep_done: Callable[[float], None],
-    target_done: Callable[[Step, Position], None],
+    rules: StepRules | None = None,
+    substep_done: Callable[[float], None] = lambda load: None,
+    target_done: Callable[[Step, Position], None] = lambda step, position: None,
     attempted: Callable[[float, int], None] = lambda load, iterations: None,
     gave_up: Callable[[float], None] = lambda load: None,
 ) -> None:
-    """Lead ``walk`` to the loads ``targets`` in turn and, where a step fails or ``rules`` ask for it, to loads between
-    them.
+    """Follow ``path`` to the loads ``targets`` in turn and, where a step fails or ``rules`` ask for it, to loads in
+    between.
 
     ``substep_done(load)`` follows every accepted step with its history still to be committed,
     ``target_done(step, position)`` every output target, ``attempted(load, iterations)`` every solve, ``gave_up(load)``
     the one after which nothing smaller is allowed, before it is taken back. Raises `StepFailure`.
     """
-    at = walk.at
-    size = StepSize(rules)
+    at = path.at
+    size = StepSize(rules or StepRules())
     size.length = at.size or size.length
     for number in range(at.targets_done, len(targets)):
         begun, target, passed = at.load, targets[number], 0.0
@@ -102,9 +118,9 @@ def march(
         while passed < 1:
             end = size.within(passed)
             load = target if end == 1 else begun + end * (target - begun)
-            result = walk.attempt(load)
+            result = path.attempt(load)
             record.iterations += result.iterations
-            record.coarse_iterations += walk.coarse_iterations
+            record.coarse_iterations += path.coarse_iterations
             record.attempts.append(result)
             attempted(load, result.iterations)
             if not result.converged:
@@ -113,27 +129,26 @@ def march(
                 smallest = not size.failed()
                 if smallest:
                     gave_up(load)
-                walk.take_back()
+                path.take_back()
                 if smallest:
-                    raise StepFailure(_why(result, walk.solver.equilibrium.load_name, load, at.load, tried), record)
+                    raise StepFailure(_why(result, path.solver.equilibrium.problem, load, at.load, tried), record)
                 continue
             record.substeps += 1
             size.accepted(result.iterations)
-            walk.accept(load)
+            path.accept(load)
             at.size, passed = size.length, end
             substep_done(load)
-            walk.commit()
+            path.commit()
         at.targets_done = number + 1
         target_done(record, at)
 
 
-def _why(result: Newton, name: str, load: float, held: float, length: float) -> str:
+def _why(result: Newton, problem: Problem, load: float, held: float, length: float) -> str:
+    name, by_force = problem.load_name, problem.control == "force" or problem.loads
     where = "" if result.worst is None else f", the largest residual at ({result.worst[0]:.4g}, {result.worst[1]:.4g})"
     last = f"{result.residuals[-1]:.1e}" if result.residuals and np.isfinite(result.residuals[-1]) else "none"
     tried = f"the step was cut to {length:.2g} of an output step" if length < 1 else "no smaller step is allowed"
-    limit = (
-        "; if the joint yields as a whole, its limit load is close" if name == "P" and result.plastic_increment else ""
-    )
+    limit = "; if the bodies yield as a whole, the limit load is close" if by_force and result.plastic_increment else ""
     return (
         f"no equilibrium at {name} = {load:.6g}: {result.reason}; after {result.iterations} iterations the residual "
         f"over reaction was {last}{where}; {tried}; the last load that held is {name} = {held:.6g}{limit}"

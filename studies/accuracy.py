@@ -18,10 +18,10 @@ from typing import Any
 from mpi4py import MPI
 
 from archord.output.disk import WriteError, naming, on_root, replace_file
-from archord.output.measures import Measures
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
 from archord.presets.joint import Joint
+from archord.presets.measures import Measures
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupt, Interrupted

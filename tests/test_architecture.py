@@ -34,7 +34,6 @@ ROOMS = [
 OPEN = {
     "solver.contact",
     "solver.linear",
-    "solver",
     "output",
     "studies",
 }

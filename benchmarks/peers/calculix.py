@@ -21,8 +21,8 @@ import numpy as np
 from archord.benchmarks.case import Case, paper_joint
 from archord.geometry.basis import Array
 from archord.geometry.joint_mesh import Facets
-from archord.output.measures import Measures
 from archord.postprocess.deck import Elements, PlaneMesh, deck, deck_mesh, loaded_nodes, thickness
+from archord.presets.measures import Measures
 from archord.report.table import Table
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
@@ -48,7 +48,7 @@ class PrintedBlock:
 
 @dataclass(frozen=True)
 class SecondOpinion:
-    """CalculiX's results for the whole joint at the last step, as in `archord.output.measures.Measures`.
+    """CalculiX's results for the whole joint at the last step, as in `archord.presets.measures.Measures`.
 
     ``forces`` ``(steps,)`` is P at the end of every step, ``force_balance`` the largest difference between the
     reactions of pin and block over P, ``pressure`` ``(n,)`` that of the nodes on the pin's arc at the growing angles

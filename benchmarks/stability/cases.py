@@ -147,9 +147,9 @@ def _load() -> Iterable[Case]:
     yield _case("zero force", replace(nothing, quantity="delta/dR"), load=by_force(0.0))
     apart = Expected("P/(E* R)", 0.0, 1e-12, "no contact")
     yield _case("lifted, delta/dR = -1", apart, load={"displacement": -1.0})
-    yield _case("pulled, P < 0", stops="come free", load=by_force(-0.001))
+    yield _case("pulled, P < 0", stops="singular mode", load=by_force(-0.001))
     yield _case("pressed, lifted, pressed", _ONCE, load={"displacement": [2.0, -1.0, 2.0], "steps": [2, 3, 2]})
-    yield _case("pressed, then pulled", stops="come free", load=by_force([0.006, -0.001], 2))
+    yield _case("pressed, then pulled", stops="singular mode", load=by_force([0.006, -0.001], 2))
 
 
 def _one_step() -> Iterable[Case]:

@@ -21,9 +21,9 @@ from archord.benchmarks.stability.cases import FINE, cases
 from archord.benchmarks.stability.fine import read_fine
 from archord.output.folder import claim_folder
 from archord.output.history import read_history
-from archord.output.measures import Measures
 from archord.output.run import Outcome
 from archord.output.step_file import all_arrays
+from archord.presets.measures import Measures
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.solver.stepping import Step, StepFailure

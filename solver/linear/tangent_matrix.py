@@ -117,7 +117,7 @@ class TangentMatrix:
         self.factorisations += factorise
         with self.timer("assemble bulk"):
             self._elastic.copy(self.A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            self.bulk.assemble_softening(self.A, self._bcs)
+            self.bulk.assemble_correction(self.A, self._bcs)
         with self.timer("assemble contact"):
             if self.contact is not None:
                 self._contact_blocks = self.contact.tangent.blocks()

@@ -28,7 +28,7 @@ def test_three_cases_through_the_command(tmp_path, capsys):
     with (tmp_path / "c" / "stability.csv").open(newline="", encoding="utf-8") as file:
         (row,) = csv.DictReader(file)
     assert (row["status"], row["verdict"]) == ("stopped", "stops, as it must")
-    assert "come free" in row["message"]
+    assert "singular mode" in row["message"]
     assert (tmp_path / "b" / "stability.png").read_bytes().startswith(b"\x89PNG")
     assert "| zero force | done |" in (tmp_path / "b" / "stability.md").read_text(encoding="utf-8")
     assert run(["benchmark", "stability", "--only", "nothing like it"]) == 2
@@ -94,9 +94,9 @@ def test_verdicts():
         assert len(line.faults) == 1
         assert re.search(said, line.verdict)
     assert judge(replace(other, warns="end of"), results, {}).faults == ['does not warn "end of"']
-    stops = replace(other, stops="come free", expected=())
+    stops = replace(other, stops="singular mode", expected=())
     assert judge(stops, results, {}).faults == ["went on"]
-    stopped = replace(DONE, status="stopped", message="the pin has come free")
+    stopped = replace(DONE, status="stopped", message="nothing resists the force (singular mode)")
     assert judge(stops, results | {"b": stopped}, {}).verdict == "stops, as it must"
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from archord.geometry import mesh_cache
 from archord.geometry.half_ring import half_ring
-from archord.geometry.joint_mesh import JointMesh
 from archord.geometry.mesh_cache import MeshCache
 from archord.geometry.quarter_joint import quarter_joint
+from archord.geometry.tagged_mesh import TaggedMesh
 
 QUARTER = {"radius": 2.0, "clearance": 0.02, "block_size": 20.0, "element_size": 0.6, "growth": 1.0}
 RING = {"radius": 2.0, "clearance": 0.02, "outer_radius": 20.0, "element_size": 0.6, "growth": 1.0, "core_radius": 0.2}
@@ -21,7 +21,7 @@ def meshes(monkeypatch) -> MeshCache:
     return cache
 
 
-def content(model: JointMesh) -> list[np.ndarray]:
+def content(model: TaggedMesh) -> list[np.ndarray]:
     mesh = model.mesh
     tags = [array for tag in (model.cells, model.facets) for array in (tag.indices, tag.values)]
     return [mesh.geometry.x, mesh.geometry.dofmap, mesh.topology.connectivity(2, 0).array, *tags]

@@ -10,27 +10,8 @@ from mpi4py import MPI
 
 from archord.materials.hardening import Hardening
 from archord.materials.j2 import J2Material
-from archord.solver.bulk import Body, Bulk
-from archord.solver.contact.contact import Contact
-from archord.solver.contact.surface import ContactSide
-from archord.solver.equilibrium import Support
-from tests.solver.parts import (
-    BASE,
-    LEFT,
-    LID,
-    LOWER,
-    LOWER_TOP,
-    NU,
-    RIGHT,
-    UPPER,
-    UPPER_BOTTOM,
-    YIELD_STRESS,
-    E,
-    edge_nodes,
-    solve,
-    space,
-    two_blocks,
-)
+from archord.solver.problem import Body, Interaction, Problem, Support
+from tests.solver.parts import NU, YIELD_STRESS, E, solve, two_blocks
 
 
 @dataclass(frozen=True)
@@ -73,22 +54,15 @@ def test_blocks_pressed_together_follow_the_closed_form(plane):
     s, mu, bulk = VOCE.stress(peeq), E / (2 * (1 + NU)), E / (3 * (1 - 2 * NU))
     strain = (s + 3 * mu * peeq) / (2 * mu) if plane == "strain" else s / E + peeq
     pressure = bulk * strain + 2 / 3 * s if plane == "strain" else s
-    mesh, cells, facets = two_blocks(MPI.COMM_SELF, 2, 3)
-    V, material = space(mesh), J2Material(E, NU, plane, VOCE)
-    bodies = Bulk(V, cells, [Body(LOWER, material), Body(UPPER, material)])
-    sides = [ContactSide(V, facets, tag, material) for tag in (UPPER_BOTTOM, LOWER_TOP)]
-    contact = Contact(sides, kinematics="reference")
-    supports = [
-        Support("base", 1, edge_nodes(V, facets, BASE)),
-        Support("lid", 1, edge_nodes(V, facets, LID), -2.0),
-        *(Support("wall", 0, edge_nodes(V, facets, wall)) for wall in (LEFT, RIGHT)[: 1 + (plane == "strain")]),
-    ]
-    problem = solve(V, bodies, supports, contact, strain[200::200])
-    u = problem.displacement()
-    assert -problem.reaction("lid")[1] == pytest.approx(pressure[-1], rel=1e-9)
-    assert bodies.cell_fields(u).peeq == pytest.approx(peeq[-1], rel=1e-8)
-    assert contact.state(sides[0]).pressure == pytest.approx(pressure[-1], rel=1e-8)
-    stored, dissipated = bodies.energies(u)
+    material, walls = J2Material(E, NU, plane, VOCE), ("left", "right")[: 1 + (plane == "strain")]
+    supports = [Support("base", "base", 1), Support("lid", "lid", 1, -2.0), *(Support(w, w, 0) for w in walls)]
+    contact = Interaction("contact", ("upper bottom", "lower top"), kinematics="reference")
+    bodies = [Body("lower", material), Body("upper", material)]
+    system = solve(Problem(two_blocks(MPI.COMM_SELF, 2, 3), bodies, [contact], supports), strain[200::200])
+    assert -system.reaction("lid")[1] == pytest.approx(pressure[-1], rel=1e-9)
+    assert system.bulk.cell_fields(system.equilibrium.displacement()).peeq == pytest.approx(peeq[-1], rel=1e-8)
+    assert system.contact.state(system.sides["upper bottom"]).pressure == pytest.approx(pressure[-1], rel=1e-8)
+    stored, dissipated = system.energies()
     assert dissipated == pytest.approx(2 * VOCE.work(peeq[-1]), rel=1e-9)
     work = np.trapezoid(pressure, strain) + 0.5 * pressure[0] * strain[0]
     assert stored + dissipated == pytest.approx(2 * work, rel=1e-6)

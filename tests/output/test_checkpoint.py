@@ -26,7 +26,7 @@ def pressed():
 
 def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Numbers ``(n,)`` and coordinates ``(n, 2)`` of all points that may have a history, on every rank."""
-    joint, comm = order.joint, order.joint.comm
+    joint, comm = order.system, order.system.comm
     here = {}
     for place, (_, number) in order._points().items():
         kind, name = place.split()

@@ -92,7 +92,7 @@ def test_a_restarted_run_equals_the_uninterrupted_one(tmp_path, name):
         assert sum(m.cutbacks for m in outcome.steps[step:]) > 0
 
 
-def test_a_restarted_run_remembers_that_a_large_gamma_is_raised_by_and_by(tmp_path):
+def test_a_restarted_run_remembers_the_continuation_in_gamma(tmp_path):
     """The rest takes the same iterations, and agrees to what such a gamma leaves of the digits."""
     problem = scene(0.2, 3, **PLASTIC, analysis={"gamma_factor": 1e4})
     run(problem, tmp_path / "whole", copies={2: tmp_path / "halted"})

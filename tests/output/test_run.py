@@ -159,14 +159,14 @@ def test_a_stopped_run_keeps_its_accepted_steps(tmp_path):
 
 
 def test_a_failing_step_tells_where_and_why(tmp_path):
-    """Every attempt's residuals, flips and plastic increment in run.json; debug.xdmf holds the state they speak of."""
+    """Every attempt's residuals, active-set changes and plastic increment in run.json; debug.xdmf holds that state."""
     problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6}, stepping={"minimum": 1.0})
     assert solve_scene(problem, tmp_path, MPI.COMM_SELF, debug=True).status == "stopped"
     failed = json.loads((tmp_path / "run.json").read_text())["failed_step"]
     assert failed["cutbacks"] == len([a for a in failed["attempts"] if not a["converged"]]) == 1
     last = failed["attempts"][-1]
-    assert len(last["flips"]) == len(last["residuals"]) > 3
-    assert sum(sum(a["flips"]) for a in failed["attempts"]) > 0
+    assert len(last["active_set_changes"]) == len(last["residuals"]) > 3
+    assert sum(sum(a["active_set_changes"]) for a in failed["attempts"]) > 0
     with meshio.xdmf.TimeSeriesReader(tmp_path / "debug.xdmf") as reader:
         points, _ = reader.read_points_cells()
         _, nodal, cells = reader.read_data(0)

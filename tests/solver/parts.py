@@ -15,14 +15,16 @@ from archord.geometry.curve import RigidCircle
 from archord.geometry.fenicsx import create_vector, gmsh_to_mesh
 from archord.geometry.joint_mesh import Cells, Facets, on_circle
 from archord.geometry.quarter_joint import quarter_joint
+from archord.geometry.tagged_mesh import TaggedMesh
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.bulk import Body, Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.surface import ContactSide
-from archord.solver.equilibrium import Equilibrium, Support
-from archord.solver.newton import NewtonSolver
+from archord.solver.problem import Problem
+from archord.solver.stepping import StepRules, march
+from archord.solver.system import System
 
 E, NU = 1.82, 0.3
 YIELD_STRESS = 0.01
@@ -126,11 +128,12 @@ def joint_parts(
 
 
 LOWER, UPPER = 1, 2  # cell tags of two blocks
-LOWER_TOP, UPPER_BOTTOM, BASE, LID, LEFT, RIGHT = range(1, 7)  # their facet tags
+SIDES = ("lower top", "upper bottom", "base", "lid", "left", "right")  # their facet sets
 
 
-def two_blocks(comm: MPI.Comm, n_lower: int, n_upper: int) -> tuple[Mesh, MeshTags, MeshTags]:
+def two_blocks(comm: MPI.Comm, n_lower: int, n_upper: int) -> TaggedMesh:
     """Unit squares on top of each other, with ``n_lower`` and ``n_upper`` edges on their common line y = 0."""
+    LOWER_TOP, UPPER_BOTTOM, BASE, LID, LEFT, RIGHT = range(1, 7)
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
@@ -150,7 +153,8 @@ def two_blocks(comm: MPI.Comm, n_lower: int, n_upper: int) -> tuple[Mesh, MeshTa
         for tag, group in lines.items():
             gmsh.model.addPhysicalGroup(1, group, tag)
 
-    return gmsh_to_mesh(comm, build)
+    facets = {name: tag for tag, name in enumerate(SIDES, 1)}
+    return TaggedMesh(*gmsh_to_mesh(comm, build), {"lower": LOWER, "upper": UPPER}, facets)
 
 
 INNER, OUTER, ON_X, ON_Y = range(1, 5)
@@ -181,16 +185,8 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> tuple[Me
     return gmsh_to_mesh(comm, build, lambda x, tag: on_circle(x, (0.0, 0.0), radii[tag]) if tag in radii else x)
 
 
-def solve(V, bulk: Bulk, supports: list[Support], contact: Contact | None, loads) -> Equilibrium:
-    """Step through ``loads`` from rest and return the equilibrium at the last; every step must converge.
-
-    Each starts from the last state in proportion to the load, and the first from afar.
-    """
-    problem = Equilibrium(V, bulk, supports, contact)
-    solver = NewtonSolver(problem)
-    for load in loads:
-        ratio = load / problem.load if problem.load else 0.0
-        result = solver.solve(load, ratio * problem.state(), afar=not ratio)
-        assert result.converged, result.reason
-        problem.commit()
-    return problem
+def solve(problem: Problem, loads) -> System:
+    """Step through ``loads`` from rest and return the system at the last; no step may be cut."""
+    system = System(problem)
+    march(system.load_path(), loads, rules=StepRules(minimum=1.0))
+    return system

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from mpi4py import MPI
 
 from archord.benchmarks.case import E, paper_joint
-from archord.output.measures import Measures, Work, arc_profiles, measure
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
+from archord.presets.measures import Measures, Work, arc_profiles, measure
 from archord.scene.scene import Scene
 from archord.solver.coarse_start import coarse_start
 from archord.solver.stepping import march
@@ -40,7 +40,7 @@ def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Sol
         solution.steps.append(measure(joint, len(solution.steps) + 1, step, profiles, work, 0.0, largest))
 
     march(
-        joint.walk(coarse=coarse_start(joint)),
+        joint.load_path(coarse=coarse_start(joint)),
         scene.targets,
         rules=scene.stepping,
         substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),

@@ -7,12 +7,12 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.geometry.tagged_mesh import TaggedMesh
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
-from archord.solver.bulk import Body, Bulk
-from archord.solver.equilibrium import Equilibrium, Support
-from archord.solver.newton import NewtonSolver
-from tests.solver.parts import INNER, ON_X, ON_Y, OUTER, coordinates, edge_nodes, internal_force, quarter_annulus, space
+from archord.solver.problem import Body, Problem, Support
+from archord.solver.system import System
+from tests.solver.parts import INNER, ON_X, ON_Y, OUTER, coordinates, edge_nodes, internal_force, quarter_annulus
 
 A, B = 1.0, 2.0
 E, SIGY = 1.0, 0.001
@@ -33,17 +33,17 @@ class Cylinder:
     """A quarter of the cylinder whose inner wall moves outward by ``load``."""
 
     def __init__(self, size: float, hardening: float = 0.0) -> None:
-        mesh, self.cells, facets = quarter_annulus(MPI.COMM_SELF, A, B, size)
-        self.V = V = space(mesh)
-        self.bulk = Bulk(V, self.cells, [Body(1, J2Material(E, NU, "strain", LinearHardening(SIGY, hardening)))])
-        x = coordinates(V)
-        self.inner, self.outer = edge_nodes(V, facets, INNER), edge_nodes(V, facets, OUTER)
-        self.radial = np.zeros_like(x)
-        self.radial[self.inner] = x[self.inner] / A
-        supports = [Support("wall", k, self.inner, self.radial[self.inner, k]) for k in range(2)]
-        supports += [Support("x", 1, edge_nodes(V, facets, ON_X)), Support("y", 0, edge_nodes(V, facets, ON_Y))]
-        self.problem = Equilibrium(V, self.bulk, supports)
-        self.solver = NewtonSolver(self.problem)
+        sets = {"inner": INNER, "outer": OUTER, "x": ON_X, "y": ON_Y}
+        mesh = TaggedMesh(*quarter_annulus(MPI.COMM_SELF, A, B, size), {"ring": 1}, sets)
+        body = Body("ring", J2Material(E, NU, "strain", LinearHardening(SIGY, hardening)))
+        supports = [Support("wall", "inner", k, lambda x, k=k: x[:, k] / A) for k in range(2)]
+        supports += [Support("x", "x", 1), Support("y", "y", 0)]
+        system = System(Problem(mesh, [body], supports=supports))
+        self.cells, self.V, self.bulk = mesh.cells, system.V, system.bulk
+        self.problem, self.solver = system.equilibrium, system.solver
+        inner, self.outer = edge_nodes(self.V, mesh.facets, INNER), edge_nodes(self.V, mesh.facets, OUTER)
+        self.radial = np.zeros_like(coordinates(self.V))
+        self.radial[inner] = coordinates(self.V)[inner] / A
 
     def step(self, wall: float) -> None:
         result = self.solver.solve(wall, self.problem.state())

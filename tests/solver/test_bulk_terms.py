@@ -51,7 +51,7 @@ def stiffness(bulk):
     """Tangent of the last update, without supports."""
     A = matrix(bulk.V, bulk.pattern_forms())
     bulk.assemble_elastic(A, [])
-    bulk.assemble_softening(A, [])
+    bulk.assemble_correction(A, [])
     A.assemble()
     return scipy_matrix(A)
 

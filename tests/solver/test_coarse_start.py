@@ -9,6 +9,7 @@ from mpi4py import MPI
 from archord.benchmarks.case import paper_joint
 from archord.geometry.curve import ProjectionError
 from archord.output.run import solve_scene
+from archord.presets import joint as preset
 from archord.scene.scene import Stepping
 from archord.solver import coarse_start
 from tests.solver.solving import SEVERAL
@@ -27,7 +28,7 @@ SCENES = {
 @pytest.fixture
 def always(monkeypatch):
     monkeypatch.setattr(coarse_start, "_FEWEST_DOFS", 1000)
-    monkeypatch.setattr(coarse_start, "_COARSEST", 0.3)
+    monkeypatch.setattr(preset, "_COARSEST", 0.3)
 
 
 def run(scene, folder, comm=MPI.COMM_SELF):
@@ -46,7 +47,7 @@ def test_the_solution_is_that_without_it(name, tmp_path, monkeypatch):
     scene = SCENES[name]
     plain, without = run(scene, tmp_path / "plain")
     monkeypatch.setattr(coarse_start, "_FEWEST_DOFS", 1000)
-    monkeypatch.setattr(coarse_start, "_COARSEST", 0.3)
+    monkeypatch.setattr(preset, "_COARSEST", 0.3)
     guessed, report = run(scene, tmp_path / "guessed")
     assert sum(s["coarse_iterations"] for s in report["steps"]) > 0
     assert not any(s["coarse_iterations"] for s in without["steps"])
@@ -72,10 +73,10 @@ def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always)
     """The fine joint goes on by itself."""
     scene = paper_joint(0.1, 4, yield_stress=0.002)
     plain = solve_scene(scene, _made(tmp_path / "plain"), MPI.COMM_SELF)
-    make = coarse_start._coarser
+    make = preset._coarser
     easy = {"max_iterations": 2}
     monkeypatch.setattr(
-        coarse_start,
+        preset,
         "_coarser",
         lambda s: make(s).model_copy(update={"analysis": make(s).analysis.model_copy(update=easy)}),
     )
@@ -85,15 +86,16 @@ def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always)
 
 def test_a_mesh_too_coarse_for_the_contact_is_gone_without(monkeypatch, always):
     """The fine joint is solved as if there were none."""
-    true_joint, asked = coarse_start.Joint, []
+    joint, asked = preset.Joint(SCENES["elastic"], MPI.COMM_SELF), []
 
-    def joint(scene, comm):
-        asked.append(scene.joint.h)
+    def too_coarse(problem):
+        asked.append(problem.mesh.mesh.topology.index_map(2).size_global)
         raise ProjectionError("no closest point")
 
-    monkeypatch.setattr(coarse_start, "Joint", joint)
-    assert coarse_start.coarse_start(true_joint(SCENES["elastic"], MPI.COMM_SELF)) is None
-    assert asked == [pytest.approx(0.18)]
+    monkeypatch.setattr(coarse_start, "System", too_coarse)
+    assert coarse_start.coarse_start(joint) is None
+    assert len(asked) == 1
+    assert asked[0] < joint.n_cells / 2
 
 
 def test_cut_steps_take_the_coarse_joint_back_too(tmp_path, monkeypatch, always):

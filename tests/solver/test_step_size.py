@@ -8,15 +8,15 @@ import pytest
 from pydantic import ValidationError
 
 from archord.scene.scene import Stepping
-from archord.solver.load_path import Walk
+from archord.solver.load_path import LoadPath
 from archord.solver.newton import Newton
-from archord.solver.stepping import StepFailure, StepSize, march
+from archord.solver.stepping import StepFailure, StepRules, StepSize, march
 
 
 class Spring:
     """Equilibrium and solver in one, which converges in ``cost(load, stride)`` iterations; infinite: it fails."""
 
-    load_name = "delta"
+    problem = SimpleNamespace(load_name="delta", control="factor", loads=[])
     elastic = False
 
     def __init__(self, cost):
@@ -45,9 +45,9 @@ class Spring:
 def follow(targets, cost=lambda load, stride: 3, **rules):
     spring, done, accepted = Spring(cost), [], []
     march(
-        Walk(spring, lambda load: np.zeros(1)),
+        LoadPath(spring, lambda load: np.zeros(1)),
         targets,
-        rules=Stepping(**rules),
+        rules=StepRules(**rules),
         substep_done=accepted.append,
         target_done=lambda step, position: done.append(SimpleNamespace(step=step, at=position.load)),
     )
@@ -75,10 +75,8 @@ def test_an_elastic_step_that_fails_starts_from_the_last_state_before_it_is_cut(
     """No cutback, and the iterations of both solves count."""
     spring, done = Kinked(), []
     march(
-        Walk(spring, lambda load: np.zeros(1)),
+        LoadPath(spring, lambda load: np.zeros(1)),
         [1.0, 2.0, 3.0],
-        rules=Stepping(),
-        substep_done=lambda load: None,
         target_done=lambda step, position: done.append(step),
     )
     assert [(s.cutbacks, s.substeps, s.iterations) for s in done] == [(0, 1, 3), (0, 1, 8), (0, 1, 8)]
@@ -147,7 +145,7 @@ def test_rules_that_contradict_themselves_are_refused(rules):
 
 def test_a_length_never_leaves_its_bounds():
     """Whatever the order of successes and failures."""
-    rules, rng = Stepping(initial=0.2, minimum=0.01, maximum=0.5, growth=1.7, cutback=0.3), np.random.default_rng(0)
+    rules, rng = StepRules(initial=0.2, minimum=0.01, maximum=0.5, growth=1.7, cutback=0.3), np.random.default_rng(0)
     size = StepSize(rules)
     for easy in rng.random(200) < 0.5:
         size.accepted(3) if easy else size.failed()

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from archord.scene.scene import Stepping
-from archord.solver.stepping import StepFailure, march
+from archord.solver.stepping import StepFailure, StepRules, march
 from tests.solver.solving import scene, solve
 
 
@@ -49,10 +48,9 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
         StepFailure, match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller"
     ):
         march(
-            joint.walk(),
+            joint.load_path(),
             targets,
-            rules=Stepping(minimum=1.0),
-            substep_done=lambda load: None,
+            rules=StepRules(minimum=1.0),
             target_done=lambda step, position: accepted.append(step.load),
         )
     assert accepted == targets[:4]

@@ -105,16 +105,16 @@ def test_a_signal_ends_the_batch_on_all_ranks(comm, tmp_path):
 @pytest.mark.mpi
 def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
     """Whichever rank has them."""
-    from archord.presets.joint import Joint
+    from archord.presets import joint
 
-    true_mesh = Joint._mesh
+    true_mesh = joint._block_mesh
 
-    def broken(self, partitioner):
-        if self.scene.pin.E < 0.75:
+    def broken(scene, comm, partitioner):
+        if scene.pin.E < 0.75:
             raise ValueError("broken")
-        return true_mesh(self, partitioner)
+        return true_mesh(scene, comm, partitioner)
 
-    monkeypatch.setattr(Joint, "_mesh", broken)
+    monkeypatch.setattr(joint, "_block_mesh", broken)
     _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 0.6, 0.7, 0.8, 1.0, 1.82]\n")
     results = []
     assert Farm(comm).run(jobs, results.append) == 0

@@ -11,60 +11,33 @@ from mpi4py import MPI
 from archord.materials.elasticity import contact_modulus
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
-from archord.solver.bulk import Body, Bulk
-from archord.solver.contact.contact import Contact
-from archord.solver.contact.surface import ContactSide
-from archord.solver.equilibrium import Support
-from tests.solver.parts import (
-    BASE,
-    ELASTIC,
-    LEFT,
-    LID,
-    LOWER,
-    LOWER_TOP,
-    NU,
-    RIGHT,
-    UPPER,
-    UPPER_BOTTOM,
-    E,
-    coordinates,
-    edge_nodes,
-    solve,
-    space,
-    two_blocks,
-)
+from archord.solver.problem import Body, Interaction, Problem, Support
+from tests.solver.parts import ELASTIC, NU, E, coordinates, solve, two_blocks
 
 DEPTH = 0.01
-every_kinematics = pytest.mark.parametrize("kinematics", ["current", "reference", "tied"])
-every_integration = pytest.mark.parametrize("one_sided", [None, 0, 1], ids=["both", "upper", "lower"])
+KINDS = {"current": {}, "reference": {"kinematics": "reference"}, "tied": {"law": "tied"}}
+every_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+every_integration = pytest.mark.parametrize(
+    "integrated", ["", "upper bottom", "lower top"], ids=["both", "upper", "lower"]
+)
+PRESSED = [Support("base", "base", 1), Support("lid", "lid", 1, -1.0), Support("left", "left", 0)]  # free to widen
 
 
 class Blocks:
     """Two unit squares with ``n_lower`` and ``n_upper`` edges on their common line; the upper side comes first."""
 
-    def __init__(self, n_lower: int, n_upper: int, lower=ELASTIC, upper=ELASTIC, **contact_options) -> None:
-        mesh, cells, facets = two_blocks(MPI.COMM_SELF, n_lower, n_upper)
-        self.V, self.facets = space(mesh), facets
-        self.bulk = Bulk(self.V, cells, [Body(LOWER, lower), Body(UPPER, upper)])
-        self.upper = ContactSide(self.V, facets, UPPER_BOTTOM, upper)
-        self.lower = ContactSide(self.V, facets, LOWER_TOP, lower)
-        self.contact = Contact([self.upper, self.lower], **contact_options)
-
-    def press(self, loads=(DEPTH,)) -> np.ndarray:
-        """Lid down by the loads, free to slide sideways from the left edge; returns the displacement."""
-        nodes = {tag: edge_nodes(self.V, self.facets, tag) for tag in (BASE, LID, LEFT)}
-        supports = [
-            Support("base", 1, nodes[BASE]),
-            Support("lid", 1, nodes[LID], -1.0),
-            Support("left", 0, nodes[LEFT]),
-        ]
-        self.problem = solve(self.V, self.bulk, supports, self.contact, loads)
-        self.force = -self.problem.reaction("lid")[1]
-        return self.problem.displacement()
+    def __init__(self, n_lower, n_upper, lower=ELASTIC, upper=ELASTIC, loads=(DEPTH,), supports=PRESSED, **contact):
+        mesh = two_blocks(MPI.COMM_SELF, n_lower, n_upper)
+        bodies = [Body("lower", lower), Body("upper", upper)]
+        joint = Interaction("joint", ("upper bottom", "lower top"), **contact)
+        self.system = solve(Problem(mesh, bodies, [joint], supports), loads)
+        self.V, self.u = self.system.V, self.system.equilibrium.displacement()
+        self.force = -self.system.reaction("lid")[1]
 
     def pressures(self) -> np.ndarray:
         """Pressure at all points of the integrated sides."""
-        return np.concatenate([self.contact.state(pair.side).pressure.ravel() for pair in self.contact.pairings])
+        contact = self.system.contact
+        return np.concatenate([contact.state(pair.side).pressure.ravel() for pair in contact.pairings])
 
 
 def uniform(V):
@@ -74,12 +47,12 @@ def uniform(V):
     return contact_modulus(E, NU, "strain") * DEPTH / 2, u
 
 
-@every_kinematics
+@every_kind
 @every_integration
-def test_matching_meshes_pass(one_sided, kinematics):
+def test_matching_meshes_pass(integrated, kind):
     """Uniform pressure, linear displacement and the closed form's force, to round-off."""
-    blocks = Blocks(4, 4, one_sided=one_sided, kinematics=kinematics)
-    u = blocks.press()
+    blocks = Blocks(4, 4, integrated=integrated, **kind)
+    u = blocks.u
     pressure, expected = uniform(blocks.V)
     np.testing.assert_allclose(blocks.pressures(), pressure, rtol=1e-9)
     np.testing.assert_allclose(u, expected, rtol=0, atol=1e-9 * DEPTH)
@@ -90,61 +63,57 @@ def test_unlike_materials_slide_on_each_other():
     """Frictionless: each block widens by its own Poisson's ratio under the common pressure (reference pairs match)."""
     stiff = replace(ELASTIC, E=5 * E, nu=0.1)
     blocks = Blocks(4, 4, upper=stiff, kinematics="reference")
-    u = blocks.press()
+    u = blocks.u
     pressure = DEPTH / sum(1 / contact_modulus(m.E, m.nu, "strain") for m in (ELASTIC, stiff))
     assert blocks.force == pytest.approx(pressure, rel=1e-9)
     np.testing.assert_allclose(blocks.pressures(), pressure, rtol=1e-9)
-    right = edge_nodes(blocks.V, blocks.facets, RIGHT)
-    y = coordinates(blocks.V)[right, 1]
-    for m, block in ((stiff, right[y > 0.1]), (ELASTIC, right[y < -0.1])):
+    x = coordinates(blocks.V)
+    right = np.isclose(x[:, 0], 1)
+    for m, block in ((stiff, right & (x[:, 1] > 0.1)), (ELASTIC, right & (x[:, 1] < -0.1))):
         np.testing.assert_allclose(u[block, 0], m.nu * (1 + m.nu) / m.E * pressure, rtol=1e-9)
 
 
-@every_kinematics
-def test_matching_plastic_blocks_pass(kinematics):
+@every_kind
+def test_matching_plastic_blocks_pass(kind):
     """Beyond yield, with hardening: uniform pressure, stress and PEEQ."""
     plastic = J2Material(E, NU, "strain", LinearHardening(0.005, 0.1 * E))
-    blocks = Blocks(3, 3, plastic, plastic, kinematics=kinematics)
-    u = blocks.press(DEPTH * np.array([0.5, 1.0, 1.5]))
-    fields = blocks.bulk.cell_fields(u)
+    blocks = Blocks(3, 3, plastic, plastic, loads=DEPTH * np.array([0.5, 1.0, 1.5]), **kind)
+    fields = blocks.system.bulk.cell_fields(blocks.u)
     assert fields.peeq.min() > 1e-3
     assert np.ptp(fields.peeq) < 1e-8 * fields.peeq.max()
     assert np.ptp(fields.von_mises) < 1e-8 * fields.von_mises.max()
     np.testing.assert_allclose(blocks.pressures(), blocks.force, rtol=1e-8)
 
 
-@every_kinematics
+@every_kind
 @every_integration
 @pytest.mark.parametrize(("n_lower", "n_upper"), [(4, 7), (9, 5), (2, 7)])
-def test_non_matching_meshes_pass(n_lower, n_upper, one_sided, kinematics):
+def test_non_matching_meshes_pass(n_lower, n_upper, integrated, kind):
     """The same on meshes that match nowhere, whichever side is integrated."""
-    blocks = Blocks(n_lower, n_upper, one_sided=one_sided, kinematics=kinematics)
-    u = blocks.press()
+    blocks = Blocks(n_lower, n_upper, integrated=integrated, **kind)
+    u = blocks.u
     pressure, expected = uniform(blocks.V)
     np.testing.assert_allclose(blocks.pressures(), pressure, rtol=1e-9)
     np.testing.assert_allclose(u, expected, rtol=0, atol=1e-9 * DEPTH)
     assert blocks.force == pytest.approx(pressure, rel=1e-9)
 
 
-@pytest.mark.parametrize(("n_lower", "n_upper", "one_sided"), [(4, 4, None), (4, 7, None), (9, 5, 0)])
-def test_a_tied_line_passes_shear_and_tension(n_lower, n_upper, one_sided):
+@pytest.mark.parametrize(("n_lower", "n_upper", "integrated"), [(4, 4, ""), (4, 7, ""), (9, 5, "upper bottom")])
+def test_a_tied_line_passes_shear_and_tension(n_lower, n_upper, integrated):
     """Any linear displacement imposed all around leaves no force on the nodes within: the tie is not seen."""
-    blocks = Blocks(n_lower, n_upper, one_sided=one_sided, kinematics="tied")
-    x = coordinates(blocks.V)
-    around = np.unique(np.concatenate([edge_nodes(blocks.V, blocks.facets, t) for t in (BASE, LID, LEFT, RIGHT)]))
     A = np.array([[0.3, 0.8], [-0.2, 1.0]])
-    expected = x @ A.T
-    supports = [Support("around", k, around, expected[around, k]) for k in range(2)]
-    problem = solve(blocks.V, blocks.bulk, supports, blocks.contact, [DEPTH])
-    np.testing.assert_allclose(problem.displacement(), DEPTH * expected, rtol=0, atol=1e-10 * DEPTH)
+    supports = [
+        Support("around", facets, axis, lambda x, axis=axis: x @ A[axis])
+        for facets in ("base", "lid", "left", "right")
+        for axis in range(2)
+    ]
+    blocks = Blocks(n_lower, n_upper, supports=supports, law="tied", integrated=integrated)
+    np.testing.assert_allclose(blocks.u, DEPTH * coordinates(blocks.V) @ A.T, rtol=0, atol=1e-10 * DEPTH)
 
 
-def test_frictionless_blocks_carry_no_shear_and_no_tension():
+@pytest.mark.parametrize("rates", [(0.0, 1.0), (1.0, 0.0)], ids=["pulled", "pushed aside"])
+def test_frictionless_blocks_carry_no_shear_and_no_tension(rates):
     """A lid pulled up leaves the lower block at rest; one pushed aside drags nothing along."""
-    blocks = Blocks(4, 4)
-    V, facets = blocks.V, blocks.facets
-    lid, base = edge_nodes(V, facets, LID), edge_nodes(V, facets, BASE)
-    for rates in ((0.0, 1.0), (1.0, 0.0)):
-        supports = [Support("base", k, base) for k in range(2)] + [Support("lid", k, lid, rates[k]) for k in range(2)]
-        u = solve(V, blocks.bulk, supports, blocks.contact, [DEPTH]).displacement()
-        assert np.abs(u[coordinates(V)[:, 1] < -0.1]).max() < 1e-10 * DEPTH
+    supports = [Support("base", "base", k) for k in range(2)] + [Support("lid", "lid", k, rates[k]) for k in range(2)]
+    blocks = Blocks(4, 4, supports=supports)
+    assert np.abs(blocks.u[coordinates(blocks.V)[:, 1] < -0.1]).max() < 1e-10 * DEPTH

@@ -6,8 +6,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.benchmarks.case import paper_joint
-from archord.presets import joint as joint_module
 from archord.presets.joint import Joint
+from archord.solver import equilibrium as equilibrium_module
 from archord.solver.linear import condensed as condensed_module
 from archord.solver.linear.condensed import Condensed
 from tests.solver.solving import solve
@@ -72,9 +72,9 @@ def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin
     short = solve(scene)
     monkeypatch.setattr(condensed_module, "_MOST_REVISIONS", 20)
     patient = solve(scene)
-    monkeypatch.setattr(joint_module, "_MOST_CONDENSED", 0)
+    monkeypatch.setattr(equilibrium_module, "_MOST_CONDENSED", 0)
     long = solve(scene)
-    assert short.joint.tangent_factorisations == 1 < long.joint.tangent_factorisations
+    assert short.joint.factorisations == 1 < long.joint.factorisations
     counts = [[m.iterations for m in run.steps] for run in (short, long)]
     assert max(counts[0]) <= 4
     assert sum(counts[0]) < 0.8 * sum(counts[1])
@@ -93,7 +93,7 @@ def test_the_ranks_take_the_same_way(comm, pin):
     for a, b in zip(many.steps, one.steps, strict=True):
         assert a.iterations == b.iterations
         assert (a.P, a.p0, a.eps) == pytest.approx((b.P, b.p0, b.eps), rel=1e-10)
-    assert many.joint.tangent_factorisations == one.joint.tangent_factorisations == 1
+    assert many.joint.factorisations == one.joint.factorisations == 1
 
 
 def test_only_joints_that_stay_elastic_and_held_are_condensed():

@@ -4,7 +4,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.case import paper_joint
-from archord.presets import joint as joint_module
+from archord.solver import equilibrium as equilibrium_module
 from archord.solver import newton as newton_module
 from archord.solver.linear.bordered import Bordered
 from tests.solver.solving import solve
@@ -15,7 +15,7 @@ RING = {"joint": {"model": "ring"}, "load": {"displacement": None, "relative_for
 
 @pytest.fixture
 def small_is_large(monkeypatch):
-    monkeypatch.setattr(joint_module, "_MOST_CONDENSED", 0)
+    monkeypatch.setattr(equilibrium_module, "_MOST_CONDENSED", 0)
     monkeypatch.setattr(newton_module, "_MANY_DOFS", 0)
 
 
@@ -30,7 +30,7 @@ def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
     for a, b in zip(iterative.steps, direct.steps, strict=True):
         assert (a.P, a.delta, a.p0, a.eps) == pytest.approx((b.P, b.delta, b.p0, b.eps), rel=1e-8)
     iterations = sum(m.iterations for m in iterative.steps)
-    assert iterative.joint.tangent_factorisations < 0.75 * iterations
+    assert iterative.joint.factorisations < 0.75 * iterations
     assert iterations <= 2 * sum(m.iterations for m in direct.steps)
 
 
@@ -40,7 +40,7 @@ def test_many_solves_bring_a_new_factorisation(small_is_large, monkeypatch):
     monkeypatch.setattr(newton_module, "_MANY_SOLVES", 1)
     often = solve(scene)
     P = often.steps[-1].P
-    assert often.joint.tangent_factorisations > usual.joint.tangent_factorisations
+    assert often.joint.factorisations > usual.joint.factorisations
     assert abs(P / usual.steps[-1].P - 1) < 1e-9
 
 
@@ -49,7 +49,7 @@ def test_solvers_that_follow_factorise_as_ever(monkeypatch):
     plastic = paper_joint(0.15, 2, 0.002)
     before = solve(plastic).steps
     monkeypatch.setattr(newton_module, "_MANY_DOFS", 0)
-    monkeypatch.setattr(joint_module, "_MOST_CONDENSED", 0)
+    monkeypatch.setattr(equilibrium_module, "_MOST_CONDENSED", 0)
     solve(paper_joint(0.15, 1))
     assert [m.iterations for m in solve(plastic).steps] == [m.iterations for m in before]
 
@@ -58,7 +58,7 @@ def test_plastic_joints_factorise_every_matrix(small_is_large, monkeypatch):
     scene = paper_joint(0.12, 2, 0.002)
     usual = solve(scene)
     monkeypatch.setattr(newton_module, "_MANY_DOFS", 10**9)
-    assert solve(scene).joint.tangent_factorisations == usual.joint.tangent_factorisations
+    assert solve(scene).joint.factorisations == usual.joint.factorisations
 
 
 def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
@@ -100,8 +100,8 @@ def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
 
 
 def test_many_changes_of_the_contact_bring_a_new_factorisation(small_is_large, monkeypatch):
-    """A guess from afar opens and closes points everywhere: as many factorisations as flips ask for."""
+    """A guess from afar opens and closes points everywhere: as many factorisations as these changes ask for."""
     scene = paper_joint(0.15, 2)
-    usual = solve(scene).joint.tangent_factorisations
-    monkeypatch.setattr(newton_module, "_MANY_FLIPS", 0)
-    assert solve(scene).joint.tangent_factorisations > usual
+    usual = solve(scene).joint.factorisations
+    monkeypatch.setattr(newton_module, "_MANY_CHANGES", 0)
+    assert solve(scene).joint.factorisations > usual

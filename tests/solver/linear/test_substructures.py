@@ -19,7 +19,7 @@ def pressed(degree=2):
     """A joint in contact, and its tangent, unsymmetric as theta = 0 makes it."""
     joint = Joint(paper_joint(0.1, 1, 0.002, analysis={"degree": degree}), MPI.COMM_WORLD)
     at = joint.equilibrium
-    at.restore(0.004, joint.rigid_translation(0.004))
+    at.restore(0.004, joint.first_guess(0.004))
     at.evaluate()
     at.update_tangent()
     return joint, at.tangent.A

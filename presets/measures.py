@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from archord.presets.arc import ArcProfile, arc_profile, peak_pressure, semi_angle
 from archord.presets.joint import Joint
@@ -72,15 +71,12 @@ def measure(
     largest_force: float = 0.0,
 ) -> Measures:
     """Sum up the last accepted state of ``joint``; ``largest_force`` is that of the steps before. Collective."""
-    comm, arcs = joint.comm, list(profiles.values())
-    u = joint.equilibrium.displacement()
-    largest, integral = joint.bulk.peeq()
-    stored, dissipated = joint.bulk.energies(u)
-    total = np.array([integral, stored, dissipated])
-    comm.Allreduce(MPI.IN_PLACE, total)
+    arcs = list(profiles.values())
+    peeq, peeq_integral = joint.peeq()
+    stored, dissipated = joint.energies()
     forces = joint.forces()
     P = forces["pin"]
-    area = 2 * float(np.mean([(p.weight * (p.raw_pressure > 0)).sum() for p in arcs]))
+    area = joint.problem.symmetry * float(np.mean([(p.weight * (p.raw_pressure > 0)).sum() for p in arcs]))
     scale = max(abs(P), largest_force, 0.0 if area else joint.scene.E_star * abs(joint.delta()))
     eps = float(np.mean([semi_angle(p) for p in arcs]))
     return Measures(
@@ -90,10 +86,10 @@ def measure(
         p0=peak_pressure(arcs, eps),
         eps=eps,
         contact_area=area,
-        peeq_max=comm.allreduce(largest, op=MPI.MAX),
-        peeq_integral=2 * total[0],
-        elastic_energy=2 * total[1],
-        plastic_dissipation=2 * total[2],
+        peeq_max=peeq,
+        peeq_integral=peeq_integral,
+        elastic_energy=stored,
+        plastic_dissipation=dissipated,
         work=work.total,
         force_balance=max(abs(f - P) for f in forces.values()) / scale if scale else 0.0,
         iterations=step.iterations,

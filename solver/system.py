@@ -1,0 +1,144 @@
+"""A problem, assembled: displacement space, bulk, contact, equilibrium, Newton's method, and the path of its loads."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import basix.ufl
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from archord.geometry.basis import Array
+from archord.solver.bulk import Body, Bulk
+from archord.solver.contact.contact import Contact
+from archord.solver.contact.surface import ContactSide
+from archord.solver.equilibrium import Equilibrium
+from archord.solver.load_path import LoadPath, Position
+from archord.solver.newton import NewtonSolver
+from archord.solver.problem import Interaction, Problem, Rigid
+from archord.solver.timer import Timer
+
+if TYPE_CHECKING:
+    from archord.solver.coarse_start import CoarseStart
+
+
+class System:
+    """``problem`` ready to be solved; forces and energies are those of the whole, its symmetric parts included.
+
+    ``sides`` holds the surfaces of bodies in contact by the name of their facet set. Collective; raises ValueError for
+    a problem that contradicts itself and `ProjectionError` if a surface does not find its opposite.
+    """
+
+    def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:
+        self.problem, self.timer = problem, timer or Timer()
+        mesh = problem.mesh.mesh
+        self.comm = mesh.comm
+        with self.timer("setup"):
+            variant = basix.LagrangeVariant.equispaced
+            element = basix.ufl.element("P", "triangle", problem.degree, shape=(2,), lagrange_variant=variant)
+            self.V = fem.functionspace(mesh, element)
+            bodies = [Body(problem.tag(body), body.material) for body in problem.bodies]
+            self.bulk = Bulk(self.V, problem.mesh.cells, bodies)
+            self.sides: dict[str, ContactSide] = {}
+            self.contact = self._contact(problem.interactions)
+            rates = [s.rate for i in problem.interactions for s in i.surfaces if isinstance(s, Rigid)]
+            self.equilibrium = Equilibrium(
+                problem,
+                self.V,
+                self.bulk,
+                self.contact,
+                rates[0] if rates else None,
+                timer=self.timer,
+            )
+            self.solver = NewtonSolver(
+                self.equilibrium, tolerance=problem.tolerance, max_iterations=problem.max_iterations
+            )
+
+    def _contact(self, interactions) -> Contact | None:
+        if not interactions:
+            return None
+        if len(interactions) > 1:
+            raise NotImplementedError("several interactions")
+        one: Interaction = interactions[0]
+        rigid = None
+        for surface in one.surfaces:
+            if isinstance(surface, Rigid):
+                rigid = surface.circle
+            else:
+                material = self.problem.body_of(surface).material
+                tag = self.problem.mesh.facet_sets[surface]
+                self.sides[surface] = ContactSide(self.V, self.problem.mesh.facets, tag, material)
+        return Contact(
+            list(self.sides.values()),
+            rigid=rigid,
+            kinematics="tied" if one.law == "tied" else one.kinematics,
+            gamma_factor=one.gamma_factor,
+            one_sided=list(self.sides).index(one.integrated) if one.integrated else None,
+            slide=one.slide,
+        )
+
+    def nodes_of(self, tag: int) -> np.ndarray:
+        """Nodes ``(n,)`` of this rank, ghosts included, in the cells with this ``tag``."""
+        return np.unique(self.V.dofmap.list[self.problem.mesh.cells.find(tag)])
+
+    def load_path(self, at: Position | None = None, coarse: CoarseStart | None = None) -> LoadPath:
+        """The path of the problem's loads, from the position ``at`` or the beginning."""
+        return LoadPath(self.solver, self.first_guess, from_rest=self.problem.from_rest, at=at, coarse=coarse)
+
+    def first_guess(self, load: float) -> Array:
+        """A state of the equilibrium, with every body moved rigidly as the problem's guess says."""
+        guess = self.problem.guess(load)
+        u = np.zeros((self.equilibrium.n_local, 2))
+        for body in self.problem.bodies:
+            u[self.nodes_of(self.problem.tag(body))] = guess.moved.get(body.name, 0.0)
+        return np.append(u, guess.factor)
+
+    # ------------------------------------------------------------------ what is asked of the last evaluation
+
+    def reaction(self, name: str) -> Array:
+        """Force ``(2,)`` of the supports ``name`` on the whole."""
+        return self.problem.symmetry * self.equilibrium.reaction(name)
+
+    def contact_force(self) -> Array:
+        """Force ``(2,)`` of the contact on its second surface."""
+        return self.problem.symmetry * self.contact.resultant()
+
+    def driving_force(self) -> float:
+        """The force whose work is that of the load: on the load factor, or the load where there are ``loads``."""
+        if self.problem.loads:
+            return self.equilibrium.load
+        return self.problem.symmetry * self.equilibrium.force_on_factor()
+
+    def driven(self) -> float:
+        """The displacement on which that force works: the load factor, or the mean one along the ``loads``."""
+        if not self.problem.loads:
+            return self.equilibrium.factor
+        u = self.equilibrium.displacement()[: self.equilibrium.n_owned]
+        return self.problem.symmetry * self.comm.allreduce(float((self.equilibrium.applied * u).sum()))
+
+    def energies(self) -> tuple[float, float]:
+        """Elastic energy and plastic dissipation of the whole."""
+        parts = np.array(self.bulk.energies(self.equilibrium.displacement()))
+        stored, dissipated = self.problem.symmetry * self.comm.allreduce(parts)
+        return float(stored), float(dissipated)
+
+    def peeq(self) -> tuple[float, float]:
+        """Largest PEEQ at a quadrature point, and the integral of PEEQ over the whole."""
+        largest, integral = self.bulk.peeq()
+        return self.comm.allreduce(largest, op=MPI.MAX), self.problem.symmetry * self.comm.allreduce(integral)
+
+    @property
+    def factorisations(self) -> int:
+        """Number of sparse factorisations so far."""
+        return self.equilibrium.tangent.factorisations
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of displacement dofs, prescribed ones included."""
+        return 2 * self.V.dofmap.index_map.size_global
+
+    @property
+    def n_cells(self) -> int:
+        """Number of triangles."""
+        return self.problem.mesh.mesh.topology.index_map(2).size_global
