@@ -1,23 +1,25 @@
-"""The peers of the benchmark "error against run time" that are here: ``python3 -m archord.benchmarks.peers.installed``.
+"""The codes beside archord that are here: ``python3 -m archord.benchmarks.peers.installed`` lists them.
 
-A peer is one standalone script of this folder. Interpreters are tried in turn: that of
-`archord.benchmarks.peers.environment` (scikit-fem, NGSolve), then this one (GetFEM, which the image target ``peers``
-has).
+A peer is one standalone script of this folder. With ``--install`` those that PyPI has get a virtual environment of
+their own, ``.cache/peers-venv`` in the checkout, without the system's packages, so that their numpy and archord's do
+not meet. About 1.5 GB, most of it MKL (PARDISO, scikit-fem's linear solver). Where a proxy signs with its own
+authority: ``docker/run env PIP_CERT=.cache/ca.pem python3 -m archord.benchmarks.peers.installed --install``.
 """
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
+import venv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from archord.benchmarks.peers.environment import interpreter
-
 CASES = ("elastic", "plastic")
+PLACE = Path(__file__).resolve().parents[2] / ".cache" / "peers-venv"
+PACKAGES = ("scikit-fem==12.0.2", "pypardiso==0.4.7", "gmsh==4.15.2", "ngsolve==6.2.2608")
 _PROBE_LIMIT = 120.0  # seconds; the first import from a cold disk is slow
-_FOLDER = Path(__file__).resolve().parent
 
 Meshes = tuple[tuple[float, int], ...]
 
@@ -42,36 +44,29 @@ class Peer:
         return [self.python, str(self.script), *(str(word) for option in options.items() for word in option)]
 
 
-def _sizes(order: int, *sizes: float) -> Meshes:
-    return tuple((size, order) for size in sizes)
+def _peer(label: str, elastic: Mapping[int, Sequence[float]], plastic: Mapping[int, Sequence[float]]) -> Peer:
+    """The peer ``label`` with its element sizes by order."""
+    script = Path(__file__).with_name(f"{label.lower().replace('scikit-', 'sk')}_joint.py")
+    series = (tuple((size, order) for order in sizes for size in sizes[order]) for sizes in (elastic, plastic))
+    return Peer(label, script, dict(zip(CASES, series, strict=True)))
 
 
 PEERS = (
-    Peer(
-        "scikit-fem",
-        _FOLDER / "skfem_joint.py",
-        {
-            "elastic": _sizes(2, 0.16, 0.08, 0.04, 0.02, 0.01),
-            "plastic": _sizes(2, 0.16, 0.08, 0.04, 0.02),
-        },
-    ),
-    Peer(
-        "GetFEM",
-        _FOLDER / "getfem_joint.py",
-        {
-            "elastic": _sizes(2, 0.16, 0.08, 0.04, 0.02),
-            "plastic": _sizes(2, 0.16, 0.08, 0.04, 0.02),
-        },
-    ),
-    Peer(
+    _peer("scikit-fem", {2: (0.16, 0.08, 0.04, 0.02, 0.01)}, {2: (0.16, 0.08, 0.04, 0.02)}),
+    _peer("GetFEM", {2: (0.16, 0.08, 0.04, 0.02)}, {2: (0.16, 0.08, 0.04, 0.02)}),
+    _peer(
         "NGSolve",
-        _FOLDER / "ngsolve_joint.py",
-        {
-            "elastic": _sizes(2, 0.08, 0.04, 0.02) + _sizes(4, 0.16, 0.08, 0.04, 0.02),
-            "plastic": _sizes(2, 0.08, 0.04, 0.02) + _sizes(4, 0.16, 0.08, 0.04),
-        },
+        {2: (0.08, 0.04, 0.02), 4: (0.16, 0.08, 0.04, 0.02)},
+        {2: (0.08, 0.04, 0.02), 4: (0.16, 0.08, 0.04)},
     ),
 )
+
+
+def install(place: Path = PLACE) -> None:
+    """Make the environment, in place of one that is there. Raises `subprocess.CalledProcessError` if pip fails."""
+    venv.create(place, clear=True, with_pip=False)
+    pip = [sys.executable, "-m", "pip", "--python", str(place / "bin" / "python"), "install", "--progress-bar", "off"]
+    subprocess.run([*pip, *PACKAGES], check=True)
 
 
 def probe(peer: Peer, python: str) -> str | None:
@@ -85,21 +80,31 @@ def probe(peer: Peer, python: str) -> str | None:
 
 
 def installed(pythons: Sequence[str] | None = None) -> list[Peer]:
-    """The peers that run here, each with its interpreter and version; ``pythons`` are tried in turn."""
+    """The peers that run here, each with its interpreter and version.
+
+    ``pythons`` are tried in turn: that of the environment (scikit-fem, NGSolve), then this one (GetFEM, which the image
+    target ``peers`` has).
+    """
     if pythons is None:
-        pythons = [python for python in (str(interpreter()), sys.executable) if Path(python).exists()]
+        pythons = [python for python in (str(PLACE / "bin" / "python"), sys.executable) if Path(python).exists()]
     found = []
     for peer in PEERS:
-        for python in pythons:
-            version = probe(peer, python)
-            if version is not None:
-                found.append(Peer(peer.label, peer.script, peer.series, peer.time_limit, python, version))
-                break
+        versions = ((python, probe(peer, python)) for python in pythons)
+        here = next((replace(peer, python=python, version=v) for python, v in versions if v is not None), None)
+        found += [here] if here else []
     return found
 
 
 def main() -> int:
-    """Print what is installed; returns the exit code."""
+    """List what is installed; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python3 -m archord.benchmarks.peers.installed", description=main.__doc__)
+    parser.add_argument("--install", action="store_true", help="install what PyPI has into .cache/peers-venv before")
+    if parser.parse_args().install:
+        try:
+            install()
+        except subprocess.CalledProcessError as error:
+            print(f"pip could not install {', '.join(PACKAGES)} (exit code {error.returncode}).", file=sys.stderr)
+            return 2
     for peer in installed():
         print(f"{peer.label} {peer.version}: {peer.python} {peer.script}")
     return 0

@@ -1,11 +1,10 @@
 """The paper's quarter joint by NGSolve: ``python3 ngsolve_joint.py --case elastic --order 4 --output r.json``.
 
-Needs NGSolve (of PyPI) and nothing of archord. Units: R = 1, E* = 1.
+Needs NGSolve (of PyPI) and nothing of archord but `joint_script` beside it.
 
-- Bodies: Netgen's triangles, curved to the order of the displacements (2 to 4), small strains, plane strain. Edges
-  have the size h on the arcs and grow by 0.25 times the distance from there, below h = 0.04 by 6.25 h times. With
-  Netgen's grading that large P2 elements are coarser than gmsh's and four times as wrong: 0.6 of it makes about as
-  many.
+- Bodies: Netgen's triangles, curved to the order of the displacements (2 to 4). Edges have the size h on the arcs and
+  grow by 0.25 times the distance from there, below h = 0.04 by 6.25 h times. With Netgen's grading that large P2
+  elements are coarser than gmsh's and four times as wrong: 0.6 of it makes about as many.
 - Contact: kinematics "reference", NGSolve's ContactBoundary paired once, in the touching configuration: a linear gap
   along the pin's normal, and the energy k/2 <-g>^2 with k = 1e5 E*/R (penalty).
 - Plasticity: J2, perfect, backward Euler. A step minimises the incremental energy, which for the elastic trial
@@ -18,18 +17,14 @@ Needs NGSolve (of PyPI) and nothing of archord. Units: R = 1, E* = 1.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import sys
 from importlib.metadata import version
-from pathlib import Path
 
-R, DR, WIDTH, NU = 1.0, 0.005, 100.0, 0.3
-E = 2 * (1 - NU**2)
-MU, LAME = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
-SIGY, PENALTY = 0.002, 1e5
-TOLERANCE, FAR, ITERATIONS, CUTS = 1e-8, 1e3, 25, 6  # residuals over the reaction
+from joint_script import BLOCK, DR, ITERATIONS, LAME, MU, PIN, SIGY, WIDTH, NoConvergence, main
+
+PENALTY = 1e5
+TOLERANCE, FAR = 1e-8, 1e3  # residuals over the reaction
 
 
 def mesh_joint(size: float, growth: float, order: int):
@@ -51,16 +46,12 @@ def mesh_joint(size: float, growth: float, order: int):
                 edge.name = f"{name}_axis"
         return face
 
-    pin = body("pin", -DR, R, [(0, -DR)])
-    block = body("block", 0.0, R + DR, [(WIDTH, 0), (WIDTH, -WIDTH), (0, -WIDTH)])
+    pin = body("pin", *PIN, [(0, -DR)])
+    block = body("block", *BLOCK, [(WIDTH, 0), (WIDTH, -WIDTH), (0, -WIDTH)])
     geometry = occ.OCCGeometry(occ.Compound([pin, block]), dim=2)
     grading = growth if order > 2 else 0.6 * growth
     mesh = ng.Mesh(geometry.GenerateMesh(maxh=WIDTH, grading=grading, segmentsperedge=1, curvaturesafety=0.1))
     return mesh.Curve(order)
-
-
-class NoConvergence(RuntimeError):
-    """Newton's method found no equilibrium."""
 
 
 class Joint:
@@ -75,6 +66,7 @@ class Joint:
         self.top.components[1].Set(1, definedon=mesh.Boundaries("pin_top"))
         self.rigid.components[1].Set(1, definedon=mesh.Materials("pin"))
         self.dofs, self.plastic, self.inverse = space.ndof, plastic, None
+        self.zero = self.u.vec.FV().NumPy().copy()
 
         points = ng.comp.IntegrationRuleSpace(mesh, order=2 * order - 2)
         dx = ng.dx(intrules=points.GetIntegrationRules())
@@ -124,8 +116,23 @@ class Joint:
             self.next.Interpolate(self.returned)
             self.strain.vec.data = self.next.vec
 
-    def newton(self) -> int:
-        """Equilibrium from the present displacement on, whose prescribed values stay; returns the iterations."""
+    def results(self) -> dict[str, float | None]:
+        """Force of the whole joint; what presses on a point, NGSolve does not tell."""
+        return {"P": 2 * self.reaction}
+
+    def elastic(self, delta: float):
+        """The state at ``delta`` of bodies that do not yield; from then on they do."""
+        found, _ = self.solve(-delta * self.rigid.vec.FV().NumPy(), delta)
+        self.yielding.Set(1.0)
+        return found
+
+    def solve(self, guess, delta: float):
+        """Equilibrium from the displacements ``guess`` on, whose prescribed values stay: those, and iterations."""
+        self.u.vec.FV().NumPy()[:] = guess
+        iterations = self._newton()
+        return self.u.vec.FV().NumPy().copy(), iterations
+
+    def _newton(self) -> int:
         form, residual, step = self.form, self.u.vec.CreateVector(), self.u.vec.CreateVector()
         free = ng.Projector(self.space.FreeDofs(), True)
         for iteration in range(ITERATIONS):
@@ -152,62 +159,10 @@ class Joint:
         raise NoConvergence
 
 
-def load(joint: Joint, steps: int, delta: float) -> int:
-    """Press the pin down by ``delta`` in equal steps, cut where need be; returns the iterations."""
-    u = joint.u.vec
-    u.data = -delta / steps * joint.rigid.vec
-    joint.newton()
-    rate, old = u.CreateVector(), u.CreateVector()
-    rate.data, old[:] = steps * u, 0.0  # du/dt, at first that of the elastic joint
-    joint.yielding.Set(1.0)
-    t, iterations, cut = 0.0, 0, 0
-    for step in range(1, steps + 1):
-        while t < step / steps - 1e-12:
-            dt = min(step / steps - t, 0.5**cut / steps)
-            u.data = old + dt * rate
-            try:
-                iterations += joint.newton()
-            except NoConvergence:
-                cut, iterations = cut + 1, iterations + ITERATIONS
-                if cut > CUTS:
-                    raise NoConvergence(f"no equilibrium beyond {t * delta / DR:.3f} dR") from None
-                continue
-            joint.commit()
-            rate.data = 1 / dt * (u - old)
-            old.data, t, cut = u, t + dt, max(cut - 1, 0)
-    return iterations
-
-
-def main() -> int:
-    """Solve what the command line says; returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--case", choices=["elastic", "plastic"], default="elastic")
-    parser.add_argument("--size", type=float, default=0.04, help="edge length on the arcs over R")
-    parser.add_argument("--growth", type=float, help="growth of the edges per distance; min(0.25, 6.25 size) if absent")
-    parser.add_argument("--order", type=int, choices=[2, 3, 4], default=2)
-    parser.add_argument("--steps", type=int, default=2, help="equal steps to delta = 2 dR")
-    parser.add_argument("--output", type=Path, default=Path("result.json"))
-    parser.add_argument("--probe", action="store_true", help="print the version if installed, else exit with 1")
-    options = parser.parse_args()
-    if options.probe:
-        print(version("ngsolve"))
-        return 0
-    growth = options.growth or min(0.25, 6.25 * options.size)
-    result: dict = {"kinematics": "reference", "P": None, "p0": None, "eps": None, "iterations": 0, "failed": None}
-    joint = Joint(options.size, growth, options.order, options.case == "plastic")
-    try:
-        result["iterations"] = load(joint, options.steps, 2 * DR)
-        result["P"] = 2 * joint.reaction
-    except NoConvergence as error:
-        result["failed"] = str(error)
-    options.output.write_text(json.dumps(result | {"dofs": joint.dofs}), encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
     try:
         import ngsolve as ng
         from netgen import occ
     except ImportError as missing:
         sys.exit(f"NGSolve cannot run here: {missing}")
-    sys.exit(main())
+    sys.exit(main(Joint, "reference", lambda: version("ngsolve"), (2, 3, 4)))

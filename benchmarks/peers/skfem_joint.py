@@ -1,72 +1,30 @@
 """The paper's quarter joint by scikit-fem: ``python3 skfem_joint.py --case plastic --steps 20 --output r.json``.
 
-Needs scikit-fem, gmsh and, for speed, pypardiso (all of PyPI), and nothing of archord. Units: R = 1, E* = 1.
+Needs scikit-fem, gmsh and pypardiso (all of PyPI), and nothing of archord but `joint_script` beside it.
 
-- Bodies: MeshTri2 (gmsh's second-order triangles, nodes on the circles), P2 displacements, three points a triangle,
-  small strains, plane strain. Elements have the size h on the arcs and grow by 0.25 times the distance from there,
-  below h = 0.04 by 6.25 h times.
+- Bodies: MeshTri2 (gmsh's second-order triangles, nodes on the circles), P2 displacements, three points a triangle.
+  Elements have the size h on the arcs and grow by 0.25 times the distance from there, below h = 0.04 by 6.25 h times.
 - Contact: kinematics "reference". A point x of the pin's arc, with its normal n, faces the point y of the hole on
   that normal in the touching configuration; the gap g = (y - x) . n - (u(x) - u(y)) . n is linear and the pressure is
   k <-g>, k = 1e5 E*/R (penalty): a usual pressure E* dR/R goes 1e-5 dR deep. Two Gauss points a facet, as many as it
   has own nodes.
 - Plasticity: J2, perfect, radial return with its consistent tangent (Simo and Hughes 1998, box 3.2).
 - Newton's method with full steps; where it fails, the step is cut. Residual: 1e-8 of the reaction. All element
-  matrices at once by numpy, their sum by slots of the sparse matrix found once; MKL's PARDISO for positive definite
-  matrices, else SuperLU.
+  matrices at once by numpy, their sum by slots of the sparse matrix found once; MKL's PARDISO.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import sys
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from joint_script import BLOCK, DR, ITERATIONS, LAME, MU, PIN, SIGY, NoConvergence, R, axis_pressure, main, mesh_bodies
 
-R, DR, WIDTH, NU = 1.0, 0.005, 100.0, 0.3
-E = 2 * (1 - NU**2)
-MU, LAME = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
-SIGY = {"elastic": float("inf"), "plastic": 0.002}
 PENALTY, POINTS = 1e5, 2
-TOLERANCE, FAR, ITERATIONS, CUTS = 1e-8, 1e3, 25, 6  # residuals over the reaction
-
-
-def mesh_joint(size: float, growth: float):
-    """Second-order triangles of pin and block: nodes ``(n, 2)`` and elements ``(m, 6)``, corners before midpoints."""
-    gmsh.initialize(interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    geo = gmsh.model.geo
-    n = round(np.pi / 2 / size) + 1
-
-    def loop(centre, radius, *others) -> None:
-        c, bottom, side = (geo.addPoint(*p, 0) for p in (centre, (0, centre[1] - radius), (radius, centre[1])))
-        corners = [side, *(c if p is None else geo.addPoint(*p, 0) for p in others), bottom]
-        arc = geo.addCircleArc(bottom, c, side)
-        geo.addPlaneSurface([geo.addCurveLoop([arc, *map(geo.addLine, corners[:-1], corners[1:])])])
-        geo.mesh.setTransfiniteCurve(arc, n)
-
-    loop((0, -DR), R, None)
-    loop((0, 0), R + DR, (WIDTH, 0), (WIDTH, -WIDTH), (0, -WIDTH))
-    geo.synchronize()
-    field = gmsh.model.mesh.field.add("MathEval")
-    gmsh.model.mesh.field.setString(field, "F", f"{size} + {growth} * Abs(Sqrt(x*x + y*y) - {R + DR})")
-    gmsh.model.mesh.field.setAsBackgroundMesh(field)
-    for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
-        gmsh.option.setNumber(f"Mesh.{option}", 0)
-    gmsh.option.setNumber("Mesh.ElementOrder", 2)
-    gmsh.model.mesh.generate(2)
-    tags, x, _ = gmsh.model.mesh.getNodes()
-    index = np.zeros(int(tags.max()) + 1, dtype=int)
-    cells = gmsh.model.mesh.getElementsByType(9)[1].reshape(-1, 6)
-    used = np.unique(cells)
-    index[used] = np.arange(len(used))
-    position = np.zeros(len(index), dtype=int)
-    position[tags] = np.arange(len(tags))
-    gmsh.finalize()
-    return x.reshape(-1, 3)[position[used], :2], index[cells]
+TOLERANCE, FAR = 1e-8, 1e3  # residuals over the reaction
 
 
 class Sum:
@@ -88,32 +46,20 @@ class Sum:
         return sparse.csr_matrix((data, self.indices, self.indptr), (self.n, self.n))
 
 
-class NoConvergence(RuntimeError):
-    """Newton's method found no equilibrium."""
-
-
 def make_solver():
-    """A function of an upper triangle and a right-hand side: PARDISO if it is installed, else SuperLU."""
+    """A function of an upper triangle and a right-hand side: MKL's PARDISO for positive definite matrices."""
     for library in sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*")):
         os.environ.setdefault("PYPARDISO_MKL_RT", str(library))  # the package would search the whole environment
-    try:
-        from pypardiso import PyPardisoSolver
-        from pypardiso.pardiso_wrapper import PyPardisoError
-    except ImportError:
-        from scipy.sparse.linalg import splu
+    from pypardiso import PyPardisoSolver
+    from pypardiso.pardiso_wrapper import PyPardisoError
 
-        options = {"SymmetricMode": True}
-        return lambda a, b: splu(
-            (a + sparse.triu(a, 1).T).tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
-        ).solve(b)
-    solver = PyPardisoSolver(mtype=2)  # symmetric, positive definite
+    solver = PyPardisoSolver(mtype=2)
 
     def solve(a, b):
         a.indptr, a.indices = a.indptr.astype(np.int32), a.indices.astype(np.int32)
-        # PyPardisoSolver.solve orders the unknowns anew each time (phase 13); their pattern never changes.
-        phases = (23,) if solver.phase == 23 else (11, 23)
+        # PyPardisoSolver.solve orders the unknowns each time (phase 11); their pattern never changes.
         try:
-            for phase in phases:
+            for phase in (23,) if solver.phase == 23 else (11, 23):
                 solver.set_phase(phase)
                 x = solver._call_pardiso(a, b[:, None])
         except PyPardisoError as error:
@@ -152,11 +98,12 @@ def return_map(strain, history, sigy: float):
 class Joint:
     """Half of the joint below the pin's diameter, discretised: elements first, then contact points, 12 dofs each."""
 
-    def __init__(self, size: float, growth: float, sigy: float) -> None:
-        points, cells = mesh_joint(size, growth)
-        mesh = skfem.MeshTri2(points.T, cells.T)
-        basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP2()), intorder=2)
-        self.sigy, self.n, self.cells = sigy, int(basis.N), len(cells)
+    def __init__(self, size: float, growth: float, order: int, plastic: bool) -> None:
+        points, cells = mesh_bodies(gmsh, size, growth, PIN, BLOCK)
+        triangles = skfem.MeshTri2(points.T, cells.T)
+        basis = skfem.Basis(triangles, skfem.ElementVector(skfem.ElementTriP2()), intorder=2)
+        self.plastic, self.sigy, self.solver = plastic, np.inf, make_solver()
+        self.dofs, self.cells, self.zero = int(basis.N), len(cells), np.zeros(basis.N)
         grad = np.stack([basis.basis[a][0].grad for a in range(12)], axis=-1)  # (2, 2, m, q, 12)
         self.B = np.stack([grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]], axis=-2)
         self.weight = basis.dx
@@ -171,11 +118,11 @@ class Joint:
         fixed[self.top] = True
         self.free = np.where(fixed, -1, np.cumsum(~fixed) - 1)
 
-        contact = self._pair(mesh, basis)
-        self.dofs = np.concatenate([basis.element_dofs.T, contact])
-        self.sum = Sum(self.dofs, self.free)
-        self.C = return_map(np.zeros((1, 1, 3)), np.zeros((1, 1, 4)), sigy)[1][0, 0]
-        self.elastic = self._element_matrices(self.C[None, None])
+        contact = self._pair(triangles, basis)
+        self.rows = np.concatenate([basis.element_dofs.T, contact])
+        self.sum = Sum(self.rows, self.free)
+        self.C = return_map(np.zeros((1, 1, 3)), np.zeros((1, 1, 4)), np.inf)[1][0, 0]
+        self.unyielding = self._element_matrices(self.C[None, None])
 
     def _pair(self, mesh, basis):
         """Contact points ``(f, g)`` on the pin's arc and their points on the hole; returns their dofs ``(f g, 12)``."""
@@ -224,17 +171,17 @@ class Joint:
 
     def pressure(self, u):
         """Contact pressure ``(f, g)``."""
-        gap = self.gap - (self.N * u[self.dofs[self.cells :]]).sum(-1).reshape(self.gap.shape)
+        gap = self.gap - (self.N * u[self.rows[self.cells :]]).sum(-1).reshape(self.gap.shape)
         return PENALTY * np.maximum(-gap, 0)
 
     def equilibrium(self, u):
         """Internal forces ``(n,)``, new history, and the blocks of the tangent."""
-        local = u[self.dofs[: self.cells]]
+        local = u[self.rows[: self.cells]]
         m, q = self.weight.shape
         B = self.B.reshape(m, 3 * q, 12)
         strain = (B @ local[..., None]).reshape(m, q, 3)
         if np.isinf(self.sigy):
-            stress, new, blocks = strain @ self.C, self.history, self.elastic
+            stress, new, blocks = strain @ self.C, self.history, self.unyielding
         else:
             stress, D, new = return_map(strain, self.history, self.sigy)
             blocks = self._element_matrices(D)
@@ -242,78 +189,38 @@ class Joint:
         pressure = self.pressure(u)
         contact = (pressure * self.ds).reshape(-1, 1) * self.N
         stiff = (PENALTY * (pressure > 0) * self.ds).reshape(-1, 1, 1) * (self.N[:, :, None] * self.N[:, None, :])
-        forces = np.bincount(self.dofs.ravel(), np.concatenate([bulk, contact]).ravel(), self.n)
+        forces = np.bincount(self.rows.ravel(), np.concatenate([bulk, contact]).ravel(), self.dofs)
         return forces, new, np.concatenate([blocks, stiff])
 
-    def axis_pressure(self, u) -> float | None:
-        """Pressure on the axis: even parabola through the facet means within 0.2 rad."""
-        mean = (self.pressure(u) * self.ds).sum(1) / self.ds.sum(1)
-        angle = (self.angle * self.ds).sum(1) / self.ds.sum(1)
-        near = angle < 0.2
-        return float(np.polyfit(angle[near] ** 2, mean[near], 1)[1]) if near.sum() > 2 else None
+    def results(self) -> dict[str, float | None]:
+        """Force of the whole joint, and pressure on the axis from the means of the facets."""
+        mean, angle = ((values * self.ds).sum(1) / self.ds.sum(1) for values in (self.pressure(self.u), self.angle))
+        return {"P": -2 * self.forces[self.top].sum(), "p0": axis_pressure(angle, mean)}
 
+    def elastic(self, delta: float):
+        """The displacements at ``delta`` of bodies that do not yield; from then on they do."""
+        found, _ = self.solve(np.where(self.pin, -delta, 0.0), delta)
+        self.sigy = SIGY if self.plastic else np.inf
+        return found
 
-def newton(joint: Joint, solve, u):
-    """Equilibrium from the guess ``u`` on, whose constrained dofs stay; also the new history, forces and iterations."""
-    free = joint.free >= 0
-    for iteration in range(ITERATIONS):
-        forces, new, blocks = joint.equilibrium(u)
-        residual = np.linalg.norm(forces[free]) / np.abs(forces[joint.top].sum())
-        if iteration and residual < TOLERANCE:
-            return u, new, forces, iteration
-        if iteration and not residual < FAR:
-            break
-        u = u.copy()
-        u[free] -= solve(joint.sum(blocks), forces[free])
-    raise NoConvergence
+    def solve(self, u, delta: float):
+        """Equilibrium from the displacements ``u`` on, whose constrained ones stay: those, and iterations."""
+        free = self.free >= 0
+        for iteration in range(ITERATIONS):
+            self.forces, self.next, blocks = self.equilibrium(u)
+            residual = np.linalg.norm(self.forces[free]) / np.abs(self.forces[self.top].sum())
+            if iteration and residual < TOLERANCE:
+                self.u = u
+                return u, iteration
+            if iteration and not residual < FAR:
+                break
+            u = u.copy()
+            u[free] -= self.solver(self.sum(blocks), self.forces[free])
+        raise NoConvergence
 
-
-def load(joint: Joint, steps: int, delta: float):
-    """Press the pin down by ``delta`` in equal steps, cut where need be: force of the joint, p0, iterations."""
-    solve = make_solver()
-    u, t, iterations, cut = np.zeros(joint.n), 0.0, 0, 0
-    # du/dt: at first that of the elastic joint, which the rigid pin's leads to.
-    sigy, joint.sigy = joint.sigy, np.inf
-    rate = steps * newton(joint, solve, np.where(joint.pin, -delta / steps, 0.0))[0]
-    joint.sigy = sigy
-    for step in range(1, steps + 1):
-        while t < step / steps - 1e-12:
-            dt = min(step / steps - t, 0.5**cut / steps)
-            try:
-                new_u, joint.history, forces, count = newton(joint, solve, u + dt * rate)
-            except NoConvergence:
-                cut, iterations = cut + 1, iterations + ITERATIONS
-                if cut > CUTS:
-                    raise NoConvergence(f"no equilibrium beyond {t * delta / DR:.3f} dR") from None
-                continue
-            rate, u, t = (new_u - u) / dt, new_u, t + dt
-            iterations, cut = iterations + count, max(cut - 1, 0)
-    return -2 * forces[joint.top].sum(), joint.axis_pressure(u), iterations
-
-
-def main() -> int:
-    """Solve what the command line says; returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--case", choices=list(SIGY), default="elastic")
-    parser.add_argument("--size", type=float, default=0.04, help="edge length on the arcs over R")
-    parser.add_argument("--growth", type=float, help="growth of the edges per distance; min(0.25, 6.25 size) if absent")
-    parser.add_argument("--order", type=int, choices=[2], default=2)
-    parser.add_argument("--steps", type=int, default=2, help="equal steps to delta = 2 dR")
-    parser.add_argument("--output", type=Path, default=Path("result.json"))
-    parser.add_argument("--probe", action="store_true", help="print the version if installed, else exit with 1")
-    options = parser.parse_args()
-    if options.probe:
-        print(version("scikit-fem"))
-        return 0
-    growth = options.growth or min(0.25, 6.25 * options.size)
-    result: dict = {"kinematics": "reference", "P": None, "p0": None, "eps": None, "iterations": 0, "failed": None}
-    joint = Joint(options.size, growth, SIGY[options.case])
-    try:
-        result["P"], result["p0"], result["iterations"] = load(joint, options.steps, 2 * DR)
-    except NoConvergence as error:
-        result["failed"] = str(error)
-    options.output.write_text(json.dumps(result | {"dofs": joint.n}), encoding="utf-8")
-    return 0
+    def commit(self) -> None:
+        """Take over the plastic strain of the last equilibrium."""
+        self.history = self.next
 
 
 if __name__ == "__main__":
@@ -323,4 +230,4 @@ if __name__ == "__main__":
         from scipy import sparse
     except ImportError as missing:
         sys.exit(f"scikit-fem cannot run here: {missing}")
-    sys.exit(main())
+    sys.exit(main(Joint, "reference", lambda: version("scikit-fem")))

@@ -1,0 +1,136 @@
+"""What the scripts ``*_joint.py`` share: the paper's quarter joint, its mesh by gmsh, the load path, the command line.
+
+They need nothing of archord, and start with ``python3 skfem_joint.py --case plastic --steps 20 --output r.json``.
+Units: R = 1, E* = 1. Plane strain, small strains; perfect J2 plasticity.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+R, DR, WIDTH, NU = 1.0, 0.005, 100.0, 0.3
+E = 2 * (1 - NU**2)
+MU, LAME = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
+SIGY = 0.002
+ITERATIONS, CUTS = 25, 6
+PIN, BLOCK = (-DR, R), (0.0, R + DR)  # height of the centre, and radius
+
+
+class NoConvergence(RuntimeError):
+    """A solve that found no equilibrium."""
+
+
+class Joint(Protocol):
+    """Half of the joint below the pin's diameter, discretised by one of the codes, with ``dofs`` unknowns.
+
+    A state is whatever can be added and multiplied by numbers; it holds all displacements. ``zero`` is the unloaded
+    one. The pin's top is at ``-delta``.
+    """
+
+    dofs: int
+    zero: Any
+
+    def elastic(self, delta: float) -> Any:
+        """The state of the joint of bodies that do not yield; from then on they do."""
+
+    def solve(self, guess: Any, delta: float) -> tuple[Any, int]:
+        """State of equilibrium and iterations from ``guess`` on. Raises `NoConvergence`."""
+
+    def commit(self) -> None:
+        """Accept the plastic strain of the state that `solve` found last."""
+
+    def results(self) -> dict[str, float | None]:
+        """P of the whole joint and, where the code tells, p0 of the last state."""
+
+
+def mesh_bodies(gmsh, size: float, growth: float, *bodies: tuple[float, float]):
+    """Second-order triangles of `PIN`, `BLOCK` or both, nodes on the circles: nodes ``(n, 2)`` and elements ``(m, 6)``,
+    corners before midpoints. Elements have ``size`` on the arcs and grow by ``growth`` times the distance from there.
+    """
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    geo = gmsh.model.geo
+    for y, radius in bodies:
+        centre, bottom, side = (geo.addPoint(*p, 0) for p in ((0, y), (0, y - radius), (radius, y)))
+        outer = [] if (y, radius) == PIN else [(WIDTH, 0), (WIDTH, -WIDTH), (0, -WIDTH)]
+        corners = [side, *([geo.addPoint(*p, 0) for p in outer] or [centre]), bottom]
+        arc = geo.addCircleArc(bottom, centre, side)
+        geo.addPlaneSurface([geo.addCurveLoop([arc, *map(geo.addLine, corners[:-1], corners[1:])])])
+        geo.mesh.setTransfiniteCurve(arc, round(np.pi / 2 / size) + 1)
+    geo.synchronize()
+    field = gmsh.model.mesh.field.add("MathEval")
+    gmsh.model.mesh.field.setString(field, "F", f"{size} + {growth} * Abs(Sqrt(x*x + y*y) - {R + DR})")
+    gmsh.model.mesh.field.setAsBackgroundMesh(field)
+    for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
+        gmsh.option.setNumber(f"Mesh.{option}", 0)
+    gmsh.option.setNumber("Mesh.ElementOrder", 2)
+    gmsh.model.mesh.generate(2)
+    tags, x, _ = gmsh.model.mesh.getNodes()
+    used, cells = np.unique(gmsh.model.mesh.getElementsByType(9)[1], return_inverse=True)
+    position = np.zeros(int(tags.max()) + 1, dtype=int)
+    position[tags] = np.arange(len(tags))
+    gmsh.finalize()
+    return x.reshape(-1, 3)[position[used], :2], cells.reshape(-1, 6)
+
+
+def axis_pressure(angle, pressure) -> float | None:
+    """Pressure on the axis: an even parabola through those within 0.2 rad."""
+    near = angle < 0.2
+    return float(np.polyfit(angle[near] ** 2, pressure[near], 1)[1]) if near.sum() > 2 else None
+
+
+def load(joint: Joint, steps: int, delta: float) -> int:
+    """Press the pin down by ``delta`` in equal steps, cut where need be; returns the iterations."""
+    state, t, iterations, cut = joint.zero, 0.0, 0, 0
+    rate = steps * (joint.elastic(delta / steps) - state)
+    for step in range(1, steps + 1):
+        while t < step / steps - 1e-12:
+            dt = min(step / steps - t, 0.5**cut / steps)
+            try:
+                new, count = joint.solve(state + dt * rate, (t + dt) * delta)
+            except NoConvergence:
+                cut, iterations = cut + 1, iterations + ITERATIONS
+                if cut > CUTS:
+                    raise NoConvergence(f"no equilibrium beyond {t * delta / DR:.3f} dR") from None
+                continue
+            joint.commit()
+            rate, state, t = (new - state) / dt, new, t + dt
+            iterations, cut = iterations + count, max(cut - 1, 0)
+    return iterations
+
+
+def main(
+    joint: Callable[[float, float, int, bool], Joint],
+    kinematics: str,
+    version: Callable[[], str],
+    orders: tuple[int, ...] = (2,),
+) -> int:
+    """Solve what the command line says with ``joint(size, growth, order, plastic)``; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--case", choices=["elastic", "plastic"], default="elastic")
+    parser.add_argument("--size", type=float, default=0.04, help="edge length on the arcs over R")
+    parser.add_argument("--growth", type=float, help="growth of the edges per distance; min(0.25, 6.25 size) if absent")
+    parser.add_argument("--order", type=int, choices=orders, default=2)
+    parser.add_argument("--steps", type=int, default=2, help="equal steps to delta = 2 dR")
+    parser.add_argument("--output", type=Path, default=Path("result.json"))
+    parser.add_argument("--probe", action="store_true", help="print the version if installed, else exit with 1")
+    options = parser.parse_args()
+    if options.probe:
+        print(version())
+        return 0
+    growth = options.growth or min(0.25, 6.25 * options.size)
+    made = joint(options.size, growth, options.order, options.case == "plastic")
+    result: dict = {"kinematics": kinematics, "P": None, "p0": None, "eps": None, "iterations": 0, "failed": None}
+    try:
+        result["iterations"] = load(made, options.steps, 2 * DR)
+        result |= made.results()
+    except NoConvergence as error:
+        result["failed"] = str(error)
+    options.output.write_text(json.dumps(result | {"dofs": made.dofs}), encoding="utf-8")
+    return 0
