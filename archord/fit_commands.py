@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from archord.fit_sweep import fit_sweep, is_sweep
+from archord.law_commands import sentences
 from archord.plain_typer import typer
 
 
@@ -51,32 +51,33 @@ def fit(
     """
     import math
 
-    from rich.console import Console
-
     from archord.output.folder import FILES
     from archord.output.output_file import check_target, writing
     from archord.postprocess.curve import read_run
     from archord.postprocess.laws import fit_report
-    from archord.postprocess.laws.calibration import calibrate
-    from archord.postprocess.laws.fitted_law import PYTHON_BEGINS
+    from archord.postprocess.laws.calibration import PYTHON_BEGINS, calibrate
     from archord.scene.errors import InputError
+    from archord.studies import sweep_fit
 
-    if any(is_sweep(folder) for folder in folders):
+    if any(sweep_fit.is_sweep(folder) for folder in folders):
         if len(folders) > 1:
             raise InputError(f"{folders[0]}: a sweep is fitted alone, but {len(folders)} folders are given.")
         if hold_k is not None or residuals or python:
             raise InputError(f"{folders[0]}: --hold-k, --residuals and --python are for runs, this is a sweep.")
-        return fit_sweep(
-            folders[0],
-            load_range or (0.0, math.inf),
-            confidence,
-            0.15 if held_out is None else held_out,
-            csv_file,
-            law_file,
-            json_file,
-            picture,
-            force,
-        )
+        files = [file for file in (csv_file, law_file, json_file, picture) if file]
+        if len({file.resolve() for file in files}) < len(files):
+            raise InputError("--csv, --law, --json, --picture: must be different files.")
+        if csv_file is None and folders[0].is_dir():
+            csv_file = folders[0] / sweep_fit.TABLE
+            files.append(csv_file)
+        targets = csv_file, law_file, json_file, picture
+        sweep_fit.check_files(folders[0], *targets, force)
+        share = 0.15 if held_out is None else held_out
+        found = sweep_fit.fit_sweep(folders[0], load_range or (0.0, math.inf), confidence, share)
+        with sentences():
+            found.write(*targets)
+        print(found.text(), *files, sep="\n")
+        return 0
     if csv_file or law_file or held_out is not None:
         raise InputError(f"{folders[0]}: --csv, --law and --held-out are for a sweep, and this is none.")
     runs = [read_run(folder).loading() for folder in folders]
@@ -91,21 +92,18 @@ def fit(
     if len({file.resolve() for file in files}) < len(files):
         raise InputError("--json, --python, --picture: must be different files.")
     if picture:
-        from archord.postprocess.laws.fit_picture import draw_fit
-
-        draw_fit(calibration, picture)
+        with sentences():
+            fit_report.draw_fit(calibration, picture)
     if json_file:
         with writing(json_file):
             json_file.write_text(fit_report.as_json(calibration), encoding="utf-8")
     if python:
         with writing(python):
             python.write_text(law.to_python(), encoding="utf-8")
-    console = Console(highlight=False, width=200)  # numbers that wrap are better than numbers cut off
     tables = [fit_report.summary_table(calibration)]
     tables += [fit_report.residual_table(curve) for curve in calibration.joint.curves if residuals]
     for one in tables:
-        console.print(one)
-        print()
+        print(one, end="\n\n")
     for note in fit_report.notes(calibration):
         print(note)
     threshold = "" if law.c is None else f", c = {law.c:.5f}"

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from archord.plain_typer import typer
 
 if TYPE_CHECKING:
+    from archord.postprocess.laws.joint import LawJoint
     from archord.postprocess.laws.law import Law, Outside
-    from archord.postprocess.laws.law_joint import LawJoint
 
 DEFAULT = "calibrated"  # the law that is meant where none is named
 
@@ -25,19 +27,31 @@ def laws(
     markdown: Annotated[bool, typer.Option("--markdown", help="print all that is known of each, as Markdown")] = False,
 ) -> int:
     """List the closed-form laws: name, title, range and source."""
-    from archord.postprocess.laws.law_tables import laws_as_markdown
+    from archord.postprocess.laws.law_report import laws_as_markdown
     from archord.postprocess.laws.laws import LAWS
 
     if markdown:
         print(laws_as_markdown(), end="")
         return 0
-    from rich.table import Table
+    from archord.report.table import Table
 
-    table = Table("name", "law", "range", "source", show_lines=True)
-    for entry in LAWS.values():
-        table.add_row(entry.name, entry.title, entry.range, entry.source)
-    _console().print(table, markup=False)
+    print(
+        Table(
+            "name", "law", "range", "source", rows=((x.name, x.title, x.range, x.source) for x in LAWS.values()), left=4
+        )
+    )
     return 0
+
+
+@contextmanager
+def sentences() -> Iterator[None]:
+    """Around formulas, whose ValueErrors are bad input here."""
+    from archord.scene.errors import InputError
+
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(str(error)) from error
 
 
 def law(
@@ -82,7 +96,8 @@ def law(
     from archord.postprocess.laws.laws import find_law
     from archord.scene.errors import InputError
 
-    chosen = [find_law(name) for name in dict.fromkeys(names or [DEFAULT])]
+    with sentences():
+        chosen = [find_law(name) for name in dict.fromkeys(names or [DEFAULT])]
     if not (math.isfinite(to) and to > 0):
         raise InputError(f"--to {to:g}: must be a positive number.")
     if not 1 <= points <= 100000:
@@ -102,12 +117,13 @@ def law(
         "pin_nu": pin_nu,
         "yielding": yielding,
     }
-    joint, units = _joint(scene, overrides or [], given, k)
+    with sentences():
+        joint, units = _joint(scene, overrides or [], given, k)
     rows = "load" if by_load or not all(entry.gives_displacement for entry in chosen) else "displacement"
     outside: Outside = "raise" if strict else "extrapolate" if extrapolate else "nan"
     if plot is not None:
         from archord.output.output_file import check_target
-        from archord.postprocess.laws.law_picture import draw_laws
+        from archord.postprocess.laws.law_report import draw_laws
         from archord.scene.file import files_read
 
         check_target(plot, files_read(scene, overrides or []) if scene else [], force=True)
@@ -123,7 +139,7 @@ def _joint(
     """The joint of the scene, or of the options, which come before it; and the names of the units."""
     import dataclasses
 
-    from archord.postprocess.laws.law_joint import LawJoint
+    from archord.postprocess.laws.joint import LawJoint
     from archord.scene.errors import InputError
 
     values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
@@ -147,9 +163,9 @@ def _warned(function: Any, *arguments: Any) -> Any:
     """Call ``function`` and print each warning about a range once, as one sentence on stderr."""
     import warnings
 
-    from archord.postprocess.laws.law_joint import LawRangeWarning
+    from archord.postprocess.laws.joint import LawRangeWarning
 
-    with warnings.catch_warnings(record=True) as caught:
+    with sentences(), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LawRangeWarning)
         result = function(*arguments)
     for message in dict.fromkeys(str(w.message) for w in caught):
@@ -160,24 +176,11 @@ def _warned(function: Any, *arguments: Any) -> Any:
 def _print_table(
     chosen: list[Law], joint: LawJoint, rows: str, to: float, points: int, outside: Outside, units: dict[str, str]
 ) -> None:
-    from rich.table import Column, Table
-
-    from archord.postprocess.laws.law_tables import law_columns
+    from archord.postprocess.laws.law_report import law_columns
+    from archord.report.table import Table
 
     for i, entry in enumerate(chosen):
         columns = law_columns(entry, joint, rows, to, points, outside, units)
-        table = Table(*(Column(name, justify="right") for name in columns), box=None, pad_edge=False)
-        for values in zip(*columns.values(), strict=True):
-            table.add_row(*(f"{value:.6g}" for value in values))
+        values = zip(*columns.values(), strict=True)
         print(f"{'' if i == 0 else chr(10)}{entry.name}: {entry.title}")
-        _console().print(table, markup=False)
-
-
-def _console() -> Any:
-    """A console as wide as its text where nobody watches, so that pipes get whole rows."""
-    from rich.console import Console
-
-    from archord.ranks import on_terminal
-
-    watched = on_terminal()
-    return Console(highlight=False, width=None if watched else 160, force_terminal=watched)
+        print(Table(*columns, rows=[[f"{value:.6g}" for value in row] for row in values]))

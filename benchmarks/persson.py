@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from archord.benchmarks.case import Case, paper_joint, varied
-from archord.postprocess.laws.law_joint import LawJoint
-from archord.postprocess.laws.persson_law import persson_pressure
+from archord.postprocess.laws.elastic_laws import persson_pressure
+from archord.postprocess.laws.joint import LawJoint
 from archord.report.table import Table
 from archord.scene.scene import Scene
 

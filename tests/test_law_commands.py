@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from archord.cli import run
-from archord.postprocess.laws.law_joint import LawJoint
+from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")
@@ -27,7 +27,7 @@ def table(text: str) -> dict[str, np.ndarray]:
 def test_laws_lists_every_law(capsys):
     assert run(["laws"]) == 0
     printed = capsys.readouterr().out
-    assert all(f" {name} " in printed for name in LAWS)
+    assert all(f"\n{name} " in printed for name in LAWS)
 
 
 def test_law_prints_its_numbers(capsys):

@@ -16,7 +16,7 @@ from archord.benchmarks.paper.runs import MESHES, PAIRS, PLANES, Plane, plastic
 from archord.geometry.basis import Array
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.laws.calibration import calibrate
-from archord.postprocess.laws.law_joint import LawJoint
+from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 
 GOOD, FAIR = 0.05, 0.15

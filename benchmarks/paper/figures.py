@@ -17,10 +17,9 @@ from archord.geometry.basis import Array
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.chord import ChordPressure, arc_angle, read_chord_pressure
 from archord.postprocess.curve import RunCurve, read_run
-from archord.postprocess.laws.hertz_laws import hertz_pressure
-from archord.postprocess.laws.law_joint import LawJoint
+from archord.postprocess.laws.elastic_laws import hertz_pressure, persson_load, persson_pressure
+from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
-from archord.postprocess.laws.persson_law import persson_load, persson_pressure
 
 STYLES: dict[str, dict] = {"strain": {"color": "tab:blue"}, "stress": {"color": "tab:red"}}
 LABELS = {"strain": "plane strain", "stress": "plane stress"}

@@ -13,7 +13,7 @@ from archord.benchmarks.paper.runs import PLANES, Plane, plastic
 from archord.output.step_file import step_name
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.fields import SUBTRIANGLES, read_fields
-from archord.postprocess.laws.law_joint import LawJoint
+from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 
 STAGES = (1.25, 1.6, 2.0)  # A, B and C in clearances: just after the paper's first yield, and on to its end

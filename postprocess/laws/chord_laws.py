@@ -11,9 +11,11 @@ import math
 
 import numpy as np
 
-from archord.postprocess.laws.law_joint import Array, LawJoint
+from archord.postprocess.laws.joint import Array, LawJoint
 
-LIU = math.pi / 2  # see `liu_force`
+# Liu, Zhang and Yang (2007), P = (pi/2) E* delta sqrt(delta/(2 (dR + delta))): an ellipse over the chord with p0 = E*
+# delta/(2 R), whose force is that of the parabola with this k
+LIU_K = 3 * math.pi / 16
 
 
 def chord_angle(joint: LawJoint, delta: Array) -> Array:
@@ -31,36 +33,15 @@ def winkler_pressure(joint: LawJoint, delta: Array) -> Array:
     return joint.k * joint.E_star * delta / joint.radius
 
 
-def _chord_force(joint: LawJoint, delta: Array, factor: float) -> Array:
-    return factor * joint.E_star * delta * np.sqrt(delta / (2 * (joint.clearance + delta)))
-
-
-def _chord_stiffness(joint: LawJoint, delta: Array, factor: float) -> Array:
-    root = np.sqrt(delta / (2 * (joint.clearance + delta)))
-    return factor * joint.E_star * root * (1 + joint.clearance / (2 * (joint.clearance + delta)))
-
-
 def paper_force(joint: LawJoint, delta: Array) -> Array:
     """Elastic NFD, ``P = (8/3) k E* delta sqrt(delta/(2 (dR + delta)))``: a parabola over the chord (eqs 8, 9)."""
-    return _chord_force(joint, delta, 8 * joint.k / 3)
+    return 8 * joint.k / 3 * joint.E_star * delta * np.sqrt(delta / (2 * (joint.clearance + delta)))
 
 
 def paper_stiffness(joint: LawJoint, delta: Array) -> Array:
     """``dP/d(delta)`` of `paper_force`."""
-    return _chord_stiffness(joint, delta, 8 * joint.k / 3)
-
-
-def liu_force(joint: LawJoint, delta: Array) -> Array:
-    """Liu, Zhang and Yang (2007): ``P = (pi/2) E* delta sqrt(delta/(2 (dR + delta)))``.
-
-    An ellipse over the chord with ``p0 = E* delta/(2 R)``.
-    """
-    return _chord_force(joint, delta, LIU)
-
-
-def liu_stiffness(joint: LawJoint, delta: Array) -> Array:
-    """``dP/d(delta)`` of `liu_force`."""
-    return _chord_stiffness(joint, delta, LIU)
+    root = np.sqrt(delta / (2 * (joint.clearance + delta)))
+    return 8 * joint.k / 3 * joint.E_star * root * (1 + joint.clearance / (2 * (joint.clearance + delta)))
 
 
 def _truncation(joint: LawJoint, delta: Array) -> tuple[Array, Array]:

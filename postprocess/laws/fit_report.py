@@ -1,56 +1,60 @@
-"""A calibration as tables for people and as JSON for programs."""
+"""A calibration for people and programs: tables, notes, a picture, and JSON."""
 
 from __future__ import annotations
 
 import json
 import math
 from dataclasses import asdict
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
+import numpy as np
 
+from archord.output.output_file import writing
 from archord.postprocess.laws.calibration import Calibration, Fits
-from archord.postprocess.laws.curve_fit import CurveFit
-from archord.postprocess.laws.least_squares import Estimate
+from archord.postprocess.laws.curve_fit import CurveFit, dimensionless_law
+from archord.report.figure import new_figure, save
+from archord.report.table import Table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _BENT = 0.5  # serial correlation that noise in ten steps or more hardly ever reaches
+_LABELS = {"P": "P/(E* dR)", "p0": "p0 R/(E* dR)", "plateau": "median p/sigY"}
 
 
 def summary_table(calibration: Calibration) -> Table:
     """One row per fitted parameter: value, errors, interval, quality of the fit."""
-    percent = f"{100 * calibration.confidence:g} %"
-    table = Table(box=None, pad_edge=False, header_style="")
-    for heading in (
-        "run",
-        "fit to",
-        "of",
-        "value",
-        "s.e.",
-        "mesh",
-        f"{percent} interval",
-        "R2",
-        "rms",
-        "largest",
-        "steps",
-    ):
-        table.add_column(heading, justify="left" if heading in ("run", "fit to", "of") else "right", no_wrap=True)
-    for fits in calibration.each:
-        _add_rows(table, fits, fits.runs[0].name)
+    interval = f"{100 * calibration.confidence:g} % interval"
+    table = Table(
+        "run", "fit to", "of", "value", "s.e.", "mesh", interval, "R2", "rms", "largest", "steps", left=3
+    )  # fmt: skip
+    named = [(fits.runs[0].name, fits) for fits in calibration.each]
     if len(calibration.joint.runs) > 1:
-        _add_rows(table, calibration.joint, "all together")
+        named.append(("all together", calibration.joint))
+    for name, fits in named:
+        for fit in fits.curves:
+            r2 = "" if fit.k is None else f"{fit.r2:.5f}"
+            steps = sum(len(part.load) for part in fit.residuals)
+            quality = [r2, f"{100 * fit.rms:.2f} %", f"{100 * fit.largest:+.2f} %", str(steps)]
+            for parameter, found in (("k", fit.k), ("c", fit.c)):
+                if found is None:
+                    continue
+                mesh = "unknown" if found.discretisation_error is None else f"{found.discretisation_error:.1e}"
+                errors = [f"{found.standard_error:.1e}", mesh, f"{found.low:.4f} .. {found.high:.4f}"]
+                if parameter == "k" and fit.k_held:
+                    errors = ["held", "", ""]
+                table.add(name, fit.quantity, parameter, f"{found.value:.5f}", *errors, *quality)
+                name, quality = "", ["", "", "", ""]
     return table
 
 
 def residual_table(fit: CurveFit) -> Table:
     """One row per step: run, ``delta/dR``, the dimensionless data, the law, and ``law/data - 1``."""
-    label = {"P": "P/(E* dR)", "p0": "p0 R/(E* dR)", "plateau": "median p/sigY"}[fit.quantity]
-    table = Table(box=None, pad_edge=False, header_style="")
-    table.add_column("run")
-    for heading in ("delta/dR", label, "law", "law/run - 1"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = Table("run", "delta/dR", _LABELS[fit.quantity], "law", "law/run - 1", left=1)
     for part in fit.residuals:
-        for load, data, law, relative in zip(part.load, part.data, part.law, part.relative, strict=True):
-            table.add_row(part.name, f"{load:.6g}", f"{data:.6g}", f"{law:.6g}", f"{100 * relative:+.2f} %")
+        for *numbers, relative in zip(part.load, part.data, part.law, part.relative, strict=True):
+            table.add(part.name, *(f"{value:.6g}" for value in numbers), f"{100 * relative:+.2f} %")
     return table
 
 
@@ -63,19 +67,23 @@ def notes(calibration: Calibration) -> list[str]:
         said.append("mesh: the discretisation error is unknown, no scene was given on a second mesh.")
     elif refined < scenes:
         said.append(f"mesh: {refined} of {scenes} scenes were given on a second mesh; the joint fit counts no other.")
-    if refined:
-        said += [f"mesh: order of convergence of {name}: {words}." for name, words in _orders(joint).items()]
+    orders: dict[str, dict[str, list[str]]] = {}  # the curves by run and order in words
+    for fit in joint.curves if refined else ():
+        for name, order in fit.orders:
+            orders.setdefault(name, {}).setdefault(order.words, []).append(fit.quantity)
+    for name, found in orders.items():
+        words = ", ".join(f"{' and '.join(curves)} {order}" for order, curves in found.items())
+        said.append(f"mesh: order of convergence of {name}: {words}.")
     if calibration.hold_k is not None:
         said.append(f"k: held at {calibration.hold_k:g}, not fitted; the errors of c do not count an error of k.")
     for fits in calibration.each:
         if fits.finer:
             said.append(f"mesh: {fits.runs[0].name} serves to estimate the discretisation error of {fits.finer}.")
-    bent = [fit for fit in joint.curves if fit.serial_correlation > _BENT]
+    bent = [f"{f.quantity} {f.serial_correlation:.2f}" for f in joint.curves if f.serial_correlation > _BENT]
     if bent:
-        values = ", ".join(f"{fit.quantity} {fit.serial_correlation:.2f}" for fit in bent)
         said.append(
-            f"s.e.: residuals of neighbouring steps are correlated ({values}): the law's shape differs from the runs', "
-            "and errors and intervals, which take residuals as independent, are too small."
+            f"s.e.: residuals of neighbouring steps are correlated ({', '.join(bent)}): the law's shape differs from "
+            "the runs', and errors and intervals, which take residuals as independent, are too small."
         )
     if any(r.sigY for r in joint.runs):
         if joint.P.c is None:
@@ -88,18 +96,6 @@ def notes(calibration: Calibration) -> list[str]:
                 f"median over peak {low:.2f} to {high:.2f} (flat: 1, parabola: 0.75)."
             )
     return said
-
-
-def _orders(fits: Fits) -> dict[str, str]:
-    """By run, the orders taken for its curves, in words."""
-    found: dict[str, dict[str, list[str]]] = {}
-    for fit in fits.curves:
-        for name, order in fit.orders:
-            found.setdefault(name, {}).setdefault(order.words, []).append(fit.quantity)
-    return {
-        name: ", ".join(f"{' and '.join(curves)} {words}" for words, curves in orders.items())
-        for name, orders in found.items()
-    }
 
 
 JSON_BEGINS = '{\n  "law": {\n    "k": '  # by which a file of `as_json` is known
@@ -122,11 +118,8 @@ def as_json(calibration: Calibration) -> str:
 
 
 def _fits(fits: Fits) -> dict[str, Any]:
-    return {
-        "runs": [run.name for run in fits.runs],
-        "finer": fits.finer,
-        **{fit.quantity: _curve(fit) for fit in fits.curves},
-    }
+    curves = {fit.quantity: _curve(fit) for fit in fits.curves}
+    return {"runs": [run.name for run in fits.runs], "finer": fits.finer, **curves}
 
 
 def _curve(fit: CurveFit) -> dict[str, Any]:
@@ -143,39 +136,40 @@ def _curve(fit: CurveFit) -> dict[str, Any]:
         "largest_residual": fit.largest,
         "serial_correlation": fit.serial_correlation,
         "residuals": [
-            {
-                "run": part.name,
-                "delta/dR": part.load.tolist(),
-                "data": part.data.tolist(),
-                "law": part.law.tolist(),
-                "relative": part.relative.tolist(),
-            }
-            for part in fit.residuals
+            {"run": part.name, "delta/dR": part.load.tolist(), "data": part.data.tolist(), "law": part.law.tolist(),
+             "relative": part.relative.tolist()} for part in fit.residuals
         ],
-    }
+    }  # fmt: skip
 
 
-def _add_rows(table: Table, fits: Fits, name: str) -> None:
-    for fit in fits.curves:
-        shown = [(parameter, estimate) for parameter, estimate in (("k", fit.k), ("c", fit.c)) if estimate]
-        for i, (parameter, estimate) in enumerate(shown):
-            quality = ["", "", "", ""]
-            if i == 0:
-                steps = sum(len(part.load) for part in fit.residuals)
-                r2 = "" if fit.k is None else f"{fit.r2:.5f}"
-                quality = [r2, f"{100 * fit.rms:.2f} %", f"{100 * fit.largest:+.2f} %", str(steps)]
-            numbers = _numbers(estimate)
-            if parameter == "k" and fit.k_held:
-                numbers = [numbers[0], "held", "", ""]
-            table.add_row(name, fit.quantity, parameter, *numbers, *quality)
-            name = ""
+def draw_fit(calibration: Calibration, target: str | Path) -> Path:
+    """Draw P(delta) and p0(delta) of the fit to all scenes, and its residuals, as ``target``; returns the file. Raises
+    ValueError for an unknown format."""
+    target, figure, fits = Path(target), new_figure(13, 4.2), calibration.joint
+    axes = figure.subplots(1, 3)
+    _draw_curve(axes[0], fits, fits.P, "P / (E* ΔR)", "force")
+    _draw_curve(axes[1], fits, fits.p0, "p0 R / (E* ΔR)", "peak pressure")
+    for fit, style in ((fits.P, "o-"), (fits.p0, "s--")):
+        for i, part in enumerate(fit.residuals):
+            label = f"{fit.quantity}: {part.name}"
+            axes[2].plot(part.load, 100 * part.relative, style, ms=3, lw=1, color=f"C{i}", label=label)
+    axes[2].axhline(0, color="black", lw=0.8)
+    axes[2].set(ylabel="law / run - 1 [%]", title="residuals")
+    for axis in axes:
+        axis.set(xlabel="δ / ΔR", xlim=(0, None))
+        axis.legend(frameon=False, fontsize="small")
+        axis.grid(alpha=0.3)
+    with writing(target):
+        return save(figure, target)
 
 
-def _numbers(estimate: Estimate) -> list[str]:
-    mesh = "unknown" if estimate.discretisation_error is None else f"{estimate.discretisation_error:.1e}"
-    return [
-        f"{estimate.value:.5f}",
-        f"{estimate.standard_error:.1e}",
-        mesh,
-        f"{estimate.low:.4f} .. {estimate.high:.4f}",
-    ]
+def _draw_curve(axis: Axes, fits: Fits, fit: CurveFit, label: str, what: str) -> None:
+    for i, (run, part) in enumerate(zip(fits.runs, fit.residuals, strict=True)):
+        axis.plot(part.load, part.data, "o", ms=4, mfc="none", color=f"C{i}", label=part.name)
+        if fit.k:
+            load = np.linspace(0, part.load.max(), 400)
+            law = dimensionless_law(fit.quantity, run, load * run.dR, fit.k.value, fit.c and fit.c.value)
+            axis.plot(load, law, "-", lw=1.4, color=f"C{i}")
+    found = [f"{name} = {value.value:.3f} ± {value.error:.3f}" for name, value in (("k", fit.k), ("c", fit.c)) if value]
+    axis.set(ylabel=label, ylim=(0, None))
+    axis.set_title(f"{what}: {', '.join(found)}", fontsize="medium")

@@ -7,8 +7,8 @@ from mpi4py import MPI
 from archord.benchmarks.persson import DR, UNLIKE, persson_joint, theory, unlike
 from archord.output.report import energy_balance
 from archord.output.run import solve_scene
-from archord.postprocess.laws.law_joint import LawJoint
-from archord.postprocess.laws.persson_law import persson_pressure
+from archord.postprocess.laws.elastic_laws import persson_pressure
+from archord.postprocess.laws.joint import LawJoint
 from archord.scene.scene import Load
 from tests.solver.solving import solve
 

@@ -11,10 +11,9 @@ import pytest
 
 from archord.cli import run
 from archord.postprocess.curve import read_run
-from archord.postprocess.laws.calibrated_law import ROWS, TABLE
-from archord.postprocess.laws.calibrated_model import CalibratedModel
+from archord.postprocess.laws.calibrated import ROWS, TABLE, CalibratedModel
 from archord.postprocess.laws.calibration import calibrate
-from archord.postprocess.laws.fitted_cases import read_cases
+from archord.postprocess.laws.study import read_cases
 from archord.studies.cases import read_sweep
 
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="the whole command, on one rank")
@@ -132,19 +131,19 @@ def test_stored_rows_give_the_law_that_is_shipped(tmp_path, capsys):
     words = ["--law", law, "--csv", copy, "--json", data, "--picture", picture]
     assert run(["fit", str(ROWS), *map(str, words)]) == 0
     printed = capsys.readouterr().out
-    model, shipped = (CalibratedModel.from_json(file.read_text()) for file in (law, TABLE))
-    assert model.form == shipped.form
-    np.testing.assert_allclose(model.elastic, shipped.elastic, rtol=1e-4)
-    assert model.provenance == shipped.provenance
+    model, shipped = (CalibratedModel.from_json(file.read_text()).data for file in (law, TABLE))
+    assert model["form"] == shipped["form"]
+    np.testing.assert_allclose(model["elastic"], shipped["elastic"], rtol=1e-4)
+    assert model["provenance"] == shipped["provenance"]
     assert copy.read_text() == ROWS.read_text()
-    assert f"{abs(model.elastic[0]):g} p" in printed
+    assert f"{abs(model['elastic'][0]):g} p" in printed
     row = next(line for line in printed.splitlines() if line.startswith("| held out | both | all |"))
-    assert f"{model.errors['held out']['both all']['P']['rms']:.1%}" in row
+    assert f"{model['errors']['held out']['both all']['P']['rms']:.1%}" in row
     everything = json.loads(data.read_text())
     with copy.open() as stream:
         rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
     assert len(everything["cases"]) == len(rows)
-    assert everything["model"]["elastic"] == list(model.elastic)
+    assert everything["model"]["elastic"] == model["elastic"]
     assert picture.read_bytes()[1:4] == b"PNG"
 
 

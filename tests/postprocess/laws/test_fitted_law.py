@@ -8,10 +8,9 @@ import sys
 import numpy as np
 import pytest
 
+from archord.postprocess.laws.calibration import FittedLaw
 from archord.postprocess.laws.chord_laws import plastic_force
-from archord.postprocess.laws.fitted_law import FittedLaw
-from archord.postprocess.laws.law_joint import LawJoint
-from archord.scene.errors import InputError
+from archord.postprocess.laws.joint import LawJoint
 
 ELASTIC = FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, fitted_range=(0.1, 2.0))
 PLASTIC = FittedLaw(
@@ -85,5 +84,5 @@ def test_the_law_is_the_plastic_winkler_law_of_its_joint():
     ],
 )
 def test_what_is_no_law(text, said):
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(ValueError, match=said):
         FittedLaw.from_json(text)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from archord.postprocess.laws.law_joint import LawJoint
+from archord.postprocess.laws.elastic_laws import largest_angle, persson_load, persson_pressure
+from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
-from archord.postprocess.laws.persson_law import largest_angle, persson_load, persson_pressure
 
 JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, length=11.0)
 UNIT = JOINT.E_star * JOINT.clearance

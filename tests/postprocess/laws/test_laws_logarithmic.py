@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
-from archord.postprocess.laws import logarithmic_laws as log
-from archord.postprocess.laws.hertz_laws import hertz_half_width
-from archord.postprocess.laws.law_joint import LawJoint
+from archord.postprocess.laws import elastic_laws as log
+from archord.postprocess.laws.elastic_laws import hertz_half_width
+from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
 
 JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, length=11.0)

@@ -1,4 +1,4 @@
-"""What the closed-form laws know of a joint, and how they say that they are asked beyond their range."""
+"""What the laws know of a joint, and how they say that they are asked outside their range."""
 
 from __future__ import annotations
 
@@ -10,13 +10,10 @@ import numpy.typing as npt
 
 from archord.materials.elasticity import contact_modulus
 from archord.materials.material import Plane
-from archord.scene.errors import InputError
 from archord.scene.geometry import Model
 from archord.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
-
-
 YIELDING = ("both", "block", "pin", "unlike")
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are
 _SOFTER, _SOFTEST = 1.4, 2.5  # fall of P in a block of W, times (W/R)^2: of like elastic bodies, and of any
@@ -26,7 +23,7 @@ class LawRangeWarning(UserWarning):
     """A law was asked outside its range; the message tells the range."""
 
 
-class LawRangeError(InputError):
+class LawRangeError(ValueError):
     """As `LawRangeWarning`, where the caller asked for an error."""
 
 
@@ -41,7 +38,7 @@ class LawJoint:
     for like bodies. Only the calibrated law asks for the rest: ``plane`` ("strain" or "stress"), ``nu`` of the block,
     ``pin_nu`` of the pin (None: the block's, or rigid), and which bodies have the yield stress, ``yielding``: "both",
     "block", "pin", or "unlike" where each has its own. Laws of P(delta) are for a pin in a wide block, and say so where
-    ``model`` is "ring" or ``block_size`` (None: wide) is small. Raises `InputError` for values that make no joint.
+    ``model`` is "ring" or ``block_size`` (None: wide) is small. Raises ValueError for values that make no joint.
     """
 
     radius: float
@@ -65,47 +62,43 @@ class LawJoint:
         for name in ("radius", "clearance", "E_star", "k", "c", "yield_stress", "length", "block_size"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
-                raise InputError(f"{name} = {value:g} must be a positive number.")
-        if not -1 <= self.dundurs_alpha <= 1:
-            raise InputError(f"dundurs_alpha = {self.dundurs_alpha:g} must be between -1 and 1.")
+                raise ValueError(f"{name} = {value:g} must be a positive number.")
+        for name, most in (("dundurs_alpha", 1), ("dundurs_beta", 0.5)):
+            value = getattr(self, name)
+            if not -most <= value <= most:
+                raise ValueError(f"{name} = {value:g} must be between {-most:g} and {most:g}.")
         if self.plane not in (None, "strain", "stress"):
-            raise InputError(f'plane = {self.plane!r} must be "strain" or "stress".')
+            raise ValueError(f'plane = {self.plane!r} must be "strain" or "stress".')
         if self.yielding not in YIELDING:
-            raise InputError(f"yielding = {self.yielding!r} must be one of {', '.join(YIELDING)}.")
+            raise ValueError(f"yielding = {self.yielding!r} must be one of {', '.join(YIELDING)}.")
         for name in ("nu", "pin_nu"):
             value = getattr(self, name)
             if value is not None and not -1 < value < 0.5:
-                raise InputError(f"{name} = {value:g} must be between -1 and 0.5.")
-        if not -0.5 <= self.dundurs_beta <= 0.5:
-            raise InputError(f"dundurs_beta = {self.dundurs_beta:g} must be between -0.5 and 0.5.")
+                raise ValueError(f"{name} = {value:g} must be between -1 and 0.5.")
 
     @classmethod
     def from_scene(cls, scene: Scene, length: float | None = None, k: float = 0.85) -> LawJoint:
         """The joint of ``scene``; of two yield stresses the lower one, hardening is left out."""
-        plane = scene.analysis.plane
-        pin = scene.pin.solid
-        solids = [scene.block] if pin is None else [pin, scene.block]
-        yields = [s.yield_stress for s in solids if s.yield_stress is not None]
-        stiff = [math.inf if pin is None else contact_modulus(pin.E, pin.nu, plane)]
-        stiff.append(contact_modulus(scene.block.E, scene.block.nu, plane))
-        alpha = (stiff[0] / stiff[1] - 1) / (stiff[0] / stiff[1] + 1) if math.isfinite(stiff[0]) else 1.0
-        second = _transverse(scene.block.nu, plane)
-        first = 0.0 if pin is None else _transverse(pin.nu, plane)
+        plane, pin, block = scene.analysis.plane, scene.pin.solid, scene.block
+        alpha, first, yields, second = 1.0, 0.0, [None, block.yield_stress], _transverse(block.nu, plane)
+        if pin is not None:
+            ratio = contact_modulus(pin.E, pin.nu, plane) / contact_modulus(block.E, block.nu, plane)
+            alpha, first, yields[0] = (ratio - 1) / (ratio + 1), _transverse(pin.nu, plane), pin.yield_stress
         # beta in the compliances 1/E1' = (1 - alpha)/(2 E*), 1/E2' = (1 + alpha)/(2 E*)
         beta = ((1 + alpha) * second - (1 - alpha) * first) / 2
         return cls(
             scene.joint.radius,
             scene.joint.dR,
             scene.E_star,
-            yield_stress=min(yields, default=None),
+            yield_stress=min((stress for stress in yields if stress is not None), default=None),
             k=k,
             length=length,
             dundurs_alpha=alpha,
             dundurs_beta=beta,
             plane=plane,
-            nu=scene.block.nu,
+            nu=block.nu,
             pin_nu=None if pin is None else pin.nu,
-            yielding=_yielding(None if pin is None else pin.yield_stress, scene.block.yield_stress),
+            yielding=_yielding(*yields),
             model=scene.joint.model,
             block_size=scene.joint.W,
         )

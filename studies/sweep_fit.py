@@ -1,0 +1,199 @@
+"""``archord fit SWEEP``: k and c of every case of a sweep, and the compact model of both."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import archord
+from archord.output.output_file import check_target, writing
+from archord.postprocess.convergence import group
+from archord.postprocess.curve import RunCurve, read_run
+from archord.postprocess.laws import study_report
+from archord.postprocess.laws.calibrated import JSON_BEGINS, CalibratedModel, shipped_model
+from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.study import (
+    CSV_BEGINS,
+    FittedCase,
+    Study,
+    TooFewError,
+    fit_case,
+    read_cases,
+    rounded,
+    shipped_rows,
+    study,
+    usable,
+    write_cases,
+)
+from archord.scene.errors import InputError
+from archord.studies.case_run import report_of, standing
+from archord.studies.cases import Case, read_sweep
+from archord.studies.tables import entry, heading, of_case
+
+FILE, TABLE = "sweep.toml", "fit.csv"
+BLOCKS = "small blocks"
+_SOFTER = 0.01  # share of P that a block may cost without a word
+
+
+@dataclass(frozen=True)
+class SweepFit:
+    """The fitted ``cases`` of a sweep with their ``numbers``, what they vary (columns by heading), ``notes`` on where
+    they are from, the runs ``left_out`` with the reason, and the ``study`` of a model over them, None where the cases
+    are ``too_few``."""
+
+    cases: list[FittedCase]
+    numbers: list[int]
+    varied: dict[str, list[str]]
+    notes: dict[str, str]
+    left_out: list[tuple[str, str]]
+    study: Study | None
+    too_few: str
+
+    @property
+    def model(self) -> CalibratedModel | None:
+        """The model of k and c, if there is one."""
+        return self.study and self.study.model
+
+    def text(self) -> str:
+        """The cases, the model and its errors; of another sweep than archord's own also those of archord's law."""
+        parts = [str(study_report.case_table(self.numbers, self.cases, self.varied)), ""]
+        parts += [f"left out: {name}: {reason}" for name, reason in self.left_out]
+        if self.study is None:
+            parts.append(f"model: {self.too_few}; the table stands alone.")
+        else:
+            parts.append(study_report.model_text(self.study, len(self.cases)))
+        if BLOCKS in self.notes:
+            said = f"{self.notes[BLOCKS]}; k is smaller in them, which a model does not know."
+            parts.append(f"\n{BLOCKS}: {said}\n")
+        if self.notes.get("sweep") != shipped_model().data["provenance"].get("sweep"):
+            rows = shipped_rows(usable(self.cases)[0])
+            if rows:
+                table = study_report.error_table(rows).markdown()
+                parts.append(f"\narchord law calibrated on these cases, as far as they are in its range:\n\n{table}")
+        return "\n".join(parts)
+
+    def write(self, csv: Path | None, law: Path | None, json: Path | None, picture: Path | None) -> None:
+        """Write those files that are named: cases, model, everything, a picture. Raises `InputError` where the cases
+        give no model for ``law``, and ValueError for a picture of unknown format."""
+        if law and self.study is None:
+            raise InputError(f"{law}: no law to write: {self.too_few}.")
+        if csv:
+            write_cases(self.cases, self.notes, csv)
+        if law and self.model:
+            with writing(law):
+                law.write_text(self.model.to_json(), encoding="utf-8")
+        if json:
+            with writing(json):
+                text = study_report.as_json(self.cases, self.notes, self.left_out, self.model)
+                json.write_text(text, encoding="utf-8")
+        if picture:
+            study_report.draw_study(self.cases, self.model, picture)
+
+
+def is_sweep(path: Path) -> bool:
+    """Whether ``path`` is the folder of a sweep, or a table of its fitted cases."""
+    return (path / FILE).is_file() or (path.suffix == ".csv" and not path.is_dir())
+
+
+def check_files(
+    path: Path, csv: Path | None, law: Path | None, json: Path | None, picture: Path | None, force: bool
+) -> None:
+    """Raise `InputError` for files that `SweepFit.write` may not write: the sweep ``path`` itself, and, without
+    ``force``, files that do not begin like such output."""
+    kinds = {csv: CSV_BEGINS, law: JSON_BEGINS, json: study_report.JSON_BEGINS}
+    for file in (csv, law, json, picture):
+        if file:
+            check_target(file, [path, path / FILE], force=force or file == picture, begins=kinds.get(file))
+
+
+def fit_sweep(path: Path, load_range: tuple[float, float], confidence: float, held_out: float) -> SweepFit:
+    """Fit the sweep in the folder ``path``, or take the stored table ``path``; then a model, with a share ``held_out``
+    to judge it by. Raises `InputError`."""
+    if not 0 <= held_out <= 0.5:
+        raise InputError(f"--held-out {held_out:g}: must be a share from 0 to 0.5.")
+    if path.suffix == ".csv":
+        cases, notes = read_cases(path)
+        if not cases:
+            raise InputError(f"{path}: holds no case.")
+        numbers, varied, left_out = list(range(1, len(cases) + 1)), study_report.numbers_of(cases), []
+    else:
+        cases, numbers, varied, notes, left_out = _solved(path, load_range, confidence)
+    used, unfit = usable(cases)
+    left_out += [(case.run, reason) for case, reason in unfit]
+    try:
+        result, too_few = study(used, held_out, provenance=notes), ""
+    except TooFewError as error:
+        result, too_few = None, str(error)
+    return SweepFit(cases, numbers, varied, notes, left_out, result, too_few)
+
+
+def _solved(folder: Path, load_range: tuple[float, float], confidence: float) -> tuple:
+    """Fit k and c to every distinct case, on its finest mesh; the first five of `SweepFit`."""
+    design = read_sweep(folder / FILE)
+    of: dict[str, Case] = {}
+    runs, fitted, left_out = [], [], list[tuple[str, str]]()
+    for case in design.distinct:
+        try:
+            run = _run(case, folder)
+        except InputError as error:
+            left_out.append((case.run, str(error)))
+        else:
+            runs.append(run)
+            of[run.name] = case
+    for refined in group(runs):
+        case = of[refined.run.name]
+        left_out += [(of[run.name].run, f"{case.run} is the same joint on a finer mesh") for run in refined.coarser]
+        try:
+            fitted.append((case, fit_case(refined, load_range, confidence, case.run)))
+        except InputError as error:
+            left_out.append((case.run, str(error)))
+    if not fitted:
+        said = "; ".join(f"{name}: {reason}" for name, reason in left_out[:1])
+        raise InputError(f"{folder}: holds no case that can be fitted{f' ({said})' if said else ''}.")
+    cases = rounded(found for _, found in fitted)
+    varied = {heading(key, fitted[0][0].scene): [_shown(entry(case.value(key))) for case, _ in fitted]
+              for key in design.keys}  # fmt: skip
+    return cases, [case.number for case, _ in fitted], varied, _notes(folder, design.distinct, cases), left_out
+
+
+def _shown(value: Any) -> str:
+    return "-" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+def _run(case: Case, folder: Path) -> RunCurve:
+    """The curve of a ``case``. Raises `InputError` if it is not solved, or its joint has no such law."""
+    run = of_case(case, folder)
+    status = standing(run)
+    if status.status not in ("done", "stopped") or not status.steps:
+        raise InputError(f"{status.status}: {status.message}" if status.message else status.status)
+    if case.scene.joint.model != "block":
+        raise InputError(f'joint.model = "{case.scene.joint.model}" has no such law')
+    if case.scene.pin.hardening > 0 or case.scene.block.hardening > 0:
+        raise InputError("hardening: the law is for perfect plasticity")
+    return read_run(run).loading()
+
+
+def _notes(folder: Path, distinct: list[Case], cases: list[FittedCase]) -> dict[str, str]:
+    """Where the fitted cases are from."""
+    reports = [report for case in distinct if (report := report_of(of_case(case, folder)))]
+    days = sorted({str(report.get("started", ""))[:10] for report in reports} - {""})
+    command = [str(word) for word in (reports[0].get("command", []) if reports else [])]
+    seconds = sum(report.get("seconds", {}).get("total", 0.0) for report in reports)
+    meshes = sorted({f"{case.mesh:.3g}" for case in cases})
+    notes = {
+        "archord": archord.__version__,
+        "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
+        "command": " ".join([Path(command[0]).name, *command[1:]]) if command else "unknown",
+        "solved": " to ".join(dict.fromkeys((days[0], days[-1]))) if days else "unknown",
+        "distinct cases": str(len(distinct)),
+        "mesh": f"elements of {' and '.join(meshes)} R on the arcs",
+        "cost": f"{seconds:.0f} s on one rank, on a machine that did other work besides",
+    }
+    joints = [(case.scene.joint, LawJoint.from_scene(case.scene)) for case in distinct]
+    widths = {g.W / g.radius: joint.softer[0] for g, joint in joints if g.model == "block"}
+    softer = {width: share for width, share in widths.items() if share > _SOFTER}
+    if softer:
+        notes[BLOCKS] = f"block_size from {min(softer):.4g} R on, P about {max(softer.values()):.1%} smaller there"
+    return notes
