@@ -23,9 +23,7 @@ def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
     """
     path = run.folder / "contact.h5" if run.folder else None
     if path is None or not path.is_file():
-        raise InputError(f"{run.name}: is not a run folder: contact.h5 is missing.")
-    if not 1 <= step <= len(run.delta):
-        raise InputError(f"{run.name}: has no step {step}; its accepted steps are 1 to {len(run.delta)}.")
+        raise InputError(f"{run.name}: is not a complete run folder: contact.h5 is missing.")
     at, radius = step_name(step), {"pin": run.R, "hole": run.R + run.dR}
     try:
         with h5py.File(path) as file:

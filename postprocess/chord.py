@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from archord.geometry.basis import Array
-from archord.postprocess.arc import read_arcs
-from archord.postprocess.curve import read_run
+from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 
 
@@ -110,13 +109,9 @@ def read_chord_pressure(folder: str | Path, step: int | None = None, side: str |
     ``R`` is the side's own radius (that of the hole is R + dR) and ``eps`` the step's in history.csv. Raises
     `InputError` where there is no run, no such step or side, no contact angle, or one beyond pi/2 (a ring).
     """
-    run = read_run(folder)
-    number = len(run.delta) if step is None else step
-    arcs = read_arcs(run, number)
-    chosen = side or list(arcs)[-1]
-    if chosen not in arcs:
-        raise InputError(f"{folder}: has no side {chosen!r}; its sides are {', '.join(arcs)}.")
-    arc, eps = arcs[chosen], float(run.eps[number - 1])
+    run = Run(folder)
+    number, arc = run.number(step), run.arc(step, side)
+    eps = run.columns["eps"][number - 1]
     if not eps > 0:
         raise InputError(f"{folder}: has no contact angle at step {number}.")
     try:

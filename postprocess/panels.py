@@ -50,25 +50,27 @@ def force_panel(axes: Any, run: Run) -> None:
     second_axis(axes, "y", scene.E_star * scene.joint.radius, "P / (E* R)", "right")
 
 
-def shown_steps(run: Run, most: int = 4) -> list[int]:
-    """Up to ``most`` steps to show, evenly through the run, the last one included."""
-    return sorted({max(1, round(run.steps * k / most)) for k in range(1, most + 1)})
+def _shown_steps(run: Run, most: int = 4) -> dict[int, dict[str, Any]]:
+    """Up to ``most`` steps to show, evenly through the run, the last one included, and the style of each."""
+    steps = sorted({max(1, round(run.steps * k / most)) for k in range(1, most + 1)})
+    deltas = (run.columns["delta"][step - 1] for step in steps)
+    styles = ({"color": f"C{i}", "lw": 1.4, "label": load_label(run.scene, d)} for i, d in enumerate(deltas))
+    return dict(zip(steps, styles, strict=True))
 
 
 def arc_panel(axes: Any, run: Run) -> None:
     """Mean contact pressure of each facet over the angle from the contact axis, at up to four steps."""
-    scene, delta = run.scene, run.columns["delta"]
-    for i, step in enumerate(shown_steps(run)):
-        arcs = run.contact(step)
-        for name, arc in arcs.items():
+    scene = run.scene
+    for step, style in _shown_steps(run).items():
+        *first, last = run.contact(step).values()
+        for arc in first:
             angle, p = arc.facet_means()
-            style = {"color": f"C{i}", "lw": 1.4, "ls": "-" if name == list(arcs)[-1] else "--"}
-            label = load_label(scene, delta[step - 1]) if name == list(arcs)[-1] else None
-            axes.plot(np.degrees(angle), p, label=label, **style)
-    two = len(run.contact()) > 1
+            axes.plot(np.degrees(angle), p, **style | {"label": None, "ls": "--"})
+        angle, p = last.facet_means()
+        axes.plot(np.degrees(angle), p, **style)
     reach = 180 if scene.joint.model == "ring" else 90
     axes.set(xlabel="angle from the contact axis [°]", ylabel=f"p [{scene.units.stress}]", xlim=(0, reach))
-    axes.set(ylim=(0, None), title=f"contact pressure on the arc{' (hole solid, pin dashed)' if two else ''}")
+    axes.set(ylim=(0, None), title=f"contact pressure on the arc{' (hole solid, pin dashed)' if first else ''}")
     axes.set_xticks(np.arange(0, reach + 1, reach / 6))
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
@@ -80,16 +82,15 @@ def chord_panel(axes: Any, run: Run) -> None:
 
     Steps without contact, or with one beyond a quarter circle, have no chord.
     """
-    scene, delta, side = run.scene, run.columns["delta"], "hole"
-    for i, step in enumerate(shown_steps(run)):
-        arcs, eps = run.contact(step), run.columns["eps"][step - 1]
-        side, arc = list(arcs.items())[-1]
-        angle, p = arc.facet_means()
+    scene = run.scene
+    for step, style in _shown_steps(run).items():
+        side, arc = list(run.contact(step).items())[-1]
         try:
-            chord = chord_projection(angle, p, eps, arc.radius, arc.weight.sum(axis=1))
+            chord = chord_projection(*arc.facet_means(), run.columns["eps"][step - 1], arc.radius,
+                                     arc.weight.sum(axis=1))  # fmt: skip
         except ValueError:
             continue
-        axes.plot(chord.x_over_l, chord.py, color=f"C{i}", lw=1.4, label=load_label(scene, delta[step - 1]))
+        axes.plot(chord.x_over_l, chord.py, **style)
     axes.set(xlabel="x / l along the chord", ylabel=f"$p_y$ [{scene.units.stress}]", xlim=(0, 1.1), ylim=(0, None))
     axes.set_title(f"pressure on the chord, {side}")
     if axes.lines:

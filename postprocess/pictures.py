@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.output.folder import FILES
 from archord.output.output_file import check_output, make_folder, writing
 from archord.postprocess import panels
 from archord.postprocess.comparison import same_size, same_units, scaled
@@ -50,15 +49,8 @@ def draw(folder: str | Path, target: str | Path | None = None) -> Path:
 
     Raises `InputError` if the folder holds no accepted step of a run or no fields, or ``target`` cannot be written.
     """
-    folder = Path(folder)
     run = Run(folder)
-    run.number(None)
-    missing = [name for name in FILES if not (folder / name).is_file()]
-    if not run.scene.output.fields:
-        raise InputError(f"{folder}: has no fields to draw: it was solved with output.fields = false.")
-    if missing:
-        raise InputError(f"{folder}: is not a complete run folder: {missing[0]} is missing.")
-    target = Path(target) if target else folder / "picture.png"
+    target = Path(target) if target else run.folder / "picture.png"
     figure = open_figure(target, 15, 4.4)
     field, arc, force = figure.subplots(1, 3, width_ratios=[1.0, 1.2, 1.1])
     panels.field_panel(figure, field, run)
@@ -73,7 +65,6 @@ def draw_run(run: Run, folder: Path) -> tuple[list[Path], list[str]]:
 
     Raises `InputError` if the run has no accepted step, a file of it is damaged, or one cannot be written.
     """
-    run.number(None)
     make_folder(folder)
     sizes = {"force.png": (6.4, 4.8), "pressure.png": (12, 4.8), "field.png": (6.4, 6), "iterations.png": (6.4, 3.6)}
     left_out = []
@@ -173,7 +164,7 @@ def _pressure_at(run: Run, load: Array, wanted: float) -> tuple[Array, Array]:
     n = len(load)
     above = min(int(np.searchsorted(load, wanted * (1 - 1e-12))), n - 1)
     below = max(above - 1, 0)
-    (phi, p), (_, q) = (list(run.contact(k + 1).values())[-1].facet_means() for k in (above, below))
+    (phi, p), (_, q) = (run.arc(k + 1).facet_means() for k in (above, below))
     share = 0.0 if above == below else np.clip((load[above] - wanted) / (load[above] - load[below]), 0.0, 1.0)
     return phi, p + share * (q - p)
 

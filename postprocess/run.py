@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 class Run:
     """The run in ``folder``, as it was when this was made; a run that still goes on is loaded again to see more.
 
+    ``status`` says how it ended: "done", "stopped" (``message`` says why) or "interrupted"; "running", if it has not or
+    was killed. ``steps`` is the number of accepted steps, which are counted from 1; ``columns`` are those of
+    history.csv by name without unit, as plain lists; ``summary`` is run.json, ``warnings`` those in it.
+
     Raises `InputError` if it is no run folder, or its scene, report or history cannot be read.
     """
 
@@ -34,54 +38,29 @@ class Run:
         for name in ("scene.toml", "history.csv", "run.json"):
             if not (self.folder / name).is_file():
                 raise no_run(self.folder, name)
-        self._columns = read_columns(self.folder / "history.csv")
+        self.columns: Columns = read_columns(self.folder / "history.csv")
         self.scene: Scene = load_scene(self.folder / "scene.toml")
         self.summary: dict[str, Any] = _read_report(self.folder / "run.json")
+        self.status, self.message = str(self.summary["status"]), str(self.summary["message"])
+        self.warnings: list[str] = list(self.summary["warnings"])
+        self.steps = len(self.columns["step"])
 
     def __repr__(self) -> str:
         """Folder, status and how far it came."""
         end = f", delta/dR = {self.columns['delta/dR'][-1]:g}" if self.steps else ""
         return f"<Run {self.folder}: {self.status}, {self.steps} step{'s' if self.steps != 1 else ''}{end}>"
 
-    @property
-    def status(self) -> str:
-        """How the run ended: "done", "stopped" (`message` says why) or "interrupted"; "running" if it has not.
-
-        A run that was killed says "running", too.
-        """
-        return str(self.summary["status"])
-
-    @property
-    def message(self) -> str:
-        """Why the run stopped, in words; empty if it is done."""
-        return str(self.summary["message"])
-
-    @property
-    def warnings(self) -> list[str]:
-        """What the run warned about."""
-        return list(self.summary["warnings"])
-
-    @property
-    def steps(self) -> int:
-        """Number of accepted steps; they are counted from 1."""
-        return len(self._columns["step"])
-
-    @property
-    def columns(self) -> Columns:
-        """The columns of history.csv by name without unit, as plain lists."""
-        return self._columns
-
     @cached_property
     def history(self) -> pd.DataFrame:
         """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of every column."""
         from archord.postprocess.frames import history_frame
 
-        return history_frame(self.folder / "history.csv", self._columns)
+        return history_frame(self.folder / "history.csv", self.columns)
 
     @cached_property
     def curve(self) -> RunCurve:
         """P, p0 and eps over delta as arrays, for laws and fits. Raises `InputError` without an accepted step."""
-        return curve_of(self.folder, self.scene, self._columns)
+        return curve_of(self.folder, self.scene, self.columns)
 
     def contact(self, step: int | None = None) -> dict[str, ArcProfile]:
         """The contact along the arcs at ``step`` (the last), arrays by side: "pin", "hole".
@@ -90,6 +69,13 @@ class Run:
         """
         return read_arcs(self.curve, self.number(step))
 
+    def arc(self, step: int | None = None, side: str | None = None) -> ArcProfile:
+        """One ``side`` of `contact` (the hole, if both are there). Raises `InputError` without such a step or side."""
+        arcs = self.contact(step)
+        if side is not None and side not in arcs:
+            raise InputError(f"{self.folder}: has no side {side!r}; its sides are {', '.join(arcs)}.")
+        return arcs[side or list(arcs)[-1]]
+
     def pressure(self, step: int | None = None, side: str | None = None) -> pd.DataFrame:
         """`contact` as a table with a row for each point, sorted by side and angle; of one ``side`` if given.
 
@@ -97,10 +83,7 @@ class Run:
         """
         from archord.postprocess.frames import contact_frame
 
-        arcs = self.contact(step)
-        if side is not None and side not in arcs:
-            raise InputError(f"{self.folder}: has no side {side!r}; its sides are {', '.join(arcs)}.")
-        return contact_frame({name: arc for name, arc in arcs.items() if side in (None, name)}, self.scene)
+        return contact_frame({side: self.arc(step, side)} if side else self.contact(step), self.scene)
 
     def fields(self, step: int | None = None) -> Fields:
         """Mesh, displacement, stress and plastic strain at ``step`` (the last).

@@ -97,7 +97,7 @@ def test_a_killed_run_is_shown_as_far_as_it_came(copy, capsys):
         ("fields.h5", 0, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
         ("fields.h5", None, "{}: is not a complete run folder: fields.h5 is missing."),
         ("contact.h5", 3000, "{}/contact.h5: cannot be read as the contact of a run."),
-        ("contact.h5", None, "{}: is not a run folder: contact.h5 is missing."),
+        ("contact.h5", None, "{}: is not a complete run folder: contact.h5 is missing."),
         ("run.json", 100, "{}/run.json: cannot be read as the report of a run."),
         ("run.json", None, "{}: is not a run folder: run.json is missing."),
         ("history.csv", 30, "{}/history.csv: cannot be read as the history of a run."),
