@@ -21,7 +21,6 @@ from archord.benchmarks.cost.work_precision_report import markdown, ratio_table,
 from archord.benchmarks.cost.work_precision_run import Point, RunFailure, Task, Values, run_all, run_once
 from archord.benchmarks.cost.work_precision_warm import curves, warm_seconds
 from archord.cli import run
-from archord.postprocess.convergence import extrapolated
 from archord.scene.errors import InputError
 from tests.postprocess.synthetic import arc
 
@@ -41,29 +40,6 @@ def point(code, series, size, seconds, P, **values):
 
 
 # --- extrapolation
-
-
-@pytest.mark.parametrize("order", [1.5, 2.0, 3.7])
-def test_richardson_recovers_limit_and_order(order):
-    """From three sizes or more, whatever their ratios, the sign and the size of the error."""
-    for sizes in ([0.04, 0.02, 0.01], [0.3, 0.17, 0.1, 0.04, 0.01]):
-        for factor in (-3.0, 1e-4):
-            found = extrapolated(sizes, [5 + factor * h**order for h in sizes])
-            assert found.value == pytest.approx(5, abs=1e-6 * abs(factor))
-            assert found.order == pytest.approx(order, abs=1e-3)
-            assert found.error < 1e-4 * abs(factor)
-
-
-def test_richardson_states_scatter_as_an_error():
-    """With noise on the values the limit is within the stated error or so, and the error not far below the noise."""
-    random = np.random.default_rng(1)
-    sizes = np.array([0.04, 0.03, 0.02, 0.014, 0.01])
-    for _ in range(20):
-        found = extrapolated(sizes, 1 + sizes**2 + 1e-5 * random.standard_normal(5))
-        assert abs(found.value - 1) < 20 * max(found.error, 1e-6)
-        assert found.error > 1e-7
-    with pytest.raises(ValueError, match="three"):
-        extrapolated([0.1, 0.1, 0.2], [1, 1, 2])
 
 
 def test_two_families_that_differ_make_the_error():

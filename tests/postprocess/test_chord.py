@@ -7,7 +7,6 @@ from scipy.integrate import quad
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.chord import arc_angle, chord_coordinate, chord_projection, read_chord_pressure
 from archord.postprocess.curve import read_run
-from archord.scene.errors import InputError
 
 
 @pytest.mark.parametrize("eps", [0.01, 0.5, 1.2, np.pi / 2])
@@ -108,19 +107,6 @@ def test_the_last_step_of_the_hole_is_the_default(runs):
     """Without step and side."""
     default, named = read_chord_pressure(runs["elastic"]), read_chord_pressure(runs["elastic"], 6, "hole")
     np.testing.assert_array_equal(default.py, named.py)
-
-
-@pytest.mark.parametrize(
-    ("step", "side", "said"),
-    [
-        (7, None, "has no step 7; its accepted steps are 1 to 6"),
-        (0, None, "no step 0"),
-        (1, "block", "no side 'block'"),
-    ],
-)
-def test_what_a_run_does_not_have(runs, step, side, said):
-    with pytest.raises(InputError, match=said):
-        read_chord_pressure(runs["elastic"], step, side)
 
 
 @pytest.mark.parametrize(

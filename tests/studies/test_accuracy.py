@@ -14,7 +14,6 @@ from mpi4py import MPI
 from archord.benchmarks.case import paper_joint
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
-from archord.postprocess.convergence import mesh_error, step_error
 from archord.scene import geometry as scene_geometry
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
@@ -226,28 +225,6 @@ def test_meshes_are_bounded_by_the_keys():
     assert family.scene_of(20, 1) is None
     short = family.scene_of(0, 64).stepping
     assert short.initial == short.maximum == 1 / 64 >= short.minimum
-
-
-@pytest.mark.parametrize("order", [1.5, 2.0, 3.0, 4.0])
-def test_estimates_of_a_known_order_are_cautious(order):
-    """Never below the error from order 1.5 on if there are three meshes; at most 5 times as large."""
-    h = 1.5 ** -np.arange(3.0)
-    curves = [[0.5, 2.0 * (1 + 0.1 * size**order)] for size in h]
-    error = 0.1 * h[-1] ** order
-    assert error * 0.9 <= mesh_error(curves, 1.5) <= 5 * error
-    assert mesh_error(curves[:1], 1.5) is None
-
-
-def test_a_lucky_coincidence_is_not_believed():
-    """Two meshes that happen to agree say no more than the two before."""
-    assert mesh_error([[1.1], [1.0], [1.0]], 1.5) == pytest.approx(0.1 / 1.5**3 / 1.25)
-    assert mesh_error([[0.0], [0.0]], 1.5) == 0
-
-
-def test_steps_are_of_first_order():
-    """The error of the finer of two curves is their difference, over the largest value."""
-    curves = [[1 + 0.2 / m, -4 - 0.4 / m] for m in (4, 8)]
-    assert step_error(*curves) == pytest.approx(0.4 / 8 / 4.05)
 
 
 def test_a_scene_without_a_mesh_is_not_solved_as_it_is(tmp_path):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import archord
+from archord.postprocess.chord import read_chord_pressure
 from archord.postprocess.fields import BODIES
 
 
@@ -80,6 +81,8 @@ def test_the_pressure_carries_the_force(runs):
         (lambda run: run.fields(0), r"has no step 0; its accepted steps are 1 to 6\."),
         (lambda run: run.pressure(7), r"has no step 7; its accepted steps are 1 to 6\."),
         (lambda run: run.pressure(1, "block"), r"has no side 'block'; its sides are pin, hole\."),
+        (lambda run: read_chord_pressure(run.folder, 7), r"has no step 7; its accepted steps are 1 to 6\."),
+        (lambda run: read_chord_pressure(run.folder, 1, "block"), r"has no side 'block'; its sides are pin, hole\."),
     ],
 )
 def test_what_a_run_does_not_have(runs, ask, said):

@@ -1,0 +1,62 @@
+"""Known orders are found, and errors are estimated with caution."""
+
+import numpy as np
+import pytest
+
+from archord.postprocess.convergence import extrapolated, mesh_error, observed_order, richardson, step_error
+
+
+@pytest.mark.parametrize("order", [1.5, 2.0, 3.7])
+def test_richardson_recovers_limit_and_order(order):
+    """From three sizes or more, whatever their ratios, the sign and the size of the error."""
+    for sizes in ([0.04, 0.02, 0.01], [0.3, 0.17, 0.1, 0.04, 0.01]):
+        for factor in (-3.0, 1e-4):
+            found = extrapolated(sizes, [5 + factor * h**order for h in sizes])
+            assert found.value == pytest.approx(5, abs=1e-6 * abs(factor))
+            assert found.order == pytest.approx(order, abs=1e-3)
+            assert found.error < 1e-4 * abs(factor)
+
+
+@pytest.mark.parametrize("order", [0.3, 1.5, 2.0, 3.7])
+@pytest.mark.parametrize("sizes", [(1.0, 1.5, 2.25), (0.03, 0.05, 0.1)])
+def test_three_sizes_show_their_order(order, sizes):
+    """And `richardson` with it is the error of the finest; orders that no three meshes show are infinite."""
+    first, second, third = (7 * h**order for h in sizes)
+    found = observed_order(sizes, second - first, third - second)
+    assert found == pytest.approx(order, rel=1e-9)
+    assert richardson(second - first, sizes[1] / sizes[0], found) == pytest.approx(first, rel=1e-8)
+    assert observed_order(sizes, 1.0, 1e9) == -observed_order(sizes, 1.0, 1e-3) == np.inf
+
+
+def test_richardson_states_scatter_as_an_error():
+    """With noise on the values the limit is within the stated error or so, and the error not far below the noise."""
+    random = np.random.default_rng(1)
+    sizes = np.array([0.04, 0.03, 0.02, 0.014, 0.01])
+    for _ in range(20):
+        found = extrapolated(sizes, 1 + sizes**2 + 1e-5 * random.standard_normal(5))
+        assert abs(found.value - 1) < 20 * max(found.error, 1e-6)
+        assert found.error > 1e-7
+    with pytest.raises(ValueError, match="three"):
+        extrapolated([0.1, 0.1, 0.2], [1, 1, 2])
+
+
+@pytest.mark.parametrize("order", [1.5, 2.0, 3.0, 4.0])
+def test_estimates_of_a_known_order_are_cautious(order):
+    """Never below the error from order 1.5 on if there are three meshes; at most 5 times as large."""
+    h = 1.5 ** -np.arange(3.0)
+    curves = [[0.5, 2.0 * (1 + 0.1 * size**order)] for size in h]
+    error = 0.1 * h[-1] ** order
+    assert error * 0.9 <= mesh_error(curves, 1.5) <= 5 * error
+    assert mesh_error(curves[:1], 1.5) is None
+
+
+def test_a_lucky_coincidence_is_not_believed():
+    """Two meshes that happen to agree say no more than the two before."""
+    assert mesh_error([[1.1], [1.0], [1.0]], 1.5) == pytest.approx(0.1 / 1.5**3 / 1.25)
+    assert mesh_error([[0.0], [0.0]], 1.5) == 0
+
+
+def test_steps_are_of_first_order():
+    """The error of the finer of two curves is their difference, over the largest value."""
+    curves = [[1 + 0.2 / m, -4 - 0.4 / m] for m in (4, 8)]
+    assert step_error(*curves) == pytest.approx(0.4 / 8 / 4.05)
