@@ -86,7 +86,7 @@ def solve(
     checked, target = agreed(comm, claimed)
     if folder is None and comm.rank == 0 and comm.size > 1:
         atexit.register(shutil.rmtree, target, ignore_errors=True)
-    from archord.output.run import solve_as_asked
+    from archord.studies.accuracy import solve_as_asked
 
     report, options = reporting(checked, silent=not progress or comm.rank != 0)
     try:

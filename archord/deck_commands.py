@@ -29,7 +29,7 @@ def export_deck(
     force: Annotated[bool, typer.Option("--force", help="overwrite a file that is there")] = False,
 ) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
-    from archord.output.output_file import check_target
+    from archord.output.user_file import check_target
     from archord.scene.errors import InputError
     from archord.scene.file import files_read, load_scene
 

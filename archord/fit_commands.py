@@ -52,7 +52,7 @@ def fit(
     import math
 
     from archord.output.folder import FILES
-    from archord.output.output_file import check_target, writing
+    from archord.output.user_file import check_target, writing
     from archord.postprocess.curve import read_run
     from archord.postprocess.laws import fit_report
     from archord.postprocess.laws.calibration import PYTHON_BEGINS, calibrate

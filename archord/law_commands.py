@@ -122,7 +122,7 @@ def law(
     rows = "load" if by_load or not all(entry.gives_displacement for entry in chosen) else "displacement"
     outside: Outside = "raise" if strict else "extrapolate" if extrapolate else "nan"
     if plot is not None:
-        from archord.output.output_file import check_target
+        from archord.output.user_file import check_target
         from archord.postprocess.laws.law_report import draw_laws
         from archord.scene.file import files_read
 

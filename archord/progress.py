@@ -42,9 +42,9 @@ def solve_with_progress(
 
     comm = MPI.COMM_WORLD
     scene = agreed(comm, claimed)
-    from archord.output.run import solve_as_asked
     from archord.postprocess.tables import first_of_each_kind
     from archord.solver.timer import Timer
+    from archord.studies.accuracy import solve_as_asked
 
     timer = Timer()
     timer.seconds["start-up"] = perf_counter() - begun

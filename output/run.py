@@ -16,11 +16,10 @@ from archord.output.contact import ContactWriter
 from archord.output.disk import WriteError, naming, on_root, replace_file
 from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import History
-from archord.output.memory import peak_memory
-from archord.output.report import Report
 from archord.output.restart import Start
+from archord.output.run_json import Report, peak_memory
 from archord.output.run_state import Standing, halt, resume
-from archord.output.stale_jit import forget_half_compiled
+from archord.output.stale_jit import without_stale_forms
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
 from archord.presets.measures import Measures, Work, arc_profiles, measure
@@ -35,7 +34,6 @@ from archord.solver.timer import Timer
 
 if TYPE_CHECKING:
     from archord.output.fields import FieldWriter
-    from archord.studies.accuracy import Accuracy
 
 _UNSEEN = (
     "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
@@ -48,7 +46,7 @@ class Outcome:
     """How a run ended: ``status`` is "done", "stopped" or "interrupted" (``message`` says why), and its steps.
 
     ``signal`` interrupted it. ``warnings`` are known on rank 0 only. ``unseen`` says that the mesh was too coarse to
-    notice the contact, ``accuracy`` how accurate a run is that was asked for it.
+    notice the contact, ``accuracy`` how accurate a run is that was asked for it (`studies.accuracy.Accuracy`).
     """
 
     folder: Path
@@ -58,7 +56,7 @@ class Outcome:
     warnings: list[str]
     signal: int = 0
     unseen: bool = False
-    accuracy: Accuracy | None = None
+    accuracy: Any = None
 
 
 def solve_scene(
@@ -88,7 +86,7 @@ def solve_scene(
     begun = perf_counter() if begun is None else begun
     with ExitStack() as stack:
         on_root(comm, lambda: stack.enter_context(occupied(folder)) or True)
-        joint = _joint(scene, comm, timer)
+        joint = without_stale_forms(lambda: Joint(scene, comm, timer=timer))
         on_start(joint)
         output = _Output(folder, joint, begun)
         status, message, failed, received = "done", "", None, 0
@@ -125,27 +123,6 @@ def solve_scene(
         except WriteError as error:
             status, message, warnings = "stopped", message if status == "stopped" else str(error), []
         return Outcome(folder, status, message, output.steps, warnings, received, unseen)
-
-
-def solve_as_asked(
-    scene: Scene, folder: Path, comm: MPI.Comm, *, start: Start | None = None, **options: Any
-) -> Outcome:
-    """`solve_scene`, or `accuracy.solve_to_accuracy` where ``scene`` asks for an accuracy. Collective."""
-    if scene.analysis.accuracy is None or start is not None:
-        return solve_scene(scene, folder, comm, start=start, **options)
-    from archord.studies.accuracy import solve_to_accuracy
-
-    return solve_to_accuracy(scene, folder, comm, **options)
-
-
-def _joint(scene: Scene, comm: MPI.Comm, timer: Timer | None) -> Joint:
-    """The joint of ``scene``, though a kill may have left its forms half compiled. Collective."""
-    try:
-        return Joint(scene, comm, timer=timer)
-    except (TimeoutError, RuntimeError) as error:
-        if not forget_half_compiled(str(error)):
-            raise
-    return Joint(scene, comm, timer=timer)
 
 
 class _Output:

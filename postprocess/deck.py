@@ -21,7 +21,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.joint_mesh import Cells, Facets
 from archord.geometry.quarter_joint import quarter_joint
-from archord.output.output_file import writing
+from archord.output.user_file import writing
 from archord.scene.scene import Pin, Scene, Solid
 
 Ints = npt.NDArray[np.int64]

@@ -15,8 +15,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from archord.output.output_file import check_output, make_folder, writing
 from archord.output.step_file import step_name
+from archord.output.user_file import check_output, make_folder, writing
 from archord.postprocess.arc import SIDES, undeformed
 from archord.postprocess.fields import Fields
 from archord.postprocess.run import Run

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.output.output_file import check_output, make_folder, writing
+from archord.output.user_file import check_output, make_folder, writing
 from archord.postprocess import panels
 from archord.postprocess.comparison import same_size, same_units, scaled
 from archord.postprocess.curve import gap_name

@@ -18,6 +18,7 @@ from typing import Any
 from mpi4py import MPI
 
 from archord.output.disk import WriteError, naming, on_root, replace_file
+from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
 from archord.presets.joint import Joint
@@ -89,6 +90,15 @@ def solve_to_accuracy(
         search = _Search(scene, folder, comm, on_level, {**options, "interrupt": interrupt})
         search.run({"timer": timer, "begun": begun})
         return search.finish()
+
+
+def solve_as_asked(
+    scene: Scene, folder: Path, comm: MPI.Comm, *, start: Start | None = None, **options: Any
+) -> Outcome:
+    """`solve_to_accuracy` where ``scene`` asks for an accuracy and no run goes on, else `solve_scene`. Collective."""
+    if scene.analysis.accuracy is None or start is not None:
+        return solve_scene(scene, folder, comm, start=start, **options)
+    return solve_to_accuracy(scene, folder, comm, **options)
 
 
 class _End(Exception):

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.benchmarks.paper.runs import PLANES, Plane
+from archord.scene.reference import toml_value
 
 R, E_STAR = 10.0, 1e5  # mm, MPa
 NU = (0.0, 0.49)
@@ -61,7 +61,7 @@ class Joint:
     ``yielding`` is "none", "both" or "block".
     """
 
-    plane: Plane
+    plane: str
     yielding: str = "none"
     alpha: float = 0.0
     pin_nu: float = 0.3
@@ -88,21 +88,21 @@ class Joint:
 
 def joints() -> list[Joint]:
     """All joints of the design."""
-    return [joint for plane in PLANES for joint in _of_plane(plane)]
+    return [joint for plane in S for joint in _of_plane(plane)]
 
 
 def fresh(number: int, seed: int = 100) -> list[Joint]:
     """``number`` other joints of each plane and kind in the same ranges, to judge the law by."""
     found: list[Joint] = []
-    for plane in PLANES:
+    for plane in S:
         for yielding, stiffest in (("none", 1.0), ("both", BOTH_STIFFEST), ("block", 1.0)):
             seed += 1
             found += _sampled(Joint(plane, yielding), number, seed, stiffest)
     return found
 
 
-def _of_plane(plane: Plane) -> Iterator[Joint]:
-    seed = PLANES.index(plane)
+def _of_plane(plane: str) -> Iterator[Joint]:
+    seed = list(S).index(plane)
     elastic = Joint(plane)
     for alpha in (SOFTEST, 0.0, 0.5, 1.0):
         for nu in (0.0, 0.15, 0.3, 0.4, 0.49):
@@ -142,8 +142,6 @@ def _rounded(value: float) -> float:
 
 def as_sweep(chosen: list[Joint] | None = None, element_sizes: tuple[float, ...] = (0.05,)) -> str:
     """The sweep file of all joints, or of those ``chosen``, on meshes with ``element_sizes`` on the arcs, over R."""
-    from archord.scene.reference import toml_value
-
     rows = [
         "    { " + ", ".join(f"{key} = {toml_value(value)}" for key, value in joint.overrides().items()) + " },"
         for joint in (joints() if chosen is None else chosen)

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 from archord.output.disk import replace_file
 from archord.output.folder import claim_folder
-from archord.output.stale_jit import forget_half_compiled
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupted
@@ -103,7 +102,7 @@ def solve_case(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[]
 
 
 def _solve(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int]) -> Result:
-    for anew in (False, True, True):
+    for anew in (False, True):
         try:
             return _attempt(scene, folder, comm, received, anew=anew)
         except Interrupted as interrupted:
@@ -113,10 +112,6 @@ def _solve(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], in
             if "another archord" in str(error):
                 return Result(folder.name, "busy", str(error))
             fault: Exception = error
-        except (TimeoutError, RuntimeError) as error:
-            if not forget_half_compiled(str(error)):
-                return _failed(folder, comm, error)
-            fault = error
         except Exception as error:
             return _failed(folder, comm, error)
     return _failed(folder, comm, fault)
@@ -125,7 +120,7 @@ def _solve(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], in
 def _attempt(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int], *, anew: bool) -> Result:
     """Solve, from the beginning if ``anew``. Raises whatever went wrong."""
     from archord.output.ranks import agreed
-    from archord.output.run import solve_as_asked
+    from archord.studies.accuracy import solve_as_asked
 
     def check(_: Any) -> None:
         number = max(comm.allgather(received()))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import archord
-from archord.output.output_file import check_target, writing
+from archord.output.user_file import check_target, writing
 from archord.postprocess.convergence import group
 from archord.postprocess.curve import RunCurve, read_run
 from archord.postprocess.laws import study_report

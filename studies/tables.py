@@ -88,12 +88,6 @@ def heading(key: str, scene: Scene) -> str:
     return f"{key} [{getattr(scene.units, str(kind))}]" if kind else key
 
 
-def read_table(path: str | Path) -> list[dict[str, str]]:
-    """The rows of a sweep.csv or cases.csv, by heading."""
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
     """Wait until no other process is here with this ``folder``: the last one to end gathers what all have done."""

@@ -34,8 +34,6 @@ ROOMS = [
 OPEN = {
     "solver.contact",
     "solver.linear",
-    "output",
-    "studies",
 }
 
 

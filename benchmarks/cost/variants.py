@@ -34,7 +34,7 @@ code = run(arguments)
 modules = sorted(sys.modules)
 import json, re
 from pathlib import Path
-from archord.output.memory import peak_memory
+from archord.output.run_json import peak_memory
 kernels = sorted(set(re.findall(r"/(\\w+)-[0-9a-f]{16}\\.so", Path("/proc/self/maps").read_text())))
 Path(note).write_text(json.dumps({"modules": modules, "kernels": kernels, "memory": peak_memory()}))
 sys.exit(code)
@@ -116,7 +116,8 @@ def use(variant: Variant, folder: Path, repeats: int) -> Use:
     note = processes[0][1]
     names = {*note["modules"], *(f"kernel {name}" for name in note["kernels"])}
     report = json.loads((run_folder / "run.json").read_text(encoding="utf-8"))
-    written = sum(f.stat().st_size for f in run_folder.iterdir() if (f.name == "picture.png") == bool(variant.drawn))
+    files = [file for file in run_folder.rglob("*") if file.is_file()]
+    written = sum(file.stat().st_size for file in files if (file.name == "picture.png") == bool(variant.drawn))
     return Use(
         variant,
         dofs=report["mesh"]["dofs"],

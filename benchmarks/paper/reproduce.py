@@ -14,8 +14,8 @@ from archord.benchmarks.paper.first_yield import fig8
 from archord.benchmarks.paper.runs import PAIRS, Case, cases, plastic, solve_missing
 from archord.benchmarks.report_files import markdown_table
 from archord.output.folder import claim_folder
-from archord.output.output_file import check_output
 from archord.output.ranks import agreed
+from archord.output.user_file import check_output
 from archord.scene.errors import InputError
 
 _PLASTIC = [plastic(pair) for pair in PAIRS]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from archord.output.output_file import writing
+from archord.output.user_file import writing
 from archord.postprocess.laws.calibration import Calibration, Fits
 from archord.postprocess.laws.curve_fit import CurveFit, dimensionless_law
 from archord.report.figure import new_figure, save

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.output.output_file import writing
+from archord.output.user_file import writing
 from archord.postprocess.laws import elastic_laws as elastic
 from archord.postprocess.laws.joint import Array, LawJoint, LawRangeWarning
 from archord.postprocess.laws.law import Law, LawState, Outside

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from archord.output.output_file import writing
+from archord.output.user_file import writing
 from archord.postprocess.convergence import Refined
 from archord.postprocess.laws.calibrated import (
     SOFT,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from archord.output.output_file import writing
+from archord.output.user_file import writing
 from archord.postprocess.laws.calibrated import SOFT, CalibratedModel, Points, equivalent
 from archord.postprocess.laws.study import KINDS, PLANES, FittedCase, Row, Study, known, predictions
 from archord.report.figure import new_figure, save

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from archord.geometry.curve import lagrange
+from archord.output.fields import SecondOrder
 from archord.output.run import solve_scene
-from archord.output.second_order import SecondOrder
 from archord.output.step_file import step_name
 from tests.solver.parts import DR
 from tests.solver.solving import scene, solve

@@ -5,8 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.persson import DR, UNLIKE, persson_joint, theory, unlike
-from archord.output.report import energy_balance
 from archord.output.run import solve_scene
+from archord.output.run_json import energy_balance
 from archord.postprocess.laws.elastic_laws import persson_pressure
 from archord.postprocess.laws.joint import LawJoint
 from archord.scene.scene import Load

@@ -12,7 +12,6 @@ from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.ranks import agreed
 from archord.output.run import solve_scene
-from archord.studies import case_run
 from archord.studies.case_run import report_of, solve_case, standing
 from archord.studies.cases import read_sweep
 from archord.studies.farm import Farm, Job, suited
@@ -122,36 +121,6 @@ def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
         by_run = {result.run: result for result in results}
         assert [by_run[job.folder.name].status for job in jobs] == 3 * ["failed"] + 3 * ["done"]
         assert [standing(job.folder).message for job in jobs] == 3 * ["ValueError: broken"] + 3 * [""]
-
-
-@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")
-def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(comm, tmp_path, monkeypatch):
-    """ffcx waits for a file that nobody will write; only an old one is removed, as a new one is somebody's work."""
-    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5]\n")
-    half = tmp_path / "libffcx_forms_0.c"
-    half.touch()
-    complaint = (
-        "JIT compilation timed out, probably due to a failed previous compile. "
-        f"Try cleaning cache (e.g. remove {half}) or increase timeout option."
-    )
-    from archord.output import run
-
-    true_solve, calls = run.solve_scene, []
-
-    def solve(*arguments, **named):
-        calls.append(half.exists())
-        if half.exists():
-            raise TimeoutError(complaint)
-        return true_solve(*arguments, **named)
-
-    monkeypatch.setattr(run, "solve_scene", solve)
-    assert solve_case(jobs[0].scene, jobs[0].folder, comm).status == "failed"
-    assert calls == [True, True, True]
-    os.utime(half, (1, 1))
-    calls.clear()
-    assert solve_case(jobs[0].scene, jobs[0].folder, comm).status == "done"
-    assert calls == [True, False]
-    assert not (jobs[0].folder / case_run.FAILURE).exists()
 
 
 @pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")

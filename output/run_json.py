@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import platform
+import resource
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -24,6 +25,7 @@ from archord.solver.stepping import Step
 from archord.solver.timer import BEFORE_SOLVING
 
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")
+_KILOBYTES = 1 if sys.platform == "darwin" else 1024  # unit of ru_maxrss in bytes
 _FEW_FACETS = 5
 _ROUGH = 0.01  # of the clearance
 _APART = (
@@ -144,6 +146,18 @@ class Report:
             "energy_balance": energy_balance(self.measures, press_fit=self.joint.scene.joint.dR < 0),
             "newton_residual": self._residual,
         }
+
+
+def peak_memory() -> int:
+    """The largest resident set of this process so far, in bytes.
+
+    Linux hands ``ru_maxrss`` down to the programs that a process starts; its own file of the process starts at zero.
+    """
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+        return 1024 * next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM:"))
+    except (OSError, StopIteration, ValueError):
+        return _KILOBYTES * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def energy_balance(steps: Sequence[Measures], *, press_fit: bool = False) -> float | None:
