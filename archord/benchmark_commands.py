@@ -1,32 +1,85 @@
-"""``archord benchmark``: how the solver fares over many scenes."""
+"""``archord benchmark`` and ``archord reproduce``: how the solver fares over many scenes."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated
 
-from archord.plain_typer import typer
+import click
 
-benchmark = typer.Typer(no_args_is_help=True, help="Benchmarks of the solver.", rich_markup_mode=None)
+from archord.options import argument, flag, output, quiet
+from archord.scene.errors import InputError
+
+Say = Callable[[str], None]
 
 
-@benchmark.callback()
-def _group() -> None:
+def _repeats(help: str, default: int) -> Callable:
+    return click.option("--repeats", type=click.IntRange(1), default=default, help=help)
+
+
+def _telling(quiet: bool) -> Say:
+    """Prints sentences with the time since now; on stderr, as ranks other than 0 tell, too, and stdout has tables."""
+    begun = perf_counter()
+
+    def say(sentence: str) -> None:
+        if not quiet:
+            print(f"{perf_counter() - begun:7.1f} s  {sentence}", file=sys.stderr, flush=True)
+
+    return say
+
+
+def _conclude(printed: str, files: Iterable[Path], faults: Iterable[str], quiet: bool) -> int:
+    """Print a benchmark's tables, what it wrote, and what is wrong; the exit code."""
+    faults = list(faults)
+    if not quiet:
+        print(printed)
+        for file in files:
+            print(file)
+    for fault in faults:
+        print(f"archord: {fault}.", file=sys.stderr)
+    return 1 if faults else 0
+
+
+@click.command()
+@argument("figures", "[FIGURE]...", "fig2 ... fig9, or all", nargs=-1, type=str)
+@output("folder for runs, tables, pictures, report", "runs/paper")
+@quiet()
+def reproduce(figures: tuple[str, ...], output: Path, quiet: bool) -> int:
+    """Solve what the paper's figures need, and write each as CSV and picture; all of them with a report.
+
+    Runs that are there already are not solved again. Under mpirun the ranks solve different runs side by side.
+    """
+    from mpi4py import MPI
+
+    from archord.benchmarks.paper.reproduce import chosen
+    from archord.benchmarks.paper.reproduce import reproduce as make
+
+    comm, say = MPI.COMM_WORLD, _telling(quiet)
+    wanted = chosen(figures or ["all"])
+    try:
+        files = make(wanted, output, comm, lambda case, P: say(f"{case.name:34s} P(2 dR)/(E* R) = {P:.6f}"))
+    except RuntimeError as error:
+        if comm.rank == 0:
+            print(f"archord: {error}.", file=sys.stderr)
+        return 3
+    if not quiet:
+        for file in files:
+            print(file)
+    return 0
+
+
+@click.group()
+def benchmark() -> None:
     """Benchmarks of the solver."""
 
 
 @benchmark.command()
-def stability(
-    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs, table and heat map")] = Path(
-        "runs/stability"
-    ),
-    only: Annotated[
-        str | None, typer.Option("--only", metavar="PATTERN", help="cases or groups with such a name")
-    ] = None,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what is wrong")] = False,
-) -> int:
+@output("folder for runs, table and heat map", "runs/stability")
+@click.option("--only", metavar="PATTERN", help="cases or groups with such a name")
+@quiet("what is wrong")
+def stability(output: Path, only: str | None, quiet: bool) -> int:
     """Solve a table of extreme scenes, each within a budget, and hold every line against what it must give.
 
     Writes stability.csv, stability.md and stability.png. Under mpirun the ranks solve different scenes side by side.
@@ -35,49 +88,32 @@ def stability(
     from mpi4py import MPI
 
     from archord.benchmarks.stability import run as table
+    from archord.benchmarks.stability.report import markdown, write
 
-    begun, comm = perf_counter(), MPI.COMM_WORLD
-    names = table.chosen(only)
+    comm, say = MPI.COMM_WORLD, _telling(quiet)
 
     def said(case, result) -> None:
-        if not quiet:
-            # stderr, as ranks other than 0 report their cases too
-            print(
-                f"{perf_counter() - begun:7.1f} s  {case.group}: {case.name}: {result.status}, {result.steps} steps, "
-                f"{result.iterations} iterations, {result.cutbacks} cutbacks, {result.seconds:.1f} s",
-                file=sys.stderr,
-                flush=True,
-            )
+        say(
+            f"{case.group}: {case.name}: {result.status}, {result.steps} steps, "
+            f"{result.iterations} iterations, {result.cutbacks} cutbacks, {result.seconds:.1f} s"
+        )
 
-    lines = table.run(names, output / "runs", comm, said)
-    wrong = [line for line in lines if line.faults]
-    if comm.rank == 0:
-        from archord.benchmarks.stability.report import markdown, write
-
-        files = write(lines, output)
-        if not quiet:
-            print(markdown(lines))
-            for file in files:
-                print(file)
-        for line in wrong:
-            print(f"archord: {line.case.group}: {line.case.name}: {line.verdict}.", file=sys.stderr)
-    return 1 if wrong else 0
+    lines = table.run(table.chosen(only), output / "runs", comm, said)
+    wrong = [f"{line.case.group}: {line.case.name}: {line.verdict}" for line in lines if line.faults]
+    if comm.rank != 0:
+        return 1 if wrong else 0
+    return _conclude(markdown(lines), write(lines, output), wrong, quiet)
 
 
 @benchmark.command()
-def scaling(
-    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs, tables and picture")] = Path(
-        "runs/scaling"
-    ),
-    largest: Annotated[
-        float, typer.Option("--largest", metavar="N", help="dofs of the largest mesh, 1 million at most")
-    ] = 1_000_000,
-    ranks: Annotated[str, typer.Option("--ranks", metavar="1,2", help="numbers of ranks, 1 first")] = "1,2",
-    repeats: Annotated[
-        int, typer.Option("--repeats", min=1, help="runs of each case, 3 of a million dofs; the median counts")
-    ] = 1,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what is wrong")] = False,
-) -> int:
+@output("folder for runs, tables and picture", "runs/scaling")
+@click.option(
+    "--largest", type=float, default=1_000_000, metavar="N", help="dofs of the largest mesh, 1 million at most"
+)
+@click.option("--ranks", default="1,2", metavar="1,2", help="numbers of ranks, 1 first")
+@_repeats("runs of each case, 3 of a million dofs; the median counts", 1)
+@quiet("what is wrong")
+def scaling(output: Path, largest: float, ranks: str, repeats: int, quiet: bool) -> int:
     """Solve the paper's joint on ever finer meshes and several ranks: time by part and memory per rank.
 
     Writes scaling.csv, scaling.md and scaling.png. Exit code 0 only if every run finishes, with the same force on any
@@ -85,108 +121,72 @@ def scaling(
     """
     from archord.benchmarks.cost import scaling as table
     from archord.benchmarks.cost.scaling_report import markdown, write_report
-    from archord.scene.errors import InputError
 
     if not all(part.strip().isdecimal() for part in ranks.split(",")):
         raise InputError(f"--ranks {ranks}: must be whole numbers with commas between them, like 1,2.")
+    say = _telling(quiet)
 
     def said(cost) -> None:
-        if not quiet:
-            what = cost.fault or f"{cost.dofs} dofs, {cost.total:.1f} s, {cost.peak / 1e6:.0f} MB"
-            print(f"{cost.case.name}: {what}", file=sys.stderr, flush=True)
+        what = cost.fault or f"{cost.dofs} dofs, {cost.total:.1f} s, {cost.peak / 1e6:.0f} MB"
+        say(f"{cost.case.name}: {what}")
 
     costs = table.Costs(table.run(largest, [int(part) for part in ranks.split(",")], output / "runs", repeats, said))
-    files = write_report(costs, output)
-    if not quiet:
-        print(markdown(costs))
-        for file in files:
-            print(file)
-    for fault in costs.faults():
-        print(f"archord: {fault}.", file=sys.stderr)
-    return 1 if costs.faults() else 0
+    return _conclude(markdown(costs), write_report(costs, output), costs.faults(), quiet)
 
 
 @benchmark.command()
-def variants(
-    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs and table")] = Path("runs/variants"),
-    repeats: Annotated[int, typer.Option("--repeats", min=1, help="runs of each variant; the median counts")] = 3,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what is wrong")] = False,
-) -> int:
+@output("folder for runs and table", "runs/variants")
+@_repeats("runs of each variant; the median counts", 3)
+@quiet("what is wrong")
+def variants(output: Path, repeats: int, quiet: bool) -> int:
     """Solve one scene in variants, and tell what each loads, needs and writes.
 
     Writes variants.csv and variants.md. Exit code 0 only if none loads what it does not use.
     """
     from archord.benchmarks.cost import variants as table
 
+    say = _telling(quiet)
+
     def said(use) -> None:
-        if not quiet:
-            print(f"{use.variant.name}: {use.seconds:.2f} s, {use.modules} modules", file=sys.stderr, flush=True)
+        say(f"{use.variant.name}: {use.seconds:.2f} s, {use.modules} modules")
 
     uses = table.run(output / "runs", repeats, said)
-    files = table.write_report(uses, output)
     faults = [fault for use in uses for fault in use.faults()]
-    if not quiet:
-        print(table.markdown(uses))
-        for file in files:
-            print(file)
-    for fault in faults:
-        print(f"archord: {fault}.", file=sys.stderr)
-    return 1 if faults else 0
+    return _conclude(table.markdown(uses), table.write_report(uses, output), faults, quiet)
 
 
 @benchmark.command()
-def accuracy(
-    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs and table")] = Path("runs/accuracy"),
-    only: Annotated[str, typer.Option("--only", metavar="PATTERN", help="joints with such a name")] = "",
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what is wrong")] = False,
-) -> int:
+@output("folder for runs and table", "runs/accuracy")
+@click.option("--only", default="", show_default=False, metavar="PATTERN", help="joints with such a name")
+@quiet("what is wrong")
+def accuracy(output: Path, only: str, quiet: bool) -> int:
     """Solve several joints to several accuracies, and compare what was asked, estimated and true.
 
     Writes accuracy.csv and accuracy.md. Exit code 0 only if all errors are below what was asked.
     """
     from archord.benchmarks.cost import accuracy as table
     from archord.benchmarks.cost.work_precision_cases import matches
-    from archord.scene.errors import InputError
 
-    def said(sentence: str) -> None:
-        if not quiet:
-            print(f"{perf_counter() - begun:7.1f} s  {sentence}", file=sys.stderr, flush=True)
-
-    begun, cases = perf_counter(), tuple(case for case in table.CASES if matches(only, case.name))
+    cases = tuple(case for case in table.CASES if matches(only, case.name))
     if not cases:
         raise InputError(f"--only {only}: must be part of {', '.join(case.name for case in table.CASES)}.")
-    lines = table.run(output / "runs", cases, said)
-    files = table.write_report(lines, output)
-    if not quiet:
-        print(table.markdown(lines))
-        for file in files:
-            print(file)
+    lines = table.run(output / "runs", cases, _telling(quiet))
     faults = [fault for line in lines if (fault := line.fault())]
-    for fault in faults:
-        print(f"archord: {fault}.", file=sys.stderr)
-    return 1 if faults else 0
+    return _conclude(table.markdown(lines), table.write_report(lines, output), faults, quiet)
 
 
 @benchmark.command("work-precision")
-def work_precision(
-    output: Annotated[Path, typer.Option("-o", "--output", help="folder for runs, tables and diagrams")] = Path(
-        "runs/work_precision"
-    ),
-    case: Annotated[str, typer.Option("--case", help="elastic, plastic or both")] = "both",
-    only: Annotated[
-        list[str] | None,
-        typer.Option("--only", metavar="PATTERN", help='codes, series or "code, series, mesh"; may be repeated'),
-    ] = None,
-    repeats: Annotated[int, typer.Option("--repeats", min=1, help="timed runs of every point")] = 3,
-    peers: Annotated[bool, typer.Option("--peers/--no-peers", help="CalculiX and other codes that are here")] = True,
-    limit: Annotated[float, typer.Option("--limit", min=1.0, help="seconds that a process may take")] = 600.0,
-    quick: Annotated[bool, typer.Option("--quick", help="the coarsest meshes alone, to see that it works")] = False,
-    warm: Annotated[bool, typer.Option("--warm", help="time curves within one process, too")] = False,
-    reference: Annotated[
-        bool, typer.Option("--reference", help="solve the fine meshes and store the reference values, nothing else")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but what failed")] = False,
-) -> int:
+@output("folder for runs, tables and diagrams", "runs/work_precision")
+@click.option("--case", default="both", help="elastic, plastic or both")
+@click.option("--only", multiple=True, metavar="PATTERN", help='codes, series or "code, series, mesh"; may be repeated')
+@_repeats("timed runs of every point", 3)
+@click.option("--peers/--no-peers", default=True, help="CalculiX and other codes that are here")
+@click.option("--limit", type=click.FloatRange(1.0), default=600.0, help="seconds that a process may take")
+@flag("--quick", "the coarsest meshes alone, to see that it works")
+@flag("--warm", "time curves within one process, too")
+@flag("--reference", "solve the fine meshes and store the reference values, nothing else")
+@quiet("what failed")
+def work_precision(output: Path, case: str, reference: bool, quiet: bool, **options) -> int:
     """Time series of meshes, elastic and elasto-plastic, archord's and other codes', and set error against time.
 
     Writes work_precision.csv, work_precision.md and a diagram for each case. Every point is a whole process on one core
@@ -194,21 +194,17 @@ def work_precision(
     """
     from archord.benchmarks.cost.work_precision_cases import chosen_cases
 
-    def say(sentence: str) -> None:
-        if not quiet:
-            print(f"{perf_counter() - begun:7.1f} s  {sentence}", file=sys.stderr, flush=True)
-
-    begun, cases = perf_counter(), chosen_cases(case)
+    say, cases = _telling(quiet), chosen_cases(case)
     try:
         if reference:
             return _store_reference(cases, output / "reference", say)
-        return _work_precision(cases, output, only, repeats, peers, limit, quick, warm, quiet, say)
+        return _work_precision(cases, output, say, quiet=quiet, **options)
     except RuntimeError as error:
         print(f"archord: {error}.", file=sys.stderr)
         return 3
 
 
-def _store_reference(cases, folder: Path, say) -> int:
+def _store_reference(cases, folder: Path, say: Say) -> int:
     from archord.benchmarks.cost.work_precision_reference import FILE, compute
     from archord.benchmarks.cost.work_precision_report import reference_table
 
@@ -220,7 +216,19 @@ def _store_reference(cases, folder: Path, say) -> int:
     return 0
 
 
-def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, warm, quiet, say) -> int:
+def _work_precision(
+    cases,
+    output: Path,
+    say: Say,
+    *,
+    only: tuple[str, ...],
+    repeats: int,
+    peers: bool,
+    limit: float,
+    quick: bool,
+    warm: bool,
+    quiet: bool,
+) -> int:
     from archord.benchmarks.cost import work_precision as table
     from archord.benchmarks.cost.work_precision_figure import draw
     from archord.benchmarks.cost.work_precision_report import markdown, write_csv
@@ -229,7 +237,7 @@ def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, war
 
     claim_folder(output, force=True)
     found = [t for case in cases for t in table.tasks(case, output / "runs", quick=quick, peers=peers, limit=limit)]
-    found = table.chosen(found, only or [])
+    found = table.chosen(found, list(only))
 
     def said(task, repeat: int, sentence: str) -> None:
         counted = f"{repeat} of {repeats}" if repeat else "not counted"
@@ -251,14 +259,9 @@ def _work_precision(cases, output: Path, only, repeats, peers, limit, quick, war
         if some:
             files.append(output / f"work_precision_{case.name}.png")
             draw(case, some, files[-1])
-    if not quiet:
-        print(text)
-        for file in files:
-            print(file)
     failed = [line for line in lines if not line.point.done and line.point.failure != INTERRUPTED]
-    for line in failed:
-        task = line.task
-        print(f"archord: {task.case}: {task.code}, {task.series}, {task.label}: {line.point.failure}.", file=sys.stderr)
+    faults = [f"{f.task.case}: {f.task.code}, {f.task.series}, {f.task.label}: {f.point.failure}" for f in failed]
+    _conclude(text, files, faults, quiet)
     if not whole:
         print("archord: interrupted; the tables have what was timed before.", file=sys.stderr)
         return 130

@@ -1,14 +1,22 @@
-"""The commands ``archord laws`` and ``archord law``: closed-form laws of the joint, listed, tabulated and drawn."""
+"""``archord laws``, ``law`` and ``fit``: laws of the joint, listed, tabulated, drawn, and calibrated on runs."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import sys
+import textwrap
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from archord.plain_typer import typer
+import click
+
+from archord.options import argument, file, flag, overrides
+from archord.report.table import Table
+from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
     from archord.postprocess.laws.joint import LawJoint
@@ -17,15 +25,18 @@ if TYPE_CHECKING:
 DEFAULT = "calibrated"  # the law that is meant where none is named
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands of this file to ``app``."""
-    app.command()(laws)
-    app.command()(law)
+@contextmanager
+def _sentences() -> Iterator[None]:
+    """Around formulas, whose ValueErrors are bad input here."""
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(str(error)) from error
 
 
-def laws(
-    markdown: Annotated[bool, typer.Option("--markdown", help="print all that is known of each, as Markdown")] = False,
-) -> int:
+@click.command()
+@flag("--markdown", "print all that is known of each, as Markdown")
+def laws(markdown: bool) -> int:
     """List the closed-form laws: name, title, range and source."""
     from archord.postprocess.laws.law_report import laws_as_markdown
     from archord.postprocess.laws.laws import LAWS
@@ -33,92 +44,62 @@ def laws(
     if markdown:
         print(laws_as_markdown(), end="")
         return 0
-    from archord.report.table import Table
-
-    print(
-        Table(
-            "name", "law", "range", "source", rows=((x.name, x.title, x.range, x.source) for x in LAWS.values()), left=4
-        )
-    )
+    for entry in LAWS.values():
+        print(f"{entry.name}: {entry.title}")
+        for text in (f"range: {entry.range}", f"source: {entry.source}"):
+            print(textwrap.fill(text, 110, initial_indent="    ", subsequent_indent="        "))
     return 0
 
 
-@contextmanager
-def sentences() -> Iterator[None]:
-    """Around formulas, whose ValueErrors are bad input here."""
-    from archord.scene.errors import InputError
-
-    try:
-        yield
-    except ValueError as error:
-        raise InputError(str(error)) from error
-
-
+@click.command()
+@argument("names", "NAME...", f"laws, as archord laws lists them [{DEFAULT}]", nargs=-1, type=str)
+@file("--scene", "take the joint from this scene file", None)
+@overrides()
+@click.option("--radius", type=float, help="radius of the pin")
+@click.option("--clearance", type=float, help="radius of the hole less that of the pin")
+@click.option("--E-star", "E_star", type=float, help="contact modulus E*")
+@click.option("--yield-stress", type=float, help="yield stress")
+@click.option("--length", type=float, help="length of the joint, for the laws that need one")
+@click.option("--k", type=float, default=0.85, help="Winkler's coefficient")
+@click.option("--c", type=float, help="plateau of the pressure over the yield stress [1]")
+@click.option("--plane", help="strain or stress, for the calibrated law")
+@click.option("--nu", type=float, help="Poisson's ratio of both bodies, for the calibrated law")
+@click.option("--pin-nu", type=float, help="Poisson's ratio of the pin, if another than --nu")
+@click.option("--yielding", help="which bodies yield, for the calibrated law: both, block or pin [both]")
+@click.option(
+    "--dundurs-alpha", type=float, help="(E1' - E2')/(E1' + E2'), positive for the stiffer pin [0, or the scene's]"
+)
+@flag("--by-load", "rows in equal loads, as for laws that give no displacement")
+@click.option("--to", type=float, default=2.0, help="last row: delta in clearances, or P in E* dR")
+@click.option("--points", type=int, default=20, help="rows, in equal steps from zero")
+@flag("--extrapolate", "evaluate formulas outside the range of the law")
+@flag("--strict", "outside the range of a law is an error")
+@file("--plot", "draw the laws into this file instead of a table", None)
+@_sentences()
 def law(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="NAME...", help=f"laws, as archord laws lists them [{DEFAULT}]", show_default=False),
-    ] = None,
-    scene: Annotated[Path | None, typer.Option(help="take the joint from this scene file")] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="override a key of the scene")
-    ] = None,
-    radius: Annotated[float | None, typer.Option(help="radius of the pin")] = None,
-    clearance: Annotated[float | None, typer.Option(help="radius of the hole less that of the pin")] = None,
-    E_star: Annotated[float | None, typer.Option("--E-star", help="contact modulus E*")] = None,
-    yield_stress: Annotated[float | None, typer.Option(help="yield stress")] = None,
-    length: Annotated[float | None, typer.Option(help="length of the joint, for the laws that need one")] = None,
-    k: Annotated[float, typer.Option("--k", help="Winkler's coefficient")] = 0.85,
-    c: Annotated[float | None, typer.Option("--c", help="plateau of the pressure over the yield stress [1]")] = None,
-    plane: Annotated[str | None, typer.Option(help="strain or stress, for the calibrated law")] = None,
-    nu: Annotated[float | None, typer.Option(help="Poisson's ratio of both bodies, for the calibrated law")] = None,
-    pin_nu: Annotated[float | None, typer.Option(help="Poisson's ratio of the pin, if another than --nu")] = None,
-    yielding: Annotated[
-        str | None, typer.Option(help="which bodies yield, for the calibrated law: both, block or pin [both]")
-    ] = None,
-    dundurs_alpha: Annotated[
-        float | None, typer.Option(help="(E1' - E2')/(E1' + E2'), positive for the stiffer pin [0, or the scene's]")
-    ] = None,
-    by_load: Annotated[
-        bool, typer.Option("--by-load", help="rows in equal loads, as for laws that give no displacement")
-    ] = False,
-    to: Annotated[float, typer.Option(help="last row: delta in clearances, or P in E* dR")] = 2.0,
-    points: Annotated[int, typer.Option(help="rows, in equal steps from zero")] = 20,
-    extrapolate: Annotated[
-        bool, typer.Option("--extrapolate", help="evaluate formulas outside the range of the law")
-    ] = False,
-    strict: Annotated[bool, typer.Option("--strict", help="outside the range of a law is an error")] = False,
-    plot: Annotated[Path | None, typer.Option(help="draw the laws into this file instead of a table")] = None,
+    names: tuple[str, ...],
+    scene: Path | None,
+    overrides: tuple[str, ...],
+    k: float,
+    by_load: bool,
+    to: float,
+    points: int,
+    extrapolate: bool,
+    strict: bool,
+    plot: Path | None,
+    **given: Any,
 ) -> int:
     """Print a table of closed-form laws, or draw them against each other."""
-    import math
-
     from archord.postprocess.laws.laws import find_law
-    from archord.scene.errors import InputError
 
-    with sentences():
-        chosen = [find_law(name) for name in dict.fromkeys(names or [DEFAULT])]
+    chosen = [find_law(name) for name in dict.fromkeys(names or [DEFAULT])]
     if not (math.isfinite(to) and to > 0):
         raise InputError(f"--to {to:g}: must be a positive number.")
     if not 1 <= points <= 100000:
         raise InputError(f"--points {points}: must be between 1 and 100000.")
     if strict and extrapolate:
         raise InputError("--strict: must not be given together with --extrapolate.")
-    given: dict[str, Any] = {
-        "radius": radius,
-        "clearance": clearance,
-        "E_star": E_star,
-        "yield_stress": yield_stress,
-        "length": length,
-        "dundurs_alpha": dundurs_alpha,
-        "c": c,
-        "plane": plane,
-        "nu": nu,
-        "pin_nu": pin_nu,
-        "yielding": yielding,
-    }
-    with sentences():
-        joint, units = _joint(scene, overrides or [], given, k)
+    joint, units = _joint(scene, overrides, given, k)
     rows = "load" if by_load or not all(entry.gives_displacement for entry in chosen) else "displacement"
     outside: Outside = "raise" if strict else "extrapolate" if extrapolate else "nan"
     if plot is not None:
@@ -126,7 +107,7 @@ def law(
         from archord.postprocess.laws.law_report import draw_laws
         from archord.scene.file import files_read
 
-        check_target(plot, files_read(scene, overrides or []) if scene else [], force=True)
+        check_target(plot, files_read(scene, overrides) if scene else [], force=True)
         print(_warned(draw_laws, chosen, joint, plot, rows, to, outside))
         return 0
     _warned(_print_table, chosen, joint, rows, to, points, outside, units)
@@ -134,13 +115,10 @@ def law(
 
 
 def _joint(
-    scene: Path | None, overrides: list[str], given: dict[str, Any], k: float
+    scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any], k: float
 ) -> tuple[LawJoint, dict[str, str]]:
     """The joint of the scene, or of the options, which come before it; and the names of the units."""
-    import dataclasses
-
     from archord.postprocess.laws.joint import LawJoint
-    from archord.scene.errors import InputError
 
     values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if "nu" in values:
@@ -161,11 +139,9 @@ def _joint(
 
 def _warned(function: Any, *arguments: Any) -> Any:
     """Call ``function`` and print each warning about a range once, as one sentence on stderr."""
-    import warnings
-
     from archord.postprocess.laws.joint import LawRangeWarning
 
-    with sentences(), warnings.catch_warnings(record=True) as caught:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LawRangeWarning)
         result = function(*arguments)
     for message in dict.fromkeys(str(w.message) for w in caught):
@@ -177,10 +153,107 @@ def _print_table(
     chosen: list[Law], joint: LawJoint, rows: str, to: float, points: int, outside: Outside, units: dict[str, str]
 ) -> None:
     from archord.postprocess.laws.law_report import law_columns
-    from archord.report.table import Table
 
     for i, entry in enumerate(chosen):
         columns = law_columns(entry, joint, rows, to, points, outside, units)
         values = zip(*columns.values(), strict=True)
         print(f"{'' if i == 0 else chr(10)}{entry.name}: {entry.title}")
         print(Table(*columns, rows=[[f"{value:.6g}" for value in row] for row in values]))
+
+
+@click.command()
+@argument("folders", "RUN...|SWEEP", "run folders, or the folder of a sweep, or its fit.csv", nargs=-1, required=True)
+@click.option(
+    "--range", "load_range", type=(float, float), help="steps to fit: delta from ... to ..., in clearances [all]"
+)
+@click.option("--confidence", type=float, default=0.95, help="level of the confidence intervals")
+@click.option("--hold-k", type=float, metavar="VALUE", help="hold k, e.g. at that of an elastic run, fit c")
+@flag("--residuals", "print the residual of every step")
+@file("--json", "write law, fits, residuals", parameter="json_file")
+@file("--picture", "draw data, fits, residuals")
+@file("--python", "write force and stiffness over delta as a module that needs only math")
+@file("--csv", "sweep: write k, c, curves here [SWEEP/fit.csv]", parameter="csv_file")
+@file("--law", "sweep: write the model of k and c as JSON", parameter="law_file")
+@click.option("--held-out", type=float, metavar="SHARE", help="sweep: cases kept to judge the model by [0.15]")
+@flag("--force", "overwrite files that are there and are no picture or earlier output")
+def fit(
+    folders: tuple[Path, ...],
+    load_range: tuple[float, float] | None,
+    confidence: float,
+    hold_k: float | None,
+    residuals: bool,
+    json_file: Path | None,
+    picture: Path | None,
+    python: Path | None,
+    csv_file: Path | None,
+    law_file: Path | None,
+    held_out: float | None,
+    force: bool,
+) -> int:
+    """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields.
+
+    Of a sweep, k and c of every case, and a model of both over all that decides a joint.
+    """
+    from archord.studies import sweep_fit
+
+    deltas = load_range or (0.0, math.inf)
+    if any(sweep_fit.is_sweep(folder) for folder in folders):
+        if len(folders) > 1:
+            raise InputError(f"{folders[0]}: a sweep is fitted alone, but {len(folders)} folders are given.")
+        if hold_k is not None or residuals or python:
+            raise InputError(f"{folders[0]}: --hold-k, --residuals and --python are for runs, this is a sweep.")
+        files = _files(csv=csv_file, law=law_file, json=json_file, picture=picture)
+        if csv_file is None and folders[0].is_dir():
+            csv_file = folders[0] / sweep_fit.TABLE
+            files.append(csv_file)
+        targets = csv_file, law_file, json_file, picture
+        sweep_fit.check_files(folders[0], *targets, force)
+        found = sweep_fit.fit_sweep(folders[0], deltas, confidence, 0.15 if held_out is None else held_out)
+        with _sentences():
+            found.write(*targets)
+        print(found.text(), *files, sep="\n")
+        return 0
+    if csv_file or law_file or held_out is not None:
+        raise InputError(f"{folders[0]}: --csv, --law and --held-out are for a sweep, and this is none.")
+    from archord.output.folder import FILES
+    from archord.output.user_file import check_target, writing
+    from archord.postprocess.curve import read_run
+    from archord.postprocess.laws import fit_report
+    from archord.postprocess.laws.calibration import PYTHON_BEGINS, calibrate
+
+    runs = [read_run(folder).loading() for folder in folders]
+    calibration = calibrate(runs, deltas, confidence, hold_k)
+    law = calibration.law()
+    # checked and written before anything is printed: a file that cannot be written is one sentence alone
+    files = _files(json=json_file, python=python, picture=picture)
+    inputs = [folder / name for folder in folders for name in FILES]
+    begins = {json_file: fit_report.JSON_BEGINS, python: PYTHON_BEGINS}
+    for target in files:
+        check_target(target, inputs, force=force or target == picture, begins=begins.get(target))
+    if picture:
+        with _sentences():
+            fit_report.draw_fit(calibration, picture)
+    if json_file:
+        with writing(json_file):
+            json_file.write_text(fit_report.as_json(calibration), encoding="utf-8")
+    if python:
+        with writing(python):
+            python.write_text(law.to_python(), encoding="utf-8")
+    tables = [fit_report.summary_table(calibration)]
+    tables += [fit_report.residual_table(curve) for curve in calibration.joint.curves if residuals]
+    for one in tables:
+        print(one, end="\n\n")
+    threshold = "" if law.c is None else f", c = {law.c:.5f}"
+    low, high = law.fitted_range
+    held = "" if hold_k is None else " (held)"
+    said = f"law: k = {law.k:.5f}{held}{threshold}, from P(delta), delta = {low:g} to {high:g} dR"
+    print(*fit_report.notes(calibration), said, *files, sep="\n")
+    return 0
+
+
+def _files(**given: Path | None) -> list[Path]:
+    """The files that were asked for by the options of these names. Raises `InputError` if two are the same."""
+    files = [file for file in given.values() if file]
+    if len({file.resolve() for file in files}) < len(files):
+        raise InputError(f"{', '.join(f'--{name}' for name in given)}: must be different files.")
+    return files

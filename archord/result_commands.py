@@ -1,12 +1,16 @@
-"""``archord show``, ``compare`` and ``export``: what runs and sweeps hold, in tables, pictures and other formats."""
+"""Commands that read what solves left: ``show``, ``compare``, ``export``, ``picture``; and ``export-deck``."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from archord.plain_typer import typer
+import click
 
+from archord.options import SCENE, argument, file, flag, output, overrides, pictures
+from archord.scene.errors import InputError
+
+_MOST_FITS = 200  # runs of a sweep; an elastic fit takes some milliseconds
 _MOST_FITS = 200  # runs of a sweep; an elastic fit takes some milliseconds
 
 if TYPE_CHECKING:
@@ -14,28 +18,20 @@ if TYPE_CHECKING:
     from archord.postprocess.sweep import Sweep
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands of this file to ``app``."""
-    app.command()(show)
-    app.command()(compare)
-    app.command()(export)
-
-
-def show(
-    folder: Annotated[Path, typer.Argument(metavar="RUN|SWEEP", help="folder of a run or of a sweep")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for the pictures [the run's]")
-    ] = None,
-    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="draw pictures, too")] = True,
-) -> int:
+@click.command()
+@argument("folder", "RUN|SWEEP", "folder of a run or of a sweep")
+@output("folder for the pictures [the run's]", metavar="DIR")
+@pictures("pictures")
+def show(folder: Path, output: Path | None, pictures: bool) -> int:
     """Print a run's joint, state, history, peaks, cost and warnings, or a sweep's cases; and draw them.
 
     The pictures of a run are force.png, pressure.png, field.png and iterations.png.
     """
     from archord.output.folder import is_sweep
-    from archord.postprocess.sweep import Sweep
 
     if is_sweep(folder):
+        from archord.postprocess.sweep import Sweep
+
         return _show_sweep(Sweep(folder), output or folder, pictures)
     from archord.postprocess.run import Run
 
@@ -74,13 +70,11 @@ def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
     return 0
 
 
-def compare(
-    folders: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="run folders; the first is the measure")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="picture to draw")] = Path(
-        "comparison.png"
-    ),
-    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="draw the picture, too")] = True,
-) -> int:
+@click.command()
+@argument("folders", "RUN RUN...", "run folders; the first is the measure", nargs=-1, required=True)
+@output("picture to draw", "comparison.png", "FILE")
+@pictures("the picture")
+def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
     """Compare runs with the first: P, p0 and eps at common displacements, scenes, cost; and draw them.
 
     Where R, dR or E* differ, they are compared in dimensionless form, too.
@@ -101,23 +95,17 @@ def compare(
     return 0
 
 
-def export(
-    folder: Annotated[Path, typer.Argument(metavar="RUN", help="run folder")],
-    vtk: Annotated[
-        Path | None, typer.Option("--vtk", metavar="DIR", help="write .vtu files for each step and run.pvd into DIR")
-    ] = None,
-    csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="DIR", help="write history, contact, nodes and cells into DIR")
-    ] = None,
-    step: Annotated[
-        int | None,
-        typer.Option("--step", metavar="N", help="of the .vtu files this step alone [all]; of nodes and cells [last]"),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="overwrite files that are there")] = False,
-) -> int:
+@click.command()
+@argument("folder", "RUN", "run folder")
+@file("--vtk", "write .vtu files for each step and run.pvd into DIR", "DIR")
+@file("--csv", "write history, contact, nodes and cells into DIR", "DIR")
+@click.option(
+    "--step", type=int, metavar="N", help="of the .vtu files this step alone [all]; of nodes and cells [last]"
+)
+@flag("--force", "overwrite files that are there")
+def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, force: bool) -> int:
     """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything else."""
     from archord.postprocess.run import Run
-    from archord.scene.errors import InputError
 
     if vtk is None and csv is None:
         raise InputError("export: give --vtk DIR, --csv DIR or both.")
@@ -143,3 +131,41 @@ def _shortened(files: list[Path]) -> list[str]:
     few = [str(file) for file in files if file.suffix != ".vtu"]
     vtu = [file for file in files if file.suffix == ".vtu"]
     return few + ([f"{len(vtu)} .vtu files beside it, {vtu[0].name} to {vtu[-1].name}"] if vtu else [])
+
+
+@click.command()
+@argument("folder", "RUN", "run folder")
+@output("file to draw [RUN/picture.png]")
+def picture(folder: Path, output: Path | None) -> int:
+    """Draw a run: plastic zone, contact pressure, P(delta)."""
+    from archord.postprocess.pictures import draw
+
+    print(draw(folder, output))
+    return 0
+
+
+@click.command("export-deck")
+@SCENE
+@output("deck to write [<scene name>.inp]")
+@click.option(
+    "--elements",
+    type=click.Choice(["quadratic", "linear"]),
+    default="quadratic",
+    help="six-node triangles, archord's own mesh, or each cut into four of three nodes",
+)
+@overrides()
+@flag("--force", "overwrite a file that is there")
+def export_deck(scene: Path, output: Path | None, elements: str, overrides: tuple[str, ...], force: bool) -> int:
+    """Write a scene as an input deck for CalculiX or Abaqus."""
+    from archord.output.user_file import check_target
+    from archord.postprocess.deck import write_deck
+    from archord.scene.file import files_read, load_scene
+
+    checked = load_scene(scene, overrides)
+    if checked.joint.model != "block":
+        raise InputError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
+    path = output or Path(f"{scene.stem}.inp")
+    check_target(path, files_read(scene, overrides), force=force)
+    write_deck(checked, path, elements)
+    print(path)
+    return 0

@@ -6,30 +6,36 @@ import sys
 from collections import Counter
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated
 
-from archord.plain_typer import typer
+import click
+
+from archord.options import argument, flag, output, overrides, quiet
+from archord.report.table import Table
+from archord.scene.errors import InputError
 
 STATUS = ("done", "stopped", "failed", "interrupted", "busy", "open")
 
 
+@click.command()
+@argument("file", "SWEEP", "sweep file (TOML), or the folder of a sweep")
+@overrides("base scene")
+@output("folder [runs/<sweep name>]")
+@flag("--dry-run", "print the cases and stop")
+@click.option("--ranks-per-case", type=click.IntRange(1), default=1, metavar="K", help="ranks that share a case")
+@click.option("--array", default="1/1", metavar="I/N", help="solve part I of N of the cases, for a job array")
+@click.option("--gather", "gather_only", is_flag=True, help="write the tables of what is there and stop")
+@flag("--retry", "try cases again that stopped or failed")
+@quiet()
 def sweep(
-    file: Annotated[Path, typer.Argument(metavar="SWEEP", help="sweep file (TOML), or the folder of a sweep")],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="override a key of the base scene; may be repeated"),
-    ] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="folder [runs/<sweep name>]")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="print the cases and stop")] = False,
-    ranks_per_case: Annotated[
-        int, typer.Option("--ranks-per-case", min=1, metavar="K", help="ranks that share a case")
-    ] = 1,
-    array: Annotated[
-        str, typer.Option("--array", metavar="I/N", help="solve part I of N of the cases, for a job array")
-    ] = "1/1",
-    gather_only: Annotated[bool, typer.Option("--gather", help="write the tables of what is there and stop")] = False,
-    retry: Annotated[bool, typer.Option("--retry", help="try cases again that stopped or failed")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print nothing but errors")] = False,
+    file: Path,
+    overrides: tuple[str, ...],
+    output: Path | None,
+    dry_run: bool,
+    ranks_per_case: int,
+    array: str,
+    gather_only: bool,
+    retry: bool,
+    quiet: bool,
 ) -> int:
     """Solve all cases of a sweep; under mpirun side by side, on one rank each.
 
@@ -40,10 +46,9 @@ def sweep(
     from mpi4py import MPI
 
     from archord.output.ranks import agreed
-    from archord.scene.errors import InputError
+    from archord.progress import SweepProgress, say
     from archord.studies.cases import read_sweep
     from archord.studies.sweep import FILE, Share, check_ranks, claim, default_folder, gather, open_jobs
-    from archord.sweep_progress import SweepProgress, say
 
     comm = MPI.COMM_WORLD
     share = Share.parse(array)
@@ -55,7 +60,7 @@ def sweep(
     show = comm.rank == 0 and not quiet
 
     def prepared():
-        design = read_sweep(source, overrides or [])
+        design = read_sweep(source, overrides)
         if show:
             say(_announced(design))
         if dry_run:
@@ -110,30 +115,23 @@ def _duration(seconds: float) -> str:
 
 
 def _print_cases(design) -> None:
-    from rich.console import Console
-    from rich.table import Column, Table
-
-    from archord.ranks import on_terminal
     from archord.studies.cost import expected_dofs, expected_seconds
     from archord.studies.tables import entry, heading
 
     keys = [heading(key, design.cases[0].scene) for key in design.keys]
-    names = ["case", "run", *keys, "steps", "dofs", "seconds"]
-    table = Table(*(Column(name, justify="right") for name in names), box=None, pad_edge=False)
+    table = Table("case", "run", *keys, "steps", "dofs", "seconds")
     for case in design.cases:
         values = [entry(case.value(key)) for key in design.keys]
-        shown = ["-" if v is None else f"{v:.9g}" if isinstance(v, float) else str(v) for v in values]
+        shown = ["-" if v is None else f"{v:.9g}" if isinstance(v, float) else v for v in values]
         scene = case.scene
-        cost = [str(len(scene.targets)), f"{expected_dofs(scene):.0f}", f"{expected_seconds(scene):.2g}"]
-        table.add_row(f"{case.number}", case.run, *shown, *cost)
-    watched = on_terminal()
-    width = None if watched else 60 + 40 * len(keys)
-    Console(highlight=False, width=width, force_terminal=watched).print(table, markup=False)
+        cost = (len(scene.targets), f"{expected_dofs(scene):.0f}", f"{expected_seconds(scene):.2g}")
+        table.add(case.number, case.run, *shown, *cost)
+    print(table)
 
 
 def _report(results, design, folder: Path, mine: set[str], *, quiet: bool, seconds: float) -> int:
     """Say how the distinct cases ended; returns how many of this share, ``mine``, failed."""
-    from archord.sweep_progress import say
+    from archord.progress import say
 
     number = {case.run: case.number for case in design.distinct}
     failed = [r for r in results if r.run in mine and r.status in ("stopped", "failed")]

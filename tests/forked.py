@@ -15,7 +15,7 @@ from pathlib import Path
 
 _FORKS = multiprocessing.get_context("forkserver")
 _FORKS.set_forkserver_preload(
-    ["gmsh", "archord.cli", "archord.continuing", "archord.materials.j2", "archord.progress", "archord.output.run"]
+    ["gmsh", "archord.cli", "archord.materials.j2", "archord.progress", "archord.output.restart", "archord.output.run"]
 )
 
 

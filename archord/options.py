@@ -1,0 +1,62 @@
+"""Arguments and options that several commands have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+Decorator = Callable[[Any], Any]
+PATH = click.Path(path_type=Path)
+
+
+class _Argument(click.Argument):
+    """An argument that help pages explain; those of click have no help."""
+
+    def __init__(self, *names: str, help: str, **settings: Any) -> None:
+        super().__init__(*names, **settings)
+        self.help = help
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str]:
+        return self.metavar or "", self.help
+
+
+def argument(name: str, metavar: str, help: str, **settings: Any) -> Decorator:
+    """A path, or several with ``nargs=-1``, or of another ``type``."""
+    return click.argument(name, metavar=metavar, help=help, cls=_Argument, **{"type": PATH, **settings})
+
+
+def flag(name: str, help: str) -> Decorator:
+    """An option without a value."""
+    return click.option(name, is_flag=True, help=help)
+
+
+def file(name: str, help: str, metavar: str | None = "FILE", parameter: str | None = None) -> Decorator:
+    """An option that takes a path; ``parameter`` is its name in the function."""
+    return click.option(*filter(None, (name, parameter)), type=PATH, metavar=metavar, help=help)
+
+
+def output(help: str, default: str | None = None, metavar: str | None = None) -> Decorator:
+    """The option ``-o``; ``help`` tells a default that depends on other arguments."""
+    return click.option("-o", "--output", type=PATH, default=default, metavar=metavar, help=help)
+
+
+def quiet(but: str = "errors") -> Decorator:
+    """The option ``-q``."""
+    return click.option("-q", "--quiet", is_flag=True, help=f"print nothing but {but}")
+
+
+def overrides(of: str = "scene") -> Decorator:
+    """The option ``--set``."""
+    help = f"override a key of the {of}; may be repeated"
+    return click.option("--set", "overrides", metavar="SECTION.KEY=VALUE", multiple=True, help=help)
+
+
+def pictures(what: str) -> Decorator:
+    """The option ``--no-pictures``."""
+    return click.option("--pictures/--no-pictures", default=True, help=f"draw {what}, too")
+
+
+SCENE = argument("scene", "SCENE", "scene file (TOML)")
