@@ -76,6 +76,20 @@ class Curve:
         value, slope, bend = p.reshape(3, *powers.shape)
         return value, slope, bend
 
+    def vertices(self) -> tuple[Array, Array]:
+        """Where facets meet or the curve ends ``(n + 1, 2)``, and the outward normals of the chords there."""
+        x = self.X[:: self.degree]
+        step = np.gradient(x, axis=0)
+        outward = np.stack([step[:, 1], -step[:, 0]], axis=1)
+        return x, outward / np.linalg.norm(outward, axis=1)[:, None]
+
+    def neighbours(self, facets: Index, rings: int) -> tuple[Index, Index]:
+        """Facets that fewer than ``rings`` others separate from one of ``facets`` ``(m,)``, these included: the places
+        ``(k,)`` in ``facets`` and the neighbours ``(k,)``."""
+        near = facets[:, None] + np.arange(-rings, rings + 1)
+        which, _ = inside = np.nonzero((near >= 0) & (near < self.n_facets))
+        return which, near[inside]
+
     def arc_length(self, xi: Array) -> Array:
         """Length ``(n, m)`` along the curve from its start to ``xi`` ``(m,)``, or ``(n, m)``, of each facet."""
         xi = np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1]))
@@ -145,14 +159,17 @@ class Curve:
 
 
 class RigidCircle:
-    """A rigid disc of the given centre and radius, as an opposite curve with one node that moves all of it."""
+    """A rigid disc of the given centre and radius, as an opposite curve of one facet with one node, which moves it."""
+
+    n_facets = 1
 
     def __init__(self, centre: Array, radius: float) -> None:
         self.centre = np.asarray(centre, dtype=float)
         self.radius = radius
+        self.X, self.connectivity = self.centre[None], np.zeros((1, 1), dtype=np.int32)
 
-    def closest_point(self, x: Array, outward: Array, displacement: Array) -> Projection:
-        """Closest points on the disc moved by ``displacement`` ``(2,)``; see `Curve.closest_point`."""
+    def closest_point(self, x: Array, outward: Array, displacement: Array, start: Index | None = None) -> Projection:
+        """Closest points on the disc moved by ``displacement`` ``(1, 2)``; see `Curve.closest_point`."""
         m = len(x)
         ray = x - self.centre - displacement
         normal = ray / np.linalg.norm(ray, axis=1)[:, None]
@@ -169,3 +186,9 @@ class RigidCircle:
             facet=np.zeros(m, dtype=np.int32),
             xi=np.zeros(m),
         )
+
+    continued = closest_point
+
+    def neighbours(self, facets: Index, rings: int) -> tuple[Index, Index]:
+        """See `Curve.neighbours`."""
+        return np.arange(len(facets)), facets

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from archord.materials.material import Array, Material
 
 
 class Points:
     """``n`` points of a ``material``: the committed ``state``, and ``trial``, which belongs to the last strain seen.
 
+    A contact law is a material too, of traction, derivative and state, whose strain are gap, slip and trial traction.
+
     With ``elastic_only`` set, `update` answers as if the points could not yield (further).
     """
 
-    def __init__(self, material: Material, n: int) -> None:
+    def __init__(self, material: Material | Any, n: int) -> None:
         self.material, self.n = material, n
         self.state = self.trial = material.state(n)
         self.elastic_only = False
 
-    def update(self, strain: Array) -> tuple[Array, Array]:
+    def update(self, *strain: Array) -> tuple[Array, Array]:
         """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the committed state."""
         material = self.material.elastic() if self.elastic_only else self.material
-        stress, tangent, self.trial = material.update(strain, self.state)
+        stress, tangent, self.trial = material.update(*strain, self.state)
         return stress, tangent
 
     @property

@@ -204,7 +204,7 @@ def _versions() -> dict[str, str]:
 
 
 def _mesh(joint: Joint) -> dict[str, Any]:
-    lengths = {name: np.diff(s.curve.arc_length(np.array([0.0, 1.0])))[:, 0] for name, s in joint.sides.items()}
+    lengths = {name: s.facet_lengths() for name, s in joint.sides.items()}
     return {
         "cells": joint.n_cells,
         "dofs": joint.n_dofs,
@@ -223,7 +223,7 @@ def _model(joint: Joint) -> dict[str, Any]:
         "target": scene.target,
         "plastic": joint.bulk.plastic,
         "pin": "rigid" if scene.pin.rigid else "deformable",
-        "contact_shares": [pair.share for pair in joint.contact.pairings],
+        "contact_shares": [pair.share for pair in joint.contact.pairs],
     }
 
 
@@ -236,7 +236,7 @@ def _rough_arcs(joint: Joint) -> list[str]:
     geometry = joint.scene.joint
     if not joint.scene.pin.rigid and geometry.size_ratio == 1:
         return []
-    lengths = [np.diff(side.curve.arc_length(np.array([0.0, 1.0]))).max() for side in joint.sides.values()]
+    lengths = [side.facet_lengths().max() for side in joint.sides.values()]
     off = (1 - np.cos(max(lengths) / geometry.radius / 2)) ** 2 / 8 * geometry.radius / abs(geometry.dR)
     if off <= _ROUGH:
         return []

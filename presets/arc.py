@@ -15,7 +15,7 @@ from archord.geometry.basis import Array
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
     from archord.solver.contact.contact import Contact
-    from archord.solver.contact.surface import ContactSide
+    from archord.solver.contact.surface import Surface
 
 _PEAK_FRACTION = 0.25  # part of the contact angle over which the parabola of the peak is fitted
 _EDGE_FACETS = 4  # facets whose forces give the edge of the contact
@@ -62,7 +62,7 @@ class ArcProfile:
         return (self.weight * self.angle).sum(axis=1) / total, (self.weight * self.pressure).sum(axis=1) / total
 
 
-def arc_profile(contact: Contact, side: ContactSide, radius: float, axis_point: Array, u: Array) -> ArcProfile | None:
+def arc_profile(contact: Contact, side: Surface, radius: float, axis_point: Array, u: Array) -> ArcProfile | None:
     """State of ``side`` at the displacement ``u`` ``(n, 2)``, last evaluated; None if its edge is not integrated.
 
     ``axis_point`` is the end of the arc on the contact axis. Collective.
@@ -70,7 +70,7 @@ def arc_profile(contact: Contact, side: ContactSide, radius: float, axis_point: 
     state = contact.state(side)
     if state is None:
         return None
-    n, q = side.curve.n_facets, side.weight.shape[1]
+    n, q = side.n_facets, side.weight.shape[1]
     local = np.zeros((n, q, 5))
     displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
     values = np.concatenate(

@@ -24,7 +24,7 @@ from archord.solver.contact.contact import Contact
 from archord.solver.control import FactorControl, ForceControl
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.linear.tangent_matrix import TangentMatrix
-from archord.solver.problem import Load, Problem, Vector
+from archord.solver.problem import Load, Problem
 from archord.solver.timer import Timer
 
 _LOAD_DEGREE = 6  # of the quadrature of distributed forces
@@ -34,10 +34,7 @@ _MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which
 
 
 class Equilibrium:
-    """Equilibrium of ``bulk`` and, if given, ``contact`` under the supports and loads of ``problem``.
-
-    ``rigid_rate`` moves rigid discs with the load factor. Collective.
-    """
+    """Equilibrium of ``bulk`` and, if given, ``contact`` under the supports and loads of ``problem``. Collective."""
 
     def __init__(
         self,
@@ -45,13 +42,11 @@ class Equilibrium:
         V: fem.FunctionSpace,
         bulk: Bulk,
         contact: Contact | None = None,
-        rigid_rate: Vector | None = None,
         *,
         timer: Timer | None = None,
     ) -> None:
         self.problem, self.V, self.bulk, self.contact = problem, V, bulk, contact
         self.comm = V.mesh.comm
-        self.rigid_rate = None if rigid_rate is None else np.array(rigid_rate)
         self.timer = timer or Timer()
         self.interrupt = Interrupt()
         self.u = fem.Function(V, name="displacement")
@@ -76,7 +71,7 @@ class Equilibrium:
         self.reaction_norm = self.noise = 0.0
         self.largest_reaction = 0.0  # norm, of all accepted states
         self._stiffest = max(float(body.material.elastic_tangent[0, 0]) for body in problem.bodies)
-        matrix = V, bulk, contact, self.fixed, self.rate, self.rigid_rate, self.timer
+        matrix = V, bulk, contact, self.fixed, self.rate, self.timer
         self.tangent = TangentMatrix(*matrix, condense=self._condensable())
         self.control = FactorControl(V)
         if problem.control == "force":
@@ -175,14 +170,13 @@ class Equilibrium:
         self._pattern_grew = False
         with self.timer("contact"):
             if self.contact is not None:
-                if self.rigid_rate is not None:
-                    self.contact.rigid_motion = self.factor * self.rigid_rate
+                self.contact.move(self.factor)
                 self._pattern_grew = self.contact.evaluate(u)
                 self.contact.add_force(self._force.array.reshape(-1, 2))
         self._force.array[:] -= self.factor * self.applied.ravel()
         self._reaction = np.where(self._free_owned, 0.0, self._force.array_r).reshape(-1, 2)
         noise = 0.0 if self.contact is None else self.contact.round_off()
-        changes = 0 if self.contact is None else self.contact.flips
+        changes = 0 if self.contact is None else self.contact.active_set_changes
         totals = np.array([(self._reaction**2).sum(), noise**2, self.interrupt.received > 0, changes])
         self.comm.Allreduce(MPI.IN_PLACE, totals)
         self.changes = int(totals[3])
@@ -207,9 +201,7 @@ class Equilibrium:
     def force_on_factor(self) -> float:
         """Force that works on the load factor: those of supports and rigid discs along their rates, over all ranks."""
         total = self.comm.allreduce(float((self._reaction * self.rate[: self.n_owned]).sum()))
-        if self.rigid_rate is not None and self.contact is not None:
-            total += float(self.rigid_rate @ self.contact.resultant())
-        return total
+        return total if self.contact is None else total + self.contact.force_on_factor()
 
     # ------------------------------------------------------------------ state
 

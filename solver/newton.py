@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
-from archord.solver.contact.contact import GAMMA_FACTOR
+from archord.solver.contact.interaction import GAMMA_FACTOR
 from archord.solver.equilibrium import Equilibrium
 from archord.solver.linear.bordered import direct_solver
 from archord.solver.timer import BEFORE_SOLVING
@@ -293,7 +293,7 @@ class NewtonSolver:
         contact = self.equilibrium.contact
         changes = result.active_set_changes
         circles = len(changes) > _CIRCLING and not any(changes[-_CIRCLING:])
-        if result.converged or contact is None or contact.kinematics != "current" or not circles:
+        if result.converged or contact is None or not contact.pairs_move or not circles:
             return result
         self.equilibrium.unpack(self._x)
         contact.hold()

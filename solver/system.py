@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import basix.ufl
@@ -11,8 +12,10 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.solver.bulk import Body, Bulk
+from archord.solver.contact import interaction as contact
 from archord.solver.contact.contact import Contact
-from archord.solver.contact.surface import ContactSide
+from archord.solver.contact.law import LAWS
+from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.equilibrium import Equilibrium
 from archord.solver.load_path import LoadPath, Position
 from archord.solver.newton import NewtonSolver
@@ -40,43 +43,35 @@ class System:
             self.V = fem.functionspace(mesh, element)
             bodies = [Body(problem.tag(body), body.material) for body in problem.bodies]
             self.bulk = Bulk(self.V, problem.mesh.cells, bodies)
-            self.sides: dict[str, ContactSide] = {}
+            self.sides: dict[str, Surface] = {}
             self.contact = self._contact(problem.interactions)
-            rates = [s.rate for i in problem.interactions for s in i.surfaces if isinstance(s, Rigid)]
-            self.equilibrium = Equilibrium(
-                problem,
-                self.V,
-                self.bulk,
-                self.contact,
-                rates[0] if rates else None,
-                timer=self.timer,
-            )
+            self.equilibrium = Equilibrium(problem, self.V, self.bulk, self.contact, timer=self.timer)
             self.solver = NewtonSolver(
                 self.equilibrium, tolerance=problem.tolerance, max_iterations=problem.max_iterations
             )
 
-    def _contact(self, interactions) -> Contact | None:
-        if not interactions:
-            return None
-        if len(interactions) > 1:
-            raise NotImplementedError("several interactions")
-        one: Interaction = interactions[0]
-        rigid = None
-        for surface in one.surfaces:
-            if isinstance(surface, Rigid):
-                rigid = surface.circle
-            else:
-                material = self.problem.body_of(surface).material
-                tag = self.problem.mesh.facet_sets[surface]
-                self.sides[surface] = ContactSide(self.V, self.problem.mesh.facets, tag, material)
-        return Contact(
-            list(self.sides.values()),
-            rigid=rigid,
-            kinematics="tied" if one.law == "tied" else one.kinematics,
-            gamma_factor=one.gamma_factor,
-            one_sided=list(self.sides).index(one.integrated) if one.integrated else None,
-            slide=one.slide,
+    def _contact(self, interactions: Sequence[Interaction]) -> Contact | None:
+        return Contact([self._interaction(i) for i in interactions]) if interactions else None
+
+    def _interaction(self, given: Interaction) -> contact.Interaction:
+        integrated = given.surfaces.index(given.integrated) if given.integrated else None
+        return contact.Interaction(
+            given.name,
+            [self._surface(surface, given.name) for surface in given.surfaces],
+            law=LAWS[given.law],
+            kinematics=given.kinematics,
+            gamma_factor=given.gamma_factor,
+            integrated=integrated,
+            slide=given.slide,
         )
+
+    def _surface(self, given: str | Rigid, interaction: str) -> Surface | RigidSurface:
+        if isinstance(given, Rigid):
+            return RigidSurface(given.circle, given.rate)
+        name = given if given not in self.sides else f"{given} ({interaction})"
+        mesh, material = self.problem.mesh, self.problem.body_of(given).material
+        self.sides[name] = Surface(self.V, mesh.facets, mesh.facet_sets[given], material, name)
+        return self.sides[name]
 
     def nodes_of(self, tag: int) -> np.ndarray:
         """Nodes ``(n,)`` of this rank, ghosts included, in the cells with this ``tag``."""

@@ -1,17 +1,19 @@
-/* Pressures at the points of one side of a contact, and their forces on the nodes of both. */
+/* Trial tractions at the points of one side of a contact, and forces on the nodes of both. */
 
 #include "contact_points.h"
 
-void contact_pressure(int32_t m, const double *stress, const double *outward, const double *opening,
-                      const double *normal, const double *gamma, double *traction, double *gap, double *trial)
+void trial_traction(int32_t m, const double *stress, const double *outward, const double *opening, const double *normal,
+                    const double *gamma, double *stress_vector, double *gap, double *slip, double *trial)
 {
     for (int32_t i = 0; i < m; i++) {
         const double *s = stress + 4 * i, *N = outward + 2 * i, *n = normal + 2 * i, *d = opening + 2 * i;
-        double *t = traction + 2 * i;
+        double *t = stress_vector + 2 * i;
         t[0] = s[0] * N[0] + s[3] * N[1];
         t[1] = s[3] * N[0] + s[1] * N[1];
         gap[i] = d[0] * n[0] + d[1] * n[1];
-        trial[i] = t[0] * n[0] + t[1] * n[1] - gamma[i] * gap[i];
+        slip[i] = -d[0] * n[1] + d[1] * n[0];
+        trial[2 * i] = t[0] * n[0] + t[1] * n[1] - gamma[i] * gap[i];
+        trial[2 * i + 1] = -t[0] * n[1] + t[1] * n[0] - gamma[i] * slip[i];
     }
 }
 

@@ -1,9 +1,9 @@
 #include <stdint.h>
 
-/* traction (m, 2) = stress . outward, gap = opening . normal, trial = traction . normal - gamma gap; stress is [xx, yy, zz,
- * xy] */
-void contact_pressure(int32_t m, const double *stress, const double *outward, const double *opening,
-    const double *normal, const double *gamma, double *traction, double *gap, double *trial);
+/* stress_vector (m, 2) = stress . outward with stress [xx, yy, zz, xy]; gap and slip (m) are the components of the opening
+ * along normal and tangent, trial (m, 2) those of the stress vector minus gamma times gap and slip. */
+void trial_traction(int32_t m, const double *stress, const double *outward, const double *opening,
+    const double *normal, const double *gamma, double *stress_vector, double *gap, double *slip, double *trial);
 
 /* Add the force (n q, 2) on the own body to own (nodes, 2) and its reaction to opposite; k nodes a facet of the own curve
  * with trace (n, q, k), o nodes of the opposite a point with shape (n q, o). */

@@ -1,68 +1,54 @@
-"""One integrated side of a contact against its opposite: pairs, gaps and pressures at its points."""
+"""One integrated surface against its opposite: pairs, gaps and tractions at its points."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from archord.geometry.curve import Array, Curve, Projection, RigidCircle
+from archord.geometry.basis import Array
 from archord.kernels.compiled import library, pointer
-from archord.solver.contact.surface import ContactSide
+from archord.materials.points import Points
+from archord.solver.contact.law import ContactLaw
+from archord.solver.contact.surface import RigidSurface, Surface
 
-Kinematics = Literal["current", "reference", "tied"]
 
+class Pair:
+    """The points of ``surface`` (``m`` on this rank) against ``opposite``; arrays are those of the last evaluation.
 
-@dataclass
-class Pairing:
-    """The points of ``side`` (``m`` on this rank) against ``opposite``; arrays hold the last evaluated displacement.
+    ``share`` of the contact's virtual work is integrated here. If the pairs do not move (``moves``), they stay those of the
+    undeformed surfaces. Tractions are in the frame of the ``law``. Raises `ProjectionError`.
 
-    ``share`` of the contact's virtual work is integrated here, with ``gamma`` ``(m,)``. Under reference and tied
-    kinematics the pairs stay those of the undeformed curves.
+    ``projection`` are the partners, ``separation`` ``x - y`` ``(m, 2)``, ``gap`` and ``slip`` ``(m,)`` its components,
+    ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` those of the own material, ``trial``, ``traction``
+    ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active`` ``(m,)`` points touch, and ``changes`` are
+    how many opened or closed.
     """
 
-    side: ContactSide
-    opposite: ContactSide | RigidCircle
-    share: float
-    gamma: Array
-    kinematics: Kinematics
-    projection: Projection = field(init=False)
-    separation: Array = field(init=False)  # x - y (m, 2)
-    gap: Array = field(init=False)  # (m,)
-    traction: Array = field(init=False)  # (m, 2) of the own body; tied: with the penalty of the jump
-    trial: Array = field(init=False)  # (m,) what the pressure would be, were it not for its sign
-    pressure: Array = field(init=False)  # (m,)
-    active: npt.NDArray[np.bool_] = field(init=False)  # (m,) points that carry a contact force
-    tangent: Array = field(init=False)  # (m, 3, 3) of the material
-    _kernels: Any = field(init=False, repr=False)
-    _search: bool = field(init=False, default=True)
-    _hold: bool = field(init=False, default=False)
-
-    def __post_init__(self) -> None:
-        """Pair the undeformed curves. Raises `ProjectionError`."""
+    def __init__(
+        self, surface: Surface, opposite: Surface | RigidSurface, law: ContactLaw, share: float, *, moves: bool
+    ) -> None:
+        self.surface, self.opposite, self.law, self.share, self.moves = surface, opposite, law, share, moves
         self._kernels = library(Path(__file__).with_name("contact_points.c"))
-        x, outward = self.side.point.reshape(-1, 2), self.side.outward.reshape(-1, 2)
-        self.projection = self.curve.closest_point(x, outward, self.opposite_motion(None))
+        self._unit_gamma = np.repeat(share * surface.gamma, surface.weight.shape[1])
+        x, self._outward = surface.point.reshape(-1, 2), surface.outward.reshape(-1, 2)
+        self.projection = opposite.curve.closest_point(x, self._outward, np.zeros_like(opposite.curve.X))
         self.separation = x - self.projection.point
-        self.trial = self.pressure = np.zeros(len(x))
-        self.active = self.projection.found if self.kinematics == "tied" else np.zeros(len(x), dtype=bool)
+        self.points = Points(law, len(x))
+        self.traction, self.active = np.zeros((len(x), 2)), np.zeros(len(x), dtype=bool)
+        self.search()
 
-    @property
-    def curve(self) -> Curve | RigidCircle:
-        """The opposite as a curve."""
-        return self.opposite.curve if isinstance(self.opposite, ContactSide) else self.opposite
+    def use_gamma(self, factor: float) -> None:
+        """Nitsche's gamma ``(m,)`` is ``factor`` times the share and the trace constant of the point's cell."""
+        self.gamma = factor * self._unit_gamma
 
-    def opposite_motion(self, u: Array | None, rigid_motion: Array | None = None) -> Array:
-        """Displacement of the opposite's nodes, or of the rigid disc ``(2,)``; at rest without ``u``. Collective."""
-        if isinstance(self.opposite, ContactSide):
-            return np.zeros_like(self.opposite.curve.X) if u is None else self.opposite.curve_displacement(u)
-        return np.zeros(2) if rigid_motion is None else rigid_motion
+    def use_own_normals(self) -> None:
+        """Measure the gap along this surface's normals, reversed, for good."""
+        self.projection = replace(self.projection, normal=-self._outward)
 
     def search(self) -> None:
-        """Forget where the pairs were: the next evaluation searches them anew, over the whole curve."""
+        """Forget where the pairs were: the next evaluation searches them over the whole surface."""
         self._search, self._hold = True, False
 
     def hold(self) -> None:
@@ -70,67 +56,68 @@ class Pairing:
         self._search, self._hold = False, True
 
     def evaluate(self, u: Array, motion: Array) -> None:
-        """Pairs, gaps, pressures and trial history at ``u`` ``(n, 2)``, with the opposite moved by ``motion``.
+        """Pairs, gaps, tractions and trial history at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``.
 
         Raises `ProjectionError`.
         """
-        side, outward = self.side, self.side.outward.reshape(-1, 2)
-        displacement, stress, tangent = (values.reshape(-1, *values.shape[2:]) for values in side.deform(u))
-        self.tangent = np.ascontiguousarray(tangent)
-        if self.kinematics == "current":
-            self._pair_anew(side.point.reshape(-1, 2) + displacement, outward, motion)
+        displacement, stress, moduli = self.surface.deform(u)
+        self.moduli = np.ascontiguousarray(moduli)
+        if self.moves:
+            self._pair(self.surface.point.reshape(-1, 2) + displacement, motion)
             opening = self.separation
         else:
-            jump = displacement - self._opposite_displacement(motion)
-            opening = self.separation + jump
-        self.traction, self.gap, self.trial = self._pressed(stress, outward, opening)
-        if self.kinematics == "tied":
-            self.traction -= self.gamma[:, None] * jump
-            self.pressure = (self.traction * self.projection.normal).sum(1)
+            P = self.projection
+            opening = displacement - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
+            if self.law.slides:
+                opening += self.separation
+        m = len(stress)
+        self.stress_vector, self.trial = np.empty((m, 2)), np.empty((m, 2))
+        self.gap, self.slip = np.empty(m), np.empty(m)
+        given = stress, self._outward, opening, self.projection.normal, self.gamma
+        self._kernels.trial_traction(m, *map(pointer, (*given, self.stress_vector, self.gap, self.slip, self.trial)))
+        self.traction = self._answer(self.trial)
+
+    def _pair(self, x: Array, motion: Array) -> None:
+        curve, facet = self.opposite.curve, self.projection.facet
+        if self._hold:
+            self.projection = curve.continued(x, self._outward, motion, facet)
         else:
-            self.press(self.projection.found & ~(self.trial <= 0))  # not a number stays that
-
-    def press(self, active: npt.NDArray[np.bool_]) -> None:
-        """Let the points ``active`` ``(m,)`` carry their trial pressures, whatever the sign, and no others."""
-        self.active, self.pressure = active, np.where(active, self.trial, 0.0)
-
-    def _pressed(self, stress: Array, outward: Array, opening: Array) -> tuple[Array, Array, Array]:
-        """Traction ``(m, 2)``, gap and trial pressure ``(m,)``."""
-        m, P = len(stress), self.projection
-        given = stress, outward, opening, P.normal, self.gamma
-        found = np.empty((m, 2)), np.empty(m), np.empty(m)
-        self._kernels.contact_pressure(m, *map(pointer, given + found))
-        return found
-
-    def _pair_anew(self, x: Array, outward: Array, motion: Array) -> None:
-        if isinstance(self.curve, Curve) and self._hold:
-            self.projection = self.curve.continued(x, outward, motion, self.projection.facet)
-        elif isinstance(self.curve, Curve):
-            start = None if self._search else self.projection.facet
-            self.projection = self.curve.closest_point(x, outward, motion, start)
-        else:
-            self.projection = self.curve.closest_point(x, outward, motion)
+            self.projection = curve.closest_point(x, self._outward, motion, None if self._search else facet)
         self._search = False
         self.separation = x - self.projection.point
 
-    def _opposite_displacement(self, motion: Array) -> Array:
-        if isinstance(self.opposite, RigidCircle):
-            return motion
-        return np.einsum("ma,mai->mi", self.projection.shape, motion[self.projection.nodes])
+    def _answer(self, trial: Array) -> Array:
+        """Traction of the law, none at points without a partner; its derivative and the active points are kept."""
+        traction, self.derivative = self.points.update(self.gap, self.slip, trial)
+        lone = ~self.projection.found
+        if lone.any():
+            traction = np.where(lone[:, None], 0.0, traction)
+            self.derivative = np.where(lone[:, None, None], 0.0, self.derivative)
+        before, self.active = self.active, self.derivative[:, 0, 0] != 0
+        self.changes = int((before != self.active).sum())
+        return traction
+
+    def expect(self, rate: Array) -> None:
+        """Go over to the branch of the law where ``rate`` ``(m, 2)`` is added to the trial tractions, as that branch
+        continues to the present ones."""
+        self.traction = self._answer(self.trial + rate) - np.einsum("mij,mj->mi", self.derivative, rate)
+
+    @property
+    def distance(self) -> Array:
+        """Distance ``(m,)`` from the partners along their normals, positive when open."""
+        return self.gap if self.law.slides else self.gap + (self.separation * self.projection.normal).sum(1)
 
     @property
     def forces(self) -> Array:
         """Weighted contact force ``(m, 2)`` of each point on its own body."""
-        w = self.share * self.side.weight.ravel()
-        if self.kinematics == "tied":
-            return np.where(self.projection.found, w, 0.0)[:, None] * self.traction
-        return (w * self.pressure)[:, None] * self.projection.normal
+        w, n = self.share * self.surface.weight.ravel(), self.projection.normal
+        pressure, shear = w * self.traction[:, 0], w * self.traction[:, 1]
+        return pressure[:, None] * n + shear[:, None] * np.stack([-n[:, 1], n[:, 0]], axis=1)
 
     def add_forces(self, own: Array, opposite: Array) -> None:
-        """Add the forces on the nodes of the own curve to ``own`` ``(nodes, 2)``, their reactions to ``opposite``."""
-        side, P = self.side, self.projection
-        n, q, k = side.trace_shape.shape
-        on_own = self.forces, side.trace_shape, side.curve.connectivity[side.facet]
-        on_opposite = P.shape, P.nodes
-        arrays = *on_own, *on_opposite, own, opposite
-        self._kernels.contact_forces(n, q, k, P.shape.shape[1], *map(pointer, arrays))
+        """Add the forces on the nodes of the own surface to ``own`` ``(nodes, 2)``, their reactions to ``opposite``."""
+        surface, P = self.surface, self.projection
+        on_own = self.forces, surface.trace_shape, surface.curve.connectivity[surface.facet]
+        arrays = *on_own, P.shape, P.nodes, own, opposite
+        sizes = *surface.trace_shape.shape, P.shape.shape[1]
+        self._kernels.contact_forces(*sizes, *map(pointer, arrays))

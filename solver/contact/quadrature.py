@@ -20,11 +20,7 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
 
     Breaks lie where ``own`` faces the vertices of ``opposite``; facets with fewer of them are broken further.
     """
-    vertices = opposite.X[:: opposite.degree]
-    step = np.gradient(vertices, axis=0)
-    outward = np.stack([step[:, 1], -step[:, 0]], axis=1)
-    outward /= np.linalg.norm(outward, axis=1)[:, None]
-    met = own.closest_point(vertices, outward, np.zeros_like(own.X))
+    met = own.closest_point(*opposite.vertices(), np.zeros_like(own.X))
     inside = met.found & (met.xi > _SHORTEST) & (met.xi < 1 - _SHORTEST)
     breaks = [_apart(np.sort(met.xi[inside & (met.facet == k)])) for k in range(own.n_facets)]
     segments = max(len(b) for b in breaks) - 1

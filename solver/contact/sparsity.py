@@ -5,73 +5,71 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from archord.solver.contact.pair import Pairing
-from archord.solver.contact.surface import ContactSide
+from archord.solver.contact.pair import Pair
 
-_MARGIN = 2  # opposite facets kept in the pattern on either side of those that are paired
+_MARGIN = 2  # rings of opposite facets kept in the pattern around those that are paired
 _WIDEST = 16  # the same where pairs are expected to slide further
 
 
-class ContactPattern:
-    """Ranges of opposite facets that each facet of each pairing may meet, where pairs are expected to slide by a length
-    ``slide``. Collective over ``comm``."""
+class Reach:
+    """Which opposite facets each facet of a ``pair`` may meet, where points are expected to slide by ``slide``.
 
-    def __init__(self, comm: MPI.Comm, pairings: list[Pairing], slide: float = 0.0) -> None:
-        self.comm, self.pairings = comm, pairings
-        self._margins = [self._margin(pair, slide) for pair in pairings]
-        # per pairing, first and last opposite facet of every facet of the curve; empty: first > last
-        self.reach = [np.tile([np.iinfo(np.int64).max, -1], (p.side.curve.n_facets, 1)) for p in pairings]
+    ``keys`` ``(n,)``, sorted and the same on every rank, number the facets that may meet: the own one times the number
+    of opposite ones, plus the opposite one. Collective.
+    """
+
+    def __init__(self, pair: Pair, slide: float) -> None:
+        self.pair, self._comm, self._n = pair, pair.surface.comm, pair.opposite.n_facets
+        length = self._comm.allreduce(float(pair.surface.weight.sum())) / self._n
+        self._rings = min(_MARGIN + int(slide / length), _WIDEST)
+        self.keys = np.zeros(0, dtype=np.int64)
         self.extend()
 
     def extend(self) -> bool:
-        """Widen the ranges to hold the pairs of the last evaluation; True if any rank had to."""
-        grew = False
-        for pair, margin, reach in zip(self.pairings, self._margins, self.reach, strict=True):
-            if isinstance(pair.opposite, ContactSide):
-                grew |= self._widen(pair, margin, pair.opposite.curve.n_facets - 1, reach)
-        return grew
-
-    def _margin(self, pair: Pairing, slide: float) -> int:
-        """Opposite facets kept on either side of those that are paired: more where facets are short."""
-        if not isinstance(pair.opposite, ContactSide):
-            return 0
-        length = self.comm.allreduce(float(pair.side.weight.sum())) / pair.opposite.curve.n_facets
-        return min(_MARGIN + int(slide / length), _WIDEST)
-
-    def _widen(self, pair: Pairing, margin: int, last: int, reach: np.ndarray) -> bool:
-        facet, met = pair.side.facet, pair.projection.facet.reshape(pair.side.weight.shape)
-        low, high = met.min(axis=1, initial=last), met.max(axis=1, initial=0)
-        outside = (low < reach[facet, 0]) | (high > reach[facet, 1])
-        if not self.comm.allreduce(bool(outside.any()), op=MPI.LOR):
+        """Make room for the pairs of the last evaluation and their neighbours; True if any rank had to. Collective."""
+        keys = self.point_keys()
+        new = keys[~self._known(keys)]
+        if not self._comm.allreduce(len(new) > 0, op=MPI.LOR):
             return False
-        wanted = np.stack([reach[:, 0], -reach[:, 1]])  # both as minima, for one reduction
-        at = facet[outside]
-        wanted[0, at] = np.minimum(wanted[0, at], np.maximum(low[outside] - margin, 0))
-        wanted[1, at] = np.minimum(wanted[1, at], -np.minimum(high[outside] + margin, last))
-        self.comm.Allreduce(MPI.IN_PLACE, wanted, op=MPI.MIN)
-        reach[:] = np.stack([wanted[0], -wanted[1]], axis=1)
+        facet, met = np.divmod(np.unique(new), self._n)
+        which, near = self.pair.opposite.neighbours(met, self._rings)
+        parts = self._comm.allgather(facet[which] * self._n + near)
+        self.keys = np.unique(np.concatenate([self.keys, *parts]))
         return True
 
-    def entries(self) -> tuple[np.ndarray, np.ndarray]:
-        """Block ``(rows, columns)`` in global dofs, each pair once, over all ranks."""
-        rows, columns = [], []
+    def point_keys(self) -> np.ndarray:
+        """The keys ``(m,)`` of this rank's points at the last evaluation."""
+        facet, shape = self.pair.surface.facet, self.pair.surface.weight.shape
+        return (facet[:, None] * self._n + self.pair.projection.facet.reshape(shape)).ravel()
 
-        def all_pairs(r: np.ndarray, c: np.ndarray) -> None:
-            rows.append(np.repeat(r, c.shape[1], axis=1).ravel())
-            columns.append(np.tile(c, (1, r.shape[1])).ravel())
+    def _known(self, keys: np.ndarray) -> np.ndarray:
+        if not len(self.keys):
+            return np.zeros(len(keys), dtype=bool)
+        at = np.searchsorted(self.keys, keys)
+        return self.keys[np.minimum(at, len(self.keys) - 1)] == keys
 
-        for pair, reach in zip(self.pairings, self.reach, strict=True):
-            own = pair.side.curve_cell_dofs
-            trace = pair.side.curve_dofs[pair.side.curve.connectivity]
-            all_pairs(trace, own)
-            if isinstance(pair.opposite, ContactSide):
-                count = np.maximum(reach[:, 1] - reach[:, 0] + 1, 0)
-                facet = np.repeat(np.arange(len(count)), count)
-                within = np.arange(len(facet)) - np.repeat(np.cumsum(count) - count, count)
-                there = pair.opposite.curve_dofs[pair.opposite.curve.connectivity[reach[facet, 0] + within]]
-                all_pairs(trace[facet], there)
-                all_pairs(there, own[facet])
-                all_pairs(there, there)
-        row, column = np.concatenate(rows), np.concatenate(columns)
-        size = 1 + max(row.max(), column.max())
-        return np.divmod(np.unique(row * size + column), size)
+    def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        """The facets ``(n,)`` that may meet: own and opposite."""
+        return np.divmod(self.keys, self._n)
+
+    def entries(self) -> np.ndarray:
+        """Block rows and columns ``(2, n)`` in global dofs, over all ranks; a rigid opposite has none."""
+        own, opposite = self.pair.surface, self.pair.opposite
+        facet, met = self.facets()
+        cells, trace = own.curve_cell_dofs, own.curve_dofs[own.curve.connectivity]
+        found = [_all_pairs(trace, cells)]
+        if not opposite.rigid:
+            there = opposite.curve_dofs[opposite.curve.connectivity[met]]
+            found += [_all_pairs(trace[facet], there), _all_pairs(there, cells[facet]), _all_pairs(there, there)]
+        return np.concatenate(found, axis=1)
+
+
+def _all_pairs(rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Each of ``rows`` ``(n, r)`` with each of ``columns`` ``(n, c)``: ``(2, n r c)``."""
+    return np.stack([np.repeat(rows, columns.shape[1], axis=1).ravel(), np.tile(columns, (1, rows.shape[1])).ravel()])
+
+
+def distinct(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the ``entries`` ``(2, n)``, each pair once and sorted."""
+    size = 1 + entries.max(initial=0)
+    return np.divmod(np.unique(entries[0] * size + entries[1]), size)

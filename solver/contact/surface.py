@@ -1,11 +1,13 @@
 """One side of a contact: the facets of a body's contact edge on this rank, and the whole edge as a curve on every rank.
 
-The curve is small (it grows with the square root of the mesh), so every rank holds all of it and exchanges its
-displacement; each rank integrates the facets of the cells it owns. What a facet needs of its own cell stays local.
+Nothing outside of this file relies on how the facets follow each other. The curve is small (it grows with the square
+root of the mesh), so every rank holds all of it and exchanges its displacement; each rank integrates the facets of the
+cells it owns. What a facet needs of its own cell stays local.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import basix
@@ -14,12 +16,12 @@ from dolfinx import fem
 from dolfinx.mesh import MeshTags
 
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis, strain, strain_matrix
-from archord.geometry.curve import Curve
+from archord.geometry.curve import Curve, RigidCircle
 from archord.materials.material import Material
 from archord.materials.points import Points
 
 
-class ContactSide:
+class Surface:
     """Facets tagged ``tag`` of the body with ``material`` in the displacement space ``V``.
 
     Arrays of this rank's ``n`` facets with ``q`` points each, in the order in which the curve runs: ``weight`` ``(n,
@@ -29,11 +31,12 @@ class ContactSide:
     ``curve_cell_dofs`` holds the global cell dofs of every facet of the curve, on every rank.
     """
 
-    def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material: Material) -> None:
+    rigid = False
+
+    def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material: Material, name: str = "") -> None:
         mesh = V.mesh
         self.comm = mesh.comm
-        self.V = V
-        self.material = material
+        self.V, self.material, self.name = V, material, name
         self.degree = V.element.basix_element.degree
         index_map = V.dofmap.index_map
         cells, local_facets = _owned_facets(mesh, facets.find(tag))
@@ -76,6 +79,19 @@ class ContactSide:
         xi, w = basix.make_quadrature(basix.CellType.interval, 2 * CONTACT_POINTS - 1)
         self.place_points(np.tile(xi[:, 0], (self.curve.n_facets, 1)), np.tile(w, (self.curve.n_facets, 1)))
         self.gamma = self._trace_inequality()
+
+    @property
+    def n_facets(self) -> int:
+        """Number of facets, over all ranks."""
+        return self.curve.n_facets
+
+    def neighbours(self, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
+        """Facets within some ``rings`` around ``facets`` ``(m,)``: places ``(k,)`` in ``facets`` and neighbours."""
+        return self.curve.neighbours(facets, rings)
+
+    def facet_lengths(self) -> Array:
+        """Arc length ``(n_facets,)`` of every facet, over all ranks."""
+        return np.diff(self.curve.arc_length(np.array([0.0, 1.0])))[:, 0]
 
     def _runs_clockwise(self, cells: np.ndarray, local_facets: np.ndarray) -> np.ndarray:
         """Facets ``(n,)`` whose reference direction has its cell on the right."""
@@ -158,11 +174,30 @@ class ContactSide:
         force[self._owned_local] += curve_force[self._owned]
 
     def deform(self, u: Array) -> tuple[Array, Array, Array]:
-        """Own displacement ``(n, q, 2)``, stress ``(n, q, 4)`` and tangent ``(n, q, 3, 3)`` at the contact points."""
+        """Own displacement ``(n q, 2)``, stress ``(n q, 4)`` and tangent ``(n q, 3, 3)`` at the contact points."""
         displacement = self.shape @ u[self.cell_dofs]
-        n, q = self.weight.shape
         stress, tangent = self.points.update(strain(self.gradient, self.cell_dofs, u).reshape(-1, 3))
-        return displacement, stress.reshape(n, q, 4), tangent.reshape(n, q, 3, 3)
+        return displacement.reshape(-1, 2), stress, tangent
+
+
+class RigidSurface:
+    """A rigid disc as a surface of one facet, without points of its own, displaced by ``motion`` ``(1, 2)``.
+
+    ``rate`` ``(2,)`` is its displacement per unit of the load factor; ``curve_dofs`` ``(1,)`` is a block dof behind
+    those of the displacement.
+    """
+
+    rigid = True
+    n_facets = 1
+
+    def __init__(self, circle: RigidCircle, rate: Sequence[float] = (0.0, 0.0)) -> None:
+        self.curve, self.rate = circle, np.array(rate, dtype=float)
+        self.neighbours = circle.neighbours
+        self.motion, self.curve_dofs = np.zeros((1, 2)), np.zeros(1, dtype=np.int64)
+
+    def curve_displacement(self, u: Array) -> Array:
+        """The displacement of the disc ``(1, 2)``, whatever that of the bodies."""
+        return self.motion
 
 
 def _facet_ends(local_facets: np.ndarray) -> tuple[Array, Array]:

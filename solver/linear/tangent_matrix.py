@@ -19,9 +19,9 @@ from archord.solver.timer import BEFORE_SOLVING, Timer
 class TangentMatrix:
     """``A``, of the last evaluation of ``bulk`` and ``contact``, assembled by `update`. Collective.
 
-    ``fixed`` ``(n_local, 2)`` are the prescribed displacements, ``rate`` what they are per unit of the level, and
-    ``rigid_rate`` ``(2,)`` that of a rigid pin. With ``condense``, for elastic bodies which their supports
-    hold, ``A`` is that of the bulk, and the contact is in ``condensed``.
+    ``fixed`` ``(n_local, 2)`` are the prescribed displacements, ``rate`` what they are per unit of the load factor. With
+    ``condense``, for elastic bodies which their supports hold, ``A`` is that of the bulk, and the contact is in
+    ``condensed``.
     """
 
     def __init__(
@@ -31,14 +31,13 @@ class TangentMatrix:
         contact: Contact | None,
         fixed: np.ndarray,
         rate: Array,
-        rigid_rate: Array | None,
         timer: Timer,
         *,
         condense: bool = False,
     ) -> None:
         self.V, self.bulk, self.contact, self.timer = V, bulk, contact, timer
         self.comm, self._index_map = V.mesh.comm, V.dofmap.index_map
-        self._fixed, self._rate, self._rigid_rate = fixed, rate, rigid_rate
+        self._fixed, self._rate = fixed, rate
         self._bcs = _scalar_bcs(V, fixed)
         self._contact_blocks = np.zeros((0, 2, 2))
         self.factorisations = 0  # of sparse matrices, asked for by `update`
@@ -70,7 +69,7 @@ class TangentMatrix:
         self.A = A
         if self._condense:
             assert self.contact is not None
-            self._touching = np.unique(np.concatenate([side.curve_dofs for side in self.contact.sides]))
+            self._touching = np.unique(np.concatenate([surface.curve_dofs for surface in self.contact.surfaces]))
             with self.timer(BEFORE_SOLVING):
                 A.convert("aij")  # PETSc has no Cholesky factors of block matrices from MUMPS
                 self.condensed = Condensed(A, self._touching, self._revise)
@@ -85,8 +84,8 @@ class TangentMatrix:
             self._elastic.destroy()
 
     def _find_contact(self) -> None:
-        """Which contact slots are free ``(n, 2, 2)``, and the rates of their rows and columns ``(n, 2)``; a rigid pin
-        is the block dof behind the last."""
+        """Which contact slots are free ``(n, 2, 2)``, and the rates of their rows and columns ``(n, 2)``; rigid
+        surfaces are the block dofs behind the last."""
         if self.contact is None:
             return
         tangent, size = self.contact.tangent, self._index_map.size_global
@@ -99,8 +98,8 @@ class TangentMatrix:
         values[0, mine] = ~self._fixed[whole[mine] - start]
         values[1, mine] = self._rate[whole[mine] - start]
         self.comm.Allreduce(MPI.IN_PLACE, values)
-        if self._rigid_rate is not None:
-            values[1, whole == size] = self._rigid_rate
+        rigid = whole >= size
+        values[1, rigid] = self.contact.rigid_rates[whole[rigid] - size]
         self._near, (free, self._rate_near) = whole, values
         row, column = np.split(np.searchsorted(whole, places), 2)
         self._row, self._column = row, column

@@ -21,7 +21,9 @@ from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.bulk import Body, Bulk
 from archord.solver.contact.contact import Contact
-from archord.solver.contact.surface import ContactSide
+from archord.solver.contact.interaction import Interaction
+from archord.solver.contact.law import LAWS
+from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Problem
 from archord.solver.stepping import StepRules, march
 from archord.solver.system import System
@@ -77,7 +79,7 @@ def internal_force(bulk: Bulk, u: np.ndarray) -> np.ndarray:
 def contact_force(contact: Contact, u: np.ndarray) -> np.ndarray:
     """What the contact adds to the residual ``(n_owned, 2)`` at ``u``."""
     contact.evaluate(u)
-    force = np.zeros((contact.sides[0].V.dofmap.index_map.size_local, 2))
+    force = np.zeros((contact.surfaces[0].V.dofmap.index_map.size_local, 2))
     contact.add_force(force)
     return force
 
@@ -90,7 +92,7 @@ class Parts:
     cells: MeshTags
     facets: MeshTags
     bulk: Bulk
-    sides: list[ContactSide]
+    sides: list[Surface]
     contact: Contact
 
     def pressed(self, depth: float, noise: float = 0.0, seed: int = 0) -> np.ndarray:
@@ -117,14 +119,21 @@ def joint_parts(
     joint = quarter_joint(comm, R, DR, 4.0, size, 0.4, rigid_pin=pin is None, partitioner=partitioner)
     V = space(joint.mesh)
     bodies = [Body(Cells.BLOCK, block)]
-    sides = [ContactSide(V, joint.facets, Facets.HOLE_ARC, block)]
-    if pin is None:
-        contact_options["rigid"] = RigidCircle(np.array([0.0, -DR]), R)
-    else:
+    sides = [Surface(V, joint.facets, Facets.HOLE_ARC, block)]
+    opposite = RigidSurface(RigidCircle(np.array([0.0, -DR]), R))
+    if pin is not None:
         bodies.insert(0, Body(Cells.PIN, pin))
-        sides.insert(0, ContactSide(V, joint.facets, Facets.PIN_ARC, pin))
+        opposite = Surface(V, joint.facets, Facets.PIN_ARC, pin)
+        sides.insert(0, opposite)
     bulk = Bulk(V, joint.cells, bodies)
-    return Parts(V, joint.cells, joint.facets, bulk, sides, Contact(sides, **contact_options))
+    return Parts(V, joint.cells, joint.facets, bulk, sides, interact([opposite, sides[-1]], **contact_options))
+
+
+def interact(surfaces, *, kinematics="current", **options) -> Contact:
+    """The contact of two surfaces; "tied" is a law that has no kinematics."""
+    if kinematics == "tied":
+        return Contact([Interaction("tie", surfaces, law=LAWS["tied"], **options)])
+    return Contact([Interaction("contact", surfaces, kinematics=kinematics, **options)])
 
 
 LOWER, UPPER = 1, 2  # cell tags of two blocks

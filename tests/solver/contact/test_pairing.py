@@ -10,8 +10,7 @@ import pytest
 from archord.geometry import curve as curve_module
 from archord.geometry.curve import Curve, ProjectionError
 from archord.geometry.joint_mesh import Cells
-from archord.solver.contact.contact import Contact
-from tests.solver.parts import DR, contact_force, joint_parts, n_nodes, nodes_of
+from tests.solver.parts import DR, contact_force, interact, joint_parts, n_nodes, nodes_of
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -22,8 +21,8 @@ def test_a_corrupted_start_does_not_change_the_forces(seed):
     contact.search()
     expected = contact_force(contact, u)
     rng = np.random.default_rng(seed)
-    for pair in contact.pairings:
-        random = rng.integers(0, pair.curve.n_facets, len(pair.projection.facet))
+    for pair in contact.pairs:
+        random = rng.integers(0, pair.opposite.n_facets, len(pair.projection.facet))
         pair.projection = replace(pair.projection, facet=random)
     np.testing.assert_allclose(contact_force(contact, u), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
@@ -67,7 +66,7 @@ def test_a_lost_point_is_an_error_on_every_rank(when, comm, monkeypatch):
     parts = joint_parts(comm)
     rest = np.zeros((n_nodes(parts.V), 2))
     parts.contact.evaluate(rest)
-    search = {"at rest": lambda: Contact(parts.sides), "moving": lambda: parts.contact.evaluate(rest)}[when]
+    search = {"at rest": lambda: interact(parts.sides), "moving": lambda: parts.contact.evaluate(rest)}[when]
     lost = comm.size - 1
     project = Curve._project
 

@@ -58,7 +58,7 @@ def state(comm, pin, block, kinematics, partitioner=None):
     x = coordinates(parts.V)
     u = 0.3 * DR * np.stack([np.sin(9 * x[:, 0] + x[:, 1]), np.cos(8 * x[:, 0] - 7 * x[:, 1])], axis=1)
     if pin is None:
-        parts.contact.rigid_motion = np.array([0.0, -1.5 * DR])
+        parts.contact.rigid[0].motion = np.array([[0.0, -1.5 * DR]])
     else:
         u[nodes_of(parts.V, parts.cells, Cells.PIN), 1] -= 1.5 * DR
     force = internal_force(parts.bulk, u)

@@ -1,0 +1,69 @@
+"""Contact laws: the traction at points of a surface, from how they lie to their partners.
+
+All are arrays of ``m`` points in the frame of the opposite surface: its outward normal ``n`` and, turned from it by a
+quarter anticlockwise, its tangent. A traction ``(m, 2)`` is a pressure, positive in compression, and a shear.
+
+Closest points leave a law of sliding points no slip: friction has to accumulate it in its state, and add its derivative
+where the normal turns to contact_tangent.c.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from archord.geometry.basis import Array
+
+State = Any
+
+
+class ContactLaw(Protocol):
+    """A law by its `update`, a pure function; without a history and without friction as it stands."""
+
+    @property
+    def slides(self) -> bool:
+        """Whether points slide along the opposite surface. If not, they keep the partners and the distance that they
+        have undeformed, where gap and slip count as zero."""
+        return True
+
+    def state(self, n: int) -> State:
+        """History of ``n`` points at the beginning: None, or a dataclass of arrays, as that of a material."""
+        return None
+
+    def update(self, gap: Array, slip: Array, trial: Array, state: State) -> tuple[Array, Array, State]:
+        """Traction ``(m, 2)``, its derivative ``(m, 2, 2)`` with respect to ``trial``, and the new state.
+
+        ``trial`` ``(m, 2)`` is Nitsche's traction of points that touch and stick: that of the own body's stress minus
+        gamma times ``gap`` ``(m,)`` and ``slip`` ``(m,)``. Traction and derivative are zero at points that do not
+        touch; where they touch, the pressure follows its trial value. What is not a number stays that.
+        """
+        ...
+
+
+class Frictionless(ContactLaw):
+    """``p = [trial]_+`` and no shear."""
+
+    def update(self, gap: Array, slip: Array, trial: Array, state: State) -> tuple[Array, Array, State]:
+        """Pressure where the trial pressure is positive."""
+        touches = ~(trial[:, 0] <= 0)
+        traction, derivative = np.zeros_like(trial), np.zeros((len(trial), 2, 2))
+        traction[:, 0] = np.where(touches, trial[:, 0], 0.0)
+        derivative[:, 0, 0] = touches
+        return traction, derivative, state
+
+
+class Tied(ContactLaw):
+    """The whole trial traction, whatever its sign: the surfaces stay as they are to each other."""
+
+    @property
+    def slides(self) -> bool:
+        """No."""
+        return False
+
+    def update(self, gap: Array, slip: Array, trial: Array, state: State) -> tuple[Array, Array, State]:
+        """The trial traction."""
+        return trial, np.tile(np.eye(2), (len(trial), 1, 1)), state
+
+
+LAWS: dict[str, ContactLaw] = {"frictionless": Frictionless(), "tied": Tied()}
