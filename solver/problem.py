@@ -15,6 +15,7 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.geometry.curve import RigidCircle
 from archord.geometry.tagged_mesh import TaggedMesh
+from archord.solver.contact.law import ContactLaw
 
 Vector = tuple[float, float]
 
@@ -40,7 +41,7 @@ class Rigid:
 class Interaction:
     """Contact of two ``surfaces``, facet sets of one body each, of which the first may be a rigid disc.
 
-    ``law`` is "frictionless" or "tied". Under ``kinematics`` "current" the closest points are those of the deformed
+    ``law`` is "frictionless", "tied" or a `ContactLaw`. Under ``kinematics`` "current" the closest points are those of the deformed
     curves, under "reference" those of the undeformed ones. ``gamma_factor`` is Nitsche's gamma over the trace constant
     of each contact cell. ``integrated`` names the one facet set whose points carry the contact, both do if empty.
     ``slide`` is how far pairs are expected to slide.
@@ -48,7 +49,7 @@ class Interaction:
 
     name: str
     surfaces: tuple[str | Rigid, str]
-    law: Literal["frictionless", "tied"] = "frictionless"
+    law: str | ContactLaw = "frictionless"
     kinematics: Literal["current", "reference"] = "current"
     gamma_factor: float = 0.5
     integrated: str = ""

@@ -58,7 +58,7 @@ class System:
         return contact.Interaction(
             given.name,
             [self._surface(surface, given.name) for surface in given.surfaces],
-            law=LAWS[given.law],
+            law=LAWS.get(given.law, given.law),
             kinematics=given.kinematics,
             gamma_factor=given.gamma_factor,
             integrated=integrated,

@@ -17,8 +17,8 @@ from archord.solver.contact.surface import RigidSurface, Surface
 class Pair:
     """The points of ``surface`` (``m`` on this rank) against ``opposite``; arrays are those of the last evaluation.
 
-    ``share`` of the contact's virtual work is integrated here. If the pairs do not move (``moves``), they stay those of the
-    undeformed surfaces. Tractions are in the frame of the ``law``. Raises `ProjectionError`.
+    ``share`` of the contact's virtual work is integrated here. Unless the pair ``moves``, points keep the partners of
+    the undeformed surfaces. Tractions are in the frame of the ``law``. Raises `ProjectionError`.
 
     ``projection`` are the partners, ``separation`` ``x - y`` ``(m, 2)``, ``gap`` and ``slip`` ``(m,)`` its components,
     ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` those of the own material, ``trial``, ``traction``

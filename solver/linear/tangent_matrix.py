@@ -19,8 +19,8 @@ from archord.solver.timer import BEFORE_SOLVING, Timer
 class TangentMatrix:
     """``A``, of the last evaluation of ``bulk`` and ``contact``, assembled by `update`. Collective.
 
-    ``fixed`` ``(n_local, 2)`` are the prescribed displacements, ``rate`` what they are per unit of the load factor. With
-    ``condense``, for elastic bodies which their supports hold, ``A`` is that of the bulk, and the contact is in
+    ``fixed`` ``(n_local, 2)`` are the prescribed displacements, ``rate`` what they are per unit of the load factor.
+    With ``condense``, for elastic bodies which their supports hold, ``A`` is that of the bulk, and the contact is in
     ``condensed``.
     """
 

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from archord.materials.hardening import Hardening
 from archord.materials.j2 import J2Material
 from archord.solver.problem import Body, Interaction, Problem, Support
-from tests.solver.parts import NU, YIELD_STRESS, E, solve, two_blocks
+from tests.solver.parts import NU, YIELD_STRESS, E, blocks, solve
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def test_blocks_pressed_together_follow_the_closed_form(plane):
     supports = [Support("base", "base", 1), Support("lid", "lid", 1, -2.0), *(Support(w, w, 0) for w in walls)]
     contact = Interaction("contact", ("upper bottom", "lower top"), kinematics="reference")
     bodies = [Body("lower", material), Body("upper", material)]
-    system = solve(Problem(two_blocks(MPI.COMM_SELF, 2, 3), bodies, [contact], supports), strain[200::200])
+    system = solve(Problem(blocks(MPI.COMM_SELF, 2, 3), bodies, [contact], supports), strain[200::200])
     assert -system.reaction("lid")[1] == pytest.approx(pressure[-1], rel=1e-9)
     assert system.bulk.cell_fields(system.equilibrium.displacement()).peeq == pytest.approx(peeq[-1], rel=1e-8)
     assert system.contact.state(system.sides["upper bottom"]).pressure == pytest.approx(pressure[-1], rel=1e-8)

@@ -136,34 +136,36 @@ def interact(surfaces, *, kinematics="current", **options) -> Contact:
     return Contact([Interaction("contact", surfaces, kinematics=kinematics, **options)])
 
 
-LOWER, UPPER = 1, 2  # cell tags of two blocks
-SIDES = ("lower top", "upper bottom", "base", "lid", "left", "right")  # their facet sets
+def blocks(comm: MPI.Comm, *edges: int) -> TaggedMesh:
+    """Unit squares on top of each other from y = -1, with so many ``edges`` on each of their sides.
 
-
-def two_blocks(comm: MPI.Comm, n_lower: int, n_upper: int) -> TaggedMesh:
-    """Unit squares on top of each other, with ``n_lower`` and ``n_upper`` edges on their common line y = 0."""
-    LOWER_TOP, UPPER_BOTTOM, BASE, LID, LEFT, RIGHT = range(1, 7)
+    Sets are "lower", "middle" (of three) and "upper", their tops and bottoms, all "left" and all "right" sides; "base"
+    and "lid" are the outermost bottom and top.
+    """
+    names = ("lower", "middle", "upper") if len(edges) == 3 else ("lower", "upper")
+    left, right = 2 * len(edges) + 1, 2 * len(edges) + 2
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
-        lines: dict[int, list[int]] = {tag: [] for tag in range(1, 7)}
-        for tag, y0, y1, n in ((LOWER, -1, 0, n_lower), (UPPER, 0, 1, n_upper)):
-            corners = [geo.addPoint(x, y, 0) for x, y in ((0, y0), (1, y0), (1, y1), (0, y1))]
-            edges = [geo.addLine(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
-            face = geo.addPlaneSurface([geo.addCurveLoop(edges)])
-            for edge in edges:
-                geo.mesh.setTransfiniteCurve(edge, n + 1)
-            lines[RIGHT].append(edges[1])
-            lines[LEFT].append(edges[3])
-            lines[BASE if tag == LOWER else UPPER_BOTTOM].append(edges[0])
-            lines[LOWER_TOP if tag == LOWER else LID].append(edges[2])
+        sides: dict[int, list[int]] = {left: [], right: []}
+        for k, n in enumerate(edges):
+            corners = [geo.addPoint(x, y, 0) for x, y in ((0, k - 1), (1, k - 1), (1, k), (0, k))]
+            lines = [geo.addLine(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
+            face = geo.addPlaneSurface([geo.addCurveLoop(lines)])
+            for line in lines:
+                geo.mesh.setTransfiniteCurve(line, n + 1)
             geo.synchronize()
-            gmsh.model.addPhysicalGroup(2, [face], tag)
-        for tag, group in lines.items():
+            gmsh.model.addPhysicalGroup(2, [face], k + 1)
+            for tag, line in ((2 * k + 1, lines[0]), (2 * k + 2, lines[2])):
+                gmsh.model.addPhysicalGroup(1, [line], tag)
+            sides[right].append(lines[1])
+            sides[left].append(lines[3])
+        for tag, group in sides.items():
             gmsh.model.addPhysicalGroup(1, group, tag)
 
-    facets = {name: tag for tag, name in enumerate(SIDES, 1)}
-    return TaggedMesh(*gmsh_to_mesh(comm, build), {"lower": LOWER, "upper": UPPER}, facets)
+    facets = {f"{name} {end}": 2 * k + e for k, name in enumerate(names) for e, end in ((1, "bottom"), (2, "top"))}
+    facets |= {"base": 1, "lid": 2 * len(edges), "left": left, "right": right}
+    return TaggedMesh(*gmsh_to_mesh(comm, build), {name: k for k, name in enumerate(names, 1)}, facets)
 
 
 INNER, OUTER, ON_X, ON_Y = range(1, 5)

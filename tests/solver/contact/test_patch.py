@@ -12,7 +12,7 @@ from archord.materials.elasticity import contact_modulus
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.problem import Body, Interaction, Problem, Support
-from tests.solver.parts import ELASTIC, NU, E, coordinates, solve, two_blocks
+from tests.solver.parts import ELASTIC, NU, E, blocks, coordinates, solve
 
 DEPTH = 0.01
 KINDS = {"current": {}, "reference": {"kinematics": "reference"}, "tied": {"law": "tied"}}
@@ -27,7 +27,7 @@ class Blocks:
     """Two unit squares with ``n_lower`` and ``n_upper`` edges on their common line; the upper side comes first."""
 
     def __init__(self, n_lower, n_upper, lower=ELASTIC, upper=ELASTIC, loads=(DEPTH,), supports=PRESSED, **contact):
-        mesh = two_blocks(MPI.COMM_SELF, n_lower, n_upper)
+        mesh = blocks(MPI.COMM_SELF, n_lower, n_upper)
         bodies = [Body("lower", lower), Body("upper", upper)]
         joint = Interaction("joint", ("upper bottom", "lower top"), **contact)
         self.system = solve(Problem(mesh, bodies, [joint], supports), loads)
@@ -37,7 +37,7 @@ class Blocks:
     def pressures(self) -> np.ndarray:
         """Pressure at all points of the integrated sides."""
         contact = self.system.contact
-        return np.concatenate([contact.state(pair.side).pressure.ravel() for pair in contact.pairs])
+        return np.concatenate([contact.state(pair.surface).pressure.ravel() for pair in contact.pairs])
 
 
 def uniform(V):

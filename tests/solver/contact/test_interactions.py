@@ -1,0 +1,100 @@
+"""Several interactions in one problem, each with its own law, gamma and sides; a law from outside."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.materials.elasticity import contact_modulus
+from archord.solver.contact.law import ContactLaw
+from archord.solver.problem import Body, Interaction, Problem, Support
+from tests.solver.contact.test_tangent import matrix
+from tests.solver.parts import ELASTIC, NU, E, blocks, contact_force, coordinates, solve
+
+DEPTH = 0.01
+PRESSED = [Support("base", "base", 1), Support("lid", "lid", 1, -1.0), Support("left", "left", 0)]  # free to widen
+LOW, HIGH = ("lower top", "middle bottom"), ("middle top", "upper bottom")
+
+
+def stack(low: dict, high: dict):
+    """Three squares pressed together, with the options of both interactions."""
+    bodies = [Body(name, ELASTIC) for name in ("lower", "middle", "upper")]
+    interactions = [Interaction("low", LOW, **low), Interaction("high", HIGH, **high)]
+    return solve(Problem(blocks(MPI.COMM_SELF, 3, 4, 2), bodies, interactions, PRESSED), [DEPTH])
+
+
+STACKS = {
+    "alike": ({}, {}),
+    "one fixed": ({}, {"kinematics": "reference"}),
+    "one tied": ({"law": "tied"}, {}),
+    "one stiff and one-sided": ({"gamma_factor": 20.0}, {"integrated": "upper bottom"}),
+}
+
+
+@pytest.mark.parametrize(("low", "high"), STACKS.values(), ids=STACKS)
+def test_a_stack_of_three_carries_a_uniform_pressure(low, high):
+    """The closed form of one column: pressure, resultants of both interactions by name, displacement."""
+    system = stack(low, high)
+    pressure = contact_modulus(E, NU, "strain") * DEPTH / 3
+    x = coordinates(system.V)
+    expected = DEPTH / 3 * np.stack([NU / (1 - NU) * x[:, 0], -1 - x[:, 1]], axis=1)
+    np.testing.assert_allclose(system.equilibrium.displacement(), expected, rtol=0, atol=1e-9 * DEPTH)
+    for pair in system.contact.pairs:
+        np.testing.assert_allclose(system.contact.state(pair.surface).pressure, pressure, rtol=1e-8)
+    for name in ("low", "high"):
+        np.testing.assert_allclose(system.contact.resultant(name), [0, pressure], atol=1e-9 * pressure)
+    assert system.sides.keys() == {*LOW, *HIGH}
+
+
+def test_the_tangent_of_several_interactions_is_the_derivative_of_their_forces():
+    """In random directions that move every node."""
+    system = stack({}, {"law": "tied"})
+    contact, rng = system.contact, np.random.default_rng(0)
+    u = system.equilibrium.displacement() + 1e-3 * DEPTH * rng.normal(size=(len(coordinates(system.V)), 2))
+    contact_force(contact, u)
+    K, h = matrix(contact, u.size)[:-2, :-2], 1e-6 * DEPTH
+    for _ in range(3):
+        d = rng.normal(size=u.shape)
+        difference = (contact_force(contact, u + h * d) - contact_force(contact, u - h * d)).ravel() / (2 * h)
+        assert np.linalg.norm(K @ d.ravel() - difference) < 1e-6 * np.linalg.norm(difference)
+
+
+def test_a_limit_of_gamma_holds_for_the_interactions_above_it():
+    """The others keep their factor; without a limit each has its own again."""
+    contact = stack({"gamma_factor": 20.0}, {}).contact
+    low, high = (i.pairs[0] for i in contact.interactions)
+    assert contact.gamma_factor == 20
+    before = low.gamma.copy(), high.gamma.copy()
+    contact.use_gamma_factor(5.0)
+    np.testing.assert_allclose(low.gamma, before[0] / 4, rtol=1e-15)
+    np.testing.assert_array_equal(high.gamma, before[1])
+    contact.use_gamma_factor(contact.gamma_factor)
+    np.testing.assert_array_equal(low.gamma, before[0])
+
+
+class Bilateral(ContactLaw):
+    """Surfaces that slide on each other and never part."""
+
+    def update(self, gap, slip, trial, state):
+        derivative = np.zeros((len(trial), 2, 2))
+        derivative[:, 0, 0] = 1.0
+        return trial * [1.0, 0.0], derivative, state
+
+
+@pytest.mark.parametrize("kinematics", ["current", "reference"])
+def test_a_law_from_outside_pulls_and_slides(kinematics):
+    """Pulled, the column carries a uniform tension; pushed aside, its upper half drags nothing along."""
+    interaction = Interaction("joint", ("upper bottom", "lower top"), law=Bilateral(), kinematics=kinematics)
+    bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
+    mesh = blocks(MPI.COMM_SELF, 4, 7)
+    supports = [Support("base", "base", 1), Support("lid", "lid", 1, 1.0), Support("left", "left", 0)]
+    system = solve(Problem(mesh, bodies, [interaction], supports), [DEPTH])
+    tension = contact_modulus(E, NU, "strain") * DEPTH / 2
+    np.testing.assert_allclose(system.reaction("lid"), [0, tension], atol=1e-9 * tension)
+    for pair in system.contact.pairs:
+        np.testing.assert_allclose(system.contact.state(pair.surface).pressure, -tension, rtol=1e-8)
+    supports = [Support("base", "base", k) for k in (0, 1)]
+    supports += [Support("lid", "lid", k, 1.0 - k) for k in (0, 1)]
+    u = solve(Problem(mesh, bodies, [interaction], supports), [DEPTH]).equilibrium.displacement()
+    assert np.abs(u[coordinates(system.V)[:, 1] < -0.1]).max() < 1e-10 * DEPTH
