@@ -1,13 +1,13 @@
-"""J2 plasticity with isotropic hardening: return mapping on arrays of points.
+"""J2 plasticity with isotropic hardening: one return map for plane strain and plane stress, on arrays of points.
 
-Backward Euler, with the tangent consistent with it (Simo and Hughes, Computational Inelasticity, 1998): radial return
-in plane strain (Box 3.2), the projected algorithm in plane stress (Box 3.3).
+Backward Euler, with the tangent consistent with it (Simo and Hughes, Computational Inelasticity, 1998, Boxes 3.2 and
+3.3). Of the components that a plane has, ``C`` are the elastic moduli and ``P`` takes a stress to its deviator (as a
+strain), so that the von Mises stress is ``q^2 = 1.5 sigma . P sigma``. The plastic strain grows by ``zeta P sigma``,
+``zeta = 1.5 d_peeq / q``, and the stress is ``(C^-1 + zeta P)^-1`` times the elastic trial strain. ``C`` and ``P``
+share their eigenvectors: each eigencomponent of the trial stress shrinks alone, by ``1 + zeta C_k P_k``, and one scalar
+equation a point is left for ``zeta``.
 
-Both reduce to one scalar equation a point. The plastic strain grows by ``zeta`` times the deviator of the stress, where
-``zeta = 1.5 d_peeq / q`` and ``q`` is the von Mises stress. Elastic moduli and the deviator's projection share their
-eigenvectors, so each eigencomponent ``a_k`` of the trial stress shrinks to ``a_k / (1 + zeta c_k)``, and
-`plastic_multiplier` finds the ``zeta`` at which ``q`` is the yield stress. In plane strain the deviator is the only
-component that shrinks, and linear hardening has a closed form: radial_return.c.
+With linear hardening in plane strain it has a closed form, which radial_return.c computes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,19 @@ from archord.materials.hardening import Hardening, LinearHardening
 from archord.materials.material import Array, Material
 
 _ITERATIONS = 60
-_DEVIATORIC = np.array([[2 / 3, -1 / 3, 0.0], [-1 / 3, 2 / 3, 0.0], [0.0, 0.0, 2.0]])  # in plane stress, strain's shear
+# components of (n, 4) stresses and of strains that a plane has; eigenvectors and eigenvalues of P
+_PLANES = {
+    "stress": (
+        [0, 1, 3],
+        np.array([[1, 1, 0], [-1, 1, 0], [0, 0, 1]]) / np.sqrt([[2], [2], [1]]),
+        np.array([1 / 3, 1.0, 2.0]),
+    ),
+    "strain": (
+        [0, 1, 2, 3],
+        np.array([[1, 1, 1, 0], [-1, 1, 0, 0], [1, 1, -2, 0], [0, 0, 0, 1]]) / np.sqrt([[3], [2], [6], [1]]),
+        np.array([0.0, 1.0, 1.0, 2.0]),
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -54,12 +66,9 @@ class J2Material(Elastic):
         return PlasticState(np.zeros((n, 4)), np.zeros(n))
 
     def update(self, strain: Array, state: PlasticState) -> tuple[Array, Array, PlasticState]:
-        """The return map of the plane."""
-        if self.plane == "stress":
-            return projected_return(strain, state, self)
-        if self.hardening.linear is None:
-            return radial_return(strain, state, self)
-        return _linear_radial_return(strain, state, self)
+        """`return_map`, in C where it has a closed form."""
+        closed = self.plane == "strain" and self.hardening.linear is not None
+        return _linear_radial_return(strain, state, self) if closed else return_map(strain, state, self)
 
     def dissipation(self, state: PlasticState) -> Array:
         """Plastic work density ``(n,)``."""
@@ -68,6 +77,44 @@ class J2Material(Elastic):
     def peeq(self, state: PlasticState) -> Array:
         """PEEQ ``(n,)``."""
         return state.peeq
+
+
+def return_map(strain: Array, old: PlasticState, m: J2Material) -> tuple[Array, Array, PlasticState]:
+    """Stress ``(n, 4)``, tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from the ``old`` state."""
+    parts, Q, deviator = _PLANES[m.plane]
+    lam, mu = m.lame
+    first = 3 * lam + 2 * mu if m.plane == "strain" else m.E / (1 - m.nu)
+    moduli = np.array([first, *[2 * mu] * (len(parts) - 2), mu])
+    C, P = Q.T * moduli @ Q, Q.T * deviator @ Q
+    shear = np.array([1.0, 1.0, 1.0, 2.0])  # engineering over tensor
+    elastic = -old.plastic_strain * shear
+    elastic[:, [0, 1, 3]] += strain
+    stress, tangent = np.zeros((len(strain), 4)), np.tile(m.elastic_tangent, (len(strain), 1, 1))
+    stress[:, parts] = elastic[:, parts] @ C
+    a = stress[:, parts] @ Q.T
+    p = np.flatnonzero(np.sqrt(1.5 * a**2 @ deviator) > m.hardening.stress(old.peeq))
+    if not len(p):
+        return stress, tangent, old
+    zeta, q = plastic_multiplier(a[p], 1.5 * deviator, moduli * deviator, m.hardening, old.peeq[p])
+    shrink = 1 + zeta[:, None] * (moduli * deviator)
+    sigma = (a[p] / shrink) @ Q
+    stress[p[:, None], parts] = sigma
+
+    plastic_strain, peeq = old.plastic_strain.copy(), old.peeq.copy()
+    peeq[p] += 2 / 3 * zeta * q
+    flow = sigma @ P
+    grown = np.stack([flow[:, 0], flow[:, 1], -flow[:, 0] - flow[:, 1], flow[:, -1]], axis=1) / shear
+    plastic_strain[p] += zeta[:, None] * grown
+
+    softened = np.einsum("ki,nk,kj->nij", Q, moduli / shrink, Q)  # (C^-1 + zeta P)^-1
+    direction = np.einsum("nij,nj->ni", softened, flow)
+    slope = m.hardening.slope(peeq[p])
+    left = 1 - 2 / 3 * slope * zeta
+    factor = left / (left * np.einsum("ni,ni->n", flow, direction) + 4 / 9 * slope * q**2)
+    consistent = softened - factor[:, None, None] * direction[:, :, None] * direction[:, None, :]
+    in_plane = np.array([0, 1, len(parts) - 1])
+    tangent[p] = consistent[:, in_plane[:, None], in_plane]
+    return stress, tangent, PlasticState(plastic_strain, peeq)
 
 
 def plastic_multiplier(
@@ -80,7 +127,7 @@ def plastic_multiplier(
     increasing and concave in ``zeta``: Newton from 0 cannot overshoot. What does not converge is not a number.
     """
     zeta = np.zeros(len(a))
-    close = 1e-10 / compliance.min()  # Newton is quadratic: a step this small leaves nothing but round-off
+    close = 1e-10 / compliance.max()  # Newton is quadratic: a step this small leaves nothing but round-off
     for _ in range(_ITERATIONS):
         shrink = 1 + zeta[:, None] * compliance
         q = np.sqrt((a / shrink) ** 2 @ weights)
@@ -98,43 +145,8 @@ def plastic_multiplier(
     return zeta, np.sqrt((a / (1 + zeta[:, None] * compliance)) ** 2 @ weights)
 
 
-def radial_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Array, Array, PlasticState]:
-    """Plane strain: the trial deviator keeps its direction ``n`` (unit) and shrinks by ``1 / (1 + 2 mu zeta)``.
-
-    With ``H`` the slope of the hardening and ``s = 3 mu d_peeq / q_trial`` the tangent is
-    ``K 1 x 1 + 2 mu (1 - s) I_dev - 2 mu (3 mu / (3 mu + H) - s) n x n``.
-    """
-    lam, mu = m.lame
-    full = np.stack([strain[:, 0], strain[:, 1], np.zeros(len(strain)), 0.5 * strain[:, 2]], axis=1)
-    elastic = full - old.plastic_strain
-    volume = np.array([1.0, 1.0, 1.0, 0.0])
-    mean = elastic[:, :3].sum(axis=1, keepdims=True) / 3
-    deviator = 2 * mu * (elastic - mean * volume)
-    q = np.sqrt(1.5 * (deviator**2 @ np.array([1.0, 1.0, 1.0, 2.0])))
-    stress = deviator + (3 * lam + 2 * mu) * mean * volume
-    tangent = np.tile(m.elastic_tangent, (len(strain), 1, 1))
-    p = np.flatnonzero(q > m.hardening.stress(old.peeq))
-    if not len(p):
-        return stress, tangent, old
-    zeta, _ = plastic_multiplier(q[p, None], np.ones(1), np.array([2 * mu]), m.hardening, old.peeq[p])
-    flow = (zeta / (1 + 2 * mu * zeta))[:, None] * deviator[p]
-    plastic_strain, peeq = old.plastic_strain.copy(), old.peeq.copy()
-    plastic_strain[p] += flow
-    peeq[p] += 2 / 3 * zeta * q[p] / (1 + 2 * mu * zeta)
-    stress[p] -= 2 * mu * flow
-
-    scale = 2 * mu * zeta / (1 + 2 * mu * zeta)
-    loss = 2 * mu * (3 * mu / (3 * mu + m.hardening.slope(peeq[p])) - scale)
-    normal = np.sqrt(1.5) * deviator[p][:, [0, 1, 3]] / q[p, None]
-    in_plane, shear = np.array([1.0, 1.0, 0.0]), np.array([1.0, 1.0, 0.5])
-    projector = np.diag(shear) - np.outer(in_plane, in_plane) / 3
-    tangent[p] = (lam + 2 / 3 * mu) * np.outer(in_plane, in_plane) + 2 * mu * (1 - scale)[:, None, None] * projector
-    tangent[p] -= loss[:, None, None] * normal[:, :, None] * normal[:, None, :]
-    return stress, tangent, PlasticState(plastic_strain, peeq)
-
-
 def _linear_radial_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Array, Array, PlasticState]:
-    """`radial_return` with linear hardening, where ``d_peeq = (q_trial - stress(PEEQ)) / (3 mu + H)``, in C."""
+    """`return_map` with linear hardening in plane strain: ``d_peeq = (q_trial - stress(PEEQ)) / (3 mu + H)``."""
     n, strain = len(strain), np.ascontiguousarray(strain, dtype=float)
     stress, tangent = np.empty((n, 4)), np.empty((n, 3, 3))
     new = PlasticState(np.empty((n, 4)), np.empty(n))
@@ -143,45 +155,3 @@ def _linear_radial_return(strain: Array, old: PlasticState, m: J2Material) -> tu
     kernel = library(Path(__file__).with_name("radial_return.c")).radial_return
     yielding = kernel(n, *inputs, *m.lame, *m.hardening.linear, pointer(m.elastic_tangent), *outputs)
     return stress, tangent, new if yielding else old
-
-
-def projected_return(strain: Array, old: PlasticState, m: J2Material) -> tuple[Array, Array, PlasticState]:
-    """Plane stress: ``sigma = (C^-1 + zeta P)^-1 C^-1 sigma_trial``, with the elastic moduli ``C`` and the projection
-    ``P`` to the deviator; the components that shrink are sum, difference and shear of the stresses in the plane."""
-    _, mu = m.lame
-    C = m.elastic_tangent
-    elastic = strain - old.plastic_strain[:, [0, 1, 3]] * np.array([1.0, 1.0, 2.0])
-    trial = elastic @ C
-    stress = np.zeros((len(strain), 4))
-    stress[:, [0, 1, 3]] = trial
-    tangent = np.tile(C, (len(strain), 1, 1))
-    parts = np.stack([trial[:, 0] + trial[:, 1], trial[:, 1] - trial[:, 0], trial[:, 2]], axis=1)
-    weights = np.array([0.25, 0.75, 3.0])  # q^2 = (sum^2)/4 + 3 (difference^2)/4 + 3 shear^2
-    p = np.flatnonzero(np.sqrt(parts**2 @ weights) > m.hardening.stress(old.peeq))
-    if not len(p):
-        return stress, tangent, old
-    compliance = np.array([m.E / (3 * (1 - m.nu)), 2 * mu, 2 * mu])  # products of the eigenvalues of C and P
-    zeta, q = plastic_multiplier(parts[p], weights, compliance, m.hardening, old.peeq[p])
-    shrink = 1 + zeta[:, None] * compliance
-    b = parts[p] / shrink
-    sigma = np.stack([(b[:, 0] - b[:, 1]) / 2, (b[:, 0] + b[:, 1]) / 2, b[:, 2]], axis=1)
-    flow = sigma @ _DEVIATORIC
-
-    plastic_strain, peeq = old.plastic_strain.copy(), old.peeq.copy()
-    peeq[p] += 2 / 3 * zeta * q
-    plastic_strain[p] += zeta[:, None] * np.stack(
-        [flow[:, 0], flow[:, 1], -flow[:, 0] - flow[:, 1], 0.5 * flow[:, 2]], axis=1
-    )
-    stress[p[:, None], [0, 1, 3]] = sigma
-
-    plane_sum, plane_difference = m.E / (1 - m.nu) / shrink[:, 0], 2 * mu / shrink[:, 1]
-    xi = np.zeros((len(p), 3, 3))
-    xi[:, 0, 0] = xi[:, 1, 1] = (plane_sum + plane_difference) / 2
-    xi[:, 0, 1] = xi[:, 1, 0] = (plane_sum - plane_difference) / 2
-    xi[:, 2, 2] = mu / shrink[:, 2]
-    direction = np.einsum("nij,nj->ni", xi, flow)
-    slope = m.hardening.slope(peeq[p])
-    left = 1 - 2 / 3 * slope * zeta
-    factor = left / (left * np.einsum("ni,ni->n", flow, direction) + 4 / 9 * slope * q**2)
-    tangent[p] = xi - factor[:, None, None] * direction[:, :, None] * direction[:, None, :]
-    return stress, tangent, PlasticState(plastic_strain, peeq)

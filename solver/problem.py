@@ -41,10 +41,10 @@ class Rigid:
 class Interaction:
     """Contact of two ``surfaces``, facet sets of one body each, of which the first may be a rigid disc.
 
-    ``law`` is "frictionless", "tied" or a `ContactLaw`. Under ``kinematics`` "current" the closest points are those of the deformed
-    curves, under "reference" those of the undeformed ones. ``gamma_factor`` is Nitsche's gamma over the trace constant
-    of each contact cell. ``integrated`` names the one facet set whose points carry the contact, both do if empty.
-    ``slide`` is how far pairs are expected to slide.
+    ``law`` is "frictionless", "tied" or a `ContactLaw`. Under ``kinematics`` "current" the closest points are those of
+    the deformed curves, under "reference" those of the undeformed ones. ``gamma_factor`` is Nitsche's gamma over the
+    trace constant of each contact cell. ``integrated`` names the one facet set whose points carry the contact, both do
+    if empty. ``slide`` is how far pairs are expected to slide.
     """
 
     name: str
