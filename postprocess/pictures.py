@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.output.user_file import check_output, make_folder, writing
+from archord.output.user_file import make_folder, writing
 from archord.postprocess import panels
 from archord.postprocess.comparison import same_size, same_units, scaled
 from archord.postprocess.curve import gap_name
@@ -27,20 +27,13 @@ _FEW = 10  # runs that get a colour of their own and a name in the legend
 _MOST = 200  # runs of a sweep that are drawn
 
 
-def open_figure(target: Path, width: float, height: float) -> Figure:
-    """A figure so wide and high in inches for the file ``target``. Raises `InputError` if that cannot be written."""
-    figure = new_figure(width, height)
-    formats = figure.canvas.get_supported_filetypes()
-    if target.suffix[1:].lower() not in formats:
-        raise InputError(f"{target}: must end in one of {', '.join('.' + name for name in sorted(formats))}.")
-    check_output(target)
-    return figure
-
-
 def save_figure(figure: Figure, target: Path) -> Path:
-    """Write ``figure`` as ``target``; returns it. Raises `InputError` if it cannot be written."""
-    with writing(target):
-        return save(figure, target)
+    """Write ``figure`` as ``target``; returns it. Raises `InputError` if that cannot be written."""
+    try:
+        with writing(target):
+            return save(figure, target)
+    except ValueError as error:
+        raise InputError(str(error)) from None
 
 
 def draw(folder: str | Path, target: str | Path | None = None) -> Path:
@@ -51,7 +44,7 @@ def draw(folder: str | Path, target: str | Path | None = None) -> Path:
     """
     run = Run(folder)
     target = Path(target) if target else run.folder / "picture.png"
-    figure = open_figure(target, 15, 4.4)
+    figure = new_figure(15, 4.4)
     field, arc, force = figure.subplots(1, 3, width_ratios=[1.0, 1.2, 1.1])
     panels.field_panel(figure, field, run)
     panels.arc_panel(arc, run)
@@ -65,7 +58,6 @@ def draw_run(run: Run, folder: Path) -> tuple[list[Path], list[str]]:
 
     Raises `InputError` if the run has no accepted step, a file of it is damaged, or one cannot be written.
     """
-    make_folder(folder)
     sizes = {"force.png": (6.4, 4.8), "pressure.png": (12, 4.8), "field.png": (6.4, 6), "iterations.png": (6.4, 3.6)}
     left_out = []
     if run.scene.joint.model == "ring":
@@ -73,7 +65,7 @@ def draw_run(run: Run, folder: Path) -> tuple[list[Path], list[str]]:
     if not run.scene.output.fields:
         del sizes["field.png"]
         left_out.append("no picture of the field: the run was solved with output.fields = false.")
-    figures = {name: open_figure(folder / name, *size) for name, size in sizes.items()}
+    figures = {name: new_figure(*size) for name, size in sizes.items()}
     panels.force_panel(figures["force.png"].subplots(), run)
     arc, chord = figures["pressure.png"].subplots(1, 2)
     panels.arc_panel(arc, run)
@@ -81,6 +73,7 @@ def draw_run(run: Run, folder: Path) -> tuple[list[Path], list[str]]:
     if field := figures.get("field.png"):
         panels.field_panel(field, field.subplots(), run)
     panels.iterations_panel(figures["iterations.png"].subplots(), run)
+    make_folder(folder)
     return [save_figure(figure, folder / name) for name, figure in figures.items()], left_out
 
 
@@ -116,7 +109,7 @@ def draw_comparison(
     curves below each other can be seen. Raises `InputError` if the file cannot be written or a run's contact cannot be
     read.
     """
-    figure = open_figure(target, 15, 4.6 * (absolute + dimensionless))
+    figure = new_figure(15, 4.6 * (absolute + dimensionless))
     rows = figure.subplots(absolute + dimensionless, 3, squeeze=False)
     for relative, axes in zip([False] * absolute + [True] * dimensionless, rows, strict=True):
         _row(axes, runs, names, relative, shades, dashed)
