@@ -6,29 +6,44 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from markdown_it import MarkdownIt
 from mpi4py import MPI
 
+from archord.benchmarks.case import Case
 from archord.benchmarks.paper.claims import CLAIMS
-from archord.benchmarks.paper.figures import Runs, Table, fig2, fig3, fig4, fig5, fig7, fig9
-from archord.benchmarks.paper.first_yield import fig8
-from archord.benchmarks.paper.runs import PAIRS, Case, cases, plastic, solve_missing
-from archord.benchmarks.report_files import markdown_table
+from archord.benchmarks.paper.figures import Figure, fig2, fig3, fig4, fig5, fig7, fig8, fig9
+from archord.benchmarks.paper.runs import (
+    FULL_YIELD,
+    JOINTS,
+    MILD_YIELD,
+    PAIRS,
+    PLANES,
+    Runs,
+    cases,
+    plastic,
+    solve_missing,
+)
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
 from archord.output.user_file import check_output
+from archord.report.table import Table
 from archord.scene.errors import InputError
 
-_PLASTIC = [plastic(pair) for pair in PAIRS]
-FIGURES: dict[str, tuple[Callable[[Runs], tuple[Table, Callable]], list[str], tuple[float, float]]] = {
-    # what draws it, the scenes it needs, its size in inches
-    "fig2": (fig2, ["elastic"], (6.5, 4.5)),
-    "fig3": (fig3, ["elastic"], (6.5, 4.5)),
-    "fig4": (fig4, ["elastic"], (6.5, 4.5)),
-    "fig5": (fig5, ["plastic_0.5_0.2"], (11, 4.5)),
-    "fig7": (fig7, _PLASTIC, (6.5, 4.5)),
-    "fig8": (fig8, ["plastic_0.1_0.1", "elastic_0.1"], (17, 8)),
-    "fig9": (fig9, ["elastic", "plastic_0.5_0.2"], (6.5, 4.5)),
+# what makes it, and the joints it needs
+FIGURES: dict[str, tuple[Callable[[Runs], Figure], list[str]]] = {
+    "fig2": (fig2, ["elastic"]),
+    "fig3": (fig3, ["elastic"]),
+    "fig4": (fig4, ["elastic"]),
+    "fig5": (fig5, [plastic(FULL_YIELD)]),
+    "fig7": (fig7, [plastic(pair) for pair in PAIRS]),
+    "fig8": (fig8, [plastic(MILD_YIELD), "elastic_0.1"]),
+    "fig9": (fig9, ["elastic", plastic(FULL_YIELD)]),
 }
+_STYLE = (
+    "body{font:16px/1.5 sans-serif;max-width:75em;margin:2em auto}td,th{border:1px solid #ccc;padding:.4em}"
+    "table{border-collapse:collapse}img{max-width:100%}"
+)
+_HEAD = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Hu et al.</title><style>{_STYLE}</style>'
 
 
 def chosen(names: list[str]) -> list[str]:
@@ -51,12 +66,12 @@ def reproduce(
     wanted = chosen(names)
     agreed(comm, lambda: _claim(folder, wanted))
     runs = Runs(folder / "runs")
-    complaints = solve_missing(cases(s for name in wanted for s in FIGURES[name][1]), runs.folder, comm, said)
-    if complaints:
+    needed = cases(joint for name in wanted for joint in FIGURES[name][1])
+    if complaints := solve_missing(needed, runs.folder, comm, said):
         raise RuntimeError("; ".join(complaints))
     if comm.rank != 0:
         return []
-    files = [file for name in wanted for file in _draw(name, runs, folder)]
+    files = [file for name in wanted for file in FIGURES[name][0](runs).write(folder, name)]
     return files + (_report(runs, folder) if len(wanted) == len(FIGURES) else [])
 
 
@@ -67,59 +82,36 @@ def _claim(folder: Path, wanted: list[str]) -> None:
             check_output(folder / f"{name}.{kind}")
 
 
-def _draw(name: str, runs: Runs, folder: Path) -> list[Path]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    make, _, size = FIGURES[name]
-    table, draw = make(runs)
-    table.write(folder / f"{name}.csv")
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    draw(figure)
-    for axes in figure.axes:
-        if axes.get_legend_handles_labels()[1]:
-            axes.legend(frameon=False, fontsize=8)
-            axes.grid(alpha=0.3)
-    figure.savefig(folder / f"{name}.png", dpi=120)
-    return [folder / f"{name}.csv", folder / f"{name}.png"]
-
-
 def mesh_errors(runs: Runs) -> dict[str, float]:
     """By run: the largest difference of P between the two meshes over all steps from 0.2 dR on, over P."""
     errors = {}
-    for case in cases(["elastic", "elastic_0.1", *_PLASTIC]):
-        if case.mesh == "fine":
-            fine, coarse = (runs.curve(case.scene, case.plane, mesh) for mesh in ("fine", "coarse"))
+    for joint in JOINTS:
+        for plane in PLANES:
+            fine, coarse = (runs.curve(joint, plane, mesh) for mesh in ("fine", "coarse"))
             late = fine.delta >= 0.2 * fine.dR
-            errors[f"{case.scene}, plane {case.plane}"] = float(np.abs(coarse.P / fine.P - 1)[late].max())
+            errors[f"{joint}, plane {plane}"] = float(np.abs(coarse.P / fine.P - 1)[late].max())
     return errors
 
 
 def _report(runs: Runs, folder: Path) -> list[Path]:
-    from markdown_it import MarkdownIt
-
     errors = mesh_errors(runs)
     worst = max(errors, key=lambda name: errors[name])
-    lines = [
-        "# The claims of Hu et al., judged",
-        "",
-        "Hu et al., *A new model for elasto-plastic conformal contact between cylinders*. Like bodies, nu = 0.3 (the "
-        "paper gives neither), block of 100 R, closest points on the deformed curves, small strains; E* = 1.",
-        "",
-        f"Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {errors[worst]:.2%} from 0.2 dR on "
-        f"({worst}): the discretisation error of the finer one, which all numbers come from, is below that.",
-        "",
-    ]
-    headings = ("claim", "figure", "the paper", "ours, plane strain", "ours, plane stress", "verdict")
-    judged = [(c.name, c.figure, c.text, c.strain, c.stress, c.verdict) for c in (f(runs) for f in CLAIMS)]
-    lines += [*markdown_table(headings, judged), "", *(f"![figure {name[3:]}]({name}.png)\n" for name in FIGURES)]
-    text = "\n".join(lines) + "\n"
-    (folder / "report.md").write_text(text, encoding="utf-8")
-    body = MarkdownIt("commonmark").enable("table").render(text)
-    style = "body{font:16px/1.5 sans-serif;max-width:75em;margin:2em auto}td,th{border:1px solid #ccc;padding:.4em}"
-    style += "table{border-collapse:collapse}img{max-width:100%}"
-    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Hu et al.</title><style>{style}</style>'
-    html = f"{head}{body}</html>\n"
-    (folder / "report.html").write_text(html, encoding="utf-8")
-    return [folder / "report.md", folder / "report.html"]
+    table = Table("claim", "figure", "the paper", *(f"ours, plane {plane}" for plane in PLANES), "verdict")
+    for claim in (judged(runs) for judged in CLAIMS):
+        table.add(claim.name, claim.figure, claim.text, *claim.found.values(), claim.verdict)
+    pictures = "\n".join(f"![figure {name[3:]}]({name}.png)\n" for name in FIGURES)
+    text = f"""# The claims of Hu et al., judged
+
+Hu et al., *A new model for elasto-plastic conformal contact between cylinders*. Like bodies, nu = 0.3 (the paper \
+gives neither), block of 100 R, closest points on the deformed curves, small strains; E* = 1.
+
+Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {errors[worst]:.2%} from 0.2 dR on ({worst}): the \
+discretisation error of the finer one, which all numbers come from, is below that.
+
+{table.markdown()}
+{pictures}"""
+    html = MarkdownIt("commonmark").enable("table").render(text)
+    files = {folder / "report.md": text, folder / "report.html": f"{_HEAD}{html}</html>\n"}
+    for file, content in files.items():
+        file.write_text(content, encoding="utf-8")
+    return list(files)

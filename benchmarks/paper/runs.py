@@ -1,4 +1,4 @@
-"""The runs behind the paper's figures: scenes, planes and meshes; what is done is not done again.
+"""The runs behind the paper's figures: joints, planes and meshes; what is solved already is not solved again.
 
 Hu et al. give neither Poisson's ratio nor the ratio of the moduli: like bodies with nu = 0.3 are taken. The text names
 (dR/R, sigY/E*) = (0.5 %, 0.2 %) and (0.1 %, 0.1 %) and the ranges of figure 7; its other pairs are our choice within
@@ -7,91 +7,100 @@ them.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from mpi4py import MPI
 
+from archord.benchmarks.case import Case, E, paper_joint, side_by_side
+from archord.materials.material import Plane
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
-from archord.output.run import solve_scene
-from archord.scene.file import load_scene, resolved
-from archord.scene.scene import Scene
+from archord.postprocess.curve import RunCurve, read_run
 
-Plane = Literal["strain", "stress"]
 PLANES: tuple[Plane, ...] = ("strain", "stress")
 MESHES = {"coarse": 0.04, "fine": 0.02}  # element size on the arcs over R
 PAIRS = ((0.1, 0.1), (0.5, 0.1), (0.5, 0.2), (0.5, 0.4), (1.0, 0.6))  # dR/R and sigY/E* in percent
-_SCENES = Path(__file__).parent
-_PLANE_STRESS = ["analysis.plane=stress", "pin.E=2.0", "block.E=2.0"]  # E* = 1
+FULL_YIELD, MILD_YIELD = (0.5, 0.2), (0.1, 0.1)  # the pairs of figures 5 and 8
+STEPS = 20  # twice as many where dR/R = 0.1 %
 
 
 def plastic(pair: tuple[float, float]) -> str:
-    """Name of the scene of a (dR/R, sigY/E*) pair in percent."""
+    """Name of the joint of a (dR/R, sigY/E*) pair in percent."""
     return f"plastic_{pair[0]}_{pair[1]}"
 
 
+# dR/R and sigY/E* in percent by name; longest runs first
+JOINTS = {
+    plastic(PAIRS[0]): PAIRS[0],
+    "elastic_0.1": (0.1, None),
+    **{plastic(pair): pair for pair in PAIRS[1:]},
+    "elastic": (0.5, None),
+}
+
+
+def run_name(joint: str, plane: Plane, mesh: str = "fine") -> str:
+    """Name of a run and of its folder."""
+    return f"{joint}-{plane}-{mesh}"
+
+
+def case(joint: str, plane: Plane, mesh: str = "fine") -> Case:
+    """One run, delta = 2 dR: E* = 1 in either plane."""
+    ratio, strength = JOINTS[joint]
+    modulus = E if plane == "strain" else 2.0
+    solid = {"E": modulus, "nu": 0.3, "yield_stress": None if strength is None else strength / 100}
+    size = {"element_size": None, "relative_element_size": MESHES[mesh]}
+    scene = paper_joint(
+        steps=STEPS if ratio > 0.1 else 2 * STEPS,
+        units={"length": "R", "stress": "E*"},
+        joint={"clearance": None, "relative_clearance": ratio / 100, **size},
+        pin=solid,
+        block=solid,
+        analysis={"plane": plane},
+    )
+    return Case(run_name(joint, plane, mesh), scene)
+
+
+def cases(joints: Iterable[str]) -> list[Case]:
+    """All planes and meshes of ``joints``, the longest runs first."""
+    asked = set(joints)
+    wanted = [joint for joint in JOINTS if joint in asked]
+    return [case(joint, plane, mesh) for mesh in ("fine", "coarse") for joint in wanted for plane in PLANES]
+
+
 @dataclass(frozen=True)
-class Case:
-    """One run: a scene of ``benchmarks/paper``, its plane and its mesh."""
+class Runs:
+    """The finished runs in ``folder``."""
 
-    scene: str
-    plane: Plane
-    mesh: str = "fine"
+    folder: Path
 
-    @property
-    def name(self) -> str:
-        """Name of the run folder."""
-        return f"{self.scene}-{self.plane}-{self.mesh}"
-
-    def load(self) -> Scene:
-        """The checked scene."""
-        overrides = [f"joint.relative_element_size={MESHES[self.mesh]}"]
-        return load_scene(_SCENES / f"{self.scene}.toml", overrides + (_PLANE_STRESS if self.plane == "stress" else []))
-
-    def is_done(self, folder: Path) -> bool:
-        """Whether ``folder`` holds this case, solved to the end."""
-        try:
-            report = json.loads((folder / self.name / "run.json").read_text(encoding="utf-8"))
-            scene = (folder / self.name / "scene.toml").read_text(encoding="utf-8")
-        except (OSError, ValueError):
-            return False
-        return report.get("status") == "done" and scene == resolved(self.load())
-
-
-def cases(scenes: Iterable[str]) -> list[Case]:
-    """All planes and meshes of ``scenes``, the longest runs first."""
-    order = sorted(set(scenes), key=lambda name: ("0.1" not in name, name.startswith("elastic"), name))
-    return [Case(scene, plane, mesh) for mesh in reversed(MESHES) for scene in order for plane in PLANES]
+    def curve(self, joint: str, plane: Plane, mesh: str = "fine") -> RunCurve:
+        """The curves of a run."""
+        return read_run(self.folder / run_name(joint, plane, mesh))
 
 
 def solve_missing(
-    wanted: list[Case], folder: Path, comm: MPI.Comm, report: Callable[[Case, float], None] = lambda case, P: None
+    wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[Case, float], None] = lambda case, P: None
 ) -> list[str]:
     """Solve the cases that are not done yet into ``folder``, each on one rank, the ranks side by side.
 
-    ``report(case, P)`` follows each on the rank that solved it. Returns the complaints of all that failed. Raises
+    ``said(case, P)`` follows each on the rank that solved it. Returns the complaints of all that failed. Raises
     `InputError`, before any is solved, if ``folder`` cannot take them. Collective.
     """
 
-    def claimed() -> list[Case]:
-        missing = [case for case in wanted if not case.is_done(folder)]
-        for case in missing:
-            claim_folder(folder / case.name, force=True)
+    def claimed() -> list[int]:
+        missing = [number for number, one in enumerate(wanted) if not one.is_done(folder)]
+        for number in missing:
+            claim_folder(wanted[number].folder(folder), force=True)
         return missing
 
-    missing = agreed(comm, claimed)
-    complaints = []
-    for case in missing[comm.rank :: comm.size]:
-        run = folder / case.name
-        outcome = solve_scene(case.load(), run, MPI.COMM_SELF)
-        if outcome.status == "interrupted":
-            raise KeyboardInterrupt
-        if outcome.status != "done":
-            complaints.append(f"{case.name}: {outcome.message}")
-            continue
-        report(case, outcome.steps[-1].P)
-    return [text for texts in comm.allgather(complaints) for text in texts]
+    def complaint(number: int) -> str:
+        try:
+            steps = wanted[number].solve(folder).steps
+        except RuntimeError as error:
+            return str(error)
+        said(wanted[number], steps[-1].P)
+        return ""
+
+    return [text for text in side_by_side(comm, agreed(comm, claimed), complaint) if text]

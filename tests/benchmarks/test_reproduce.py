@@ -7,13 +7,11 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.paper import runs as paper_runs
-from archord.benchmarks.paper.claims import FAIR, GOOD, _grade
-from archord.benchmarks.paper.figures import Runs
+from archord.benchmarks.paper.claims import FAIR, GOOD, grade
 from archord.benchmarks.paper.first_yield import first_yield
 from archord.benchmarks.paper.reproduce import FIGURES, chosen, reproduce
-from archord.benchmarks.paper.runs import PAIRS, Case, cases, plastic
+from archord.benchmarks.paper.runs import JOINTS, PAIRS, PLANES, Runs, case, cases, plastic
 from archord.scene.errors import InputError
-from archord.scene.file import load_scene
 
 STEPS = 8
 
@@ -24,12 +22,12 @@ def folder(tmp_path_factory):
     target = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(paper_runs, "MESHES", {"coarse": 0.2, "fine": 0.1})
-        patch.setattr(paper_runs, "load_scene", lambda file, keys: load_scene(file, [*keys, f"load.steps={STEPS}"]))
+        patch.setattr(paper_runs, "STEPS", STEPS)
         solved: list[str] = []
-        reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda case, P: solved.append(case.name))
-        assert sorted(solved) == sorted(c.name for c in cases(["elastic", plastic((0.5, 0.2))]))
+        reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda one, P: solved.append(one.name))
+        assert sorted(solved) == sorted(one.name for one in cases(["elastic", plastic((0.5, 0.2))]))
         again: list[str] = []
-        files = reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda case, P: again.append(case.name))
+        files = reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda one, P: again.append(one.name))
         assert again == []
         assert [f.name for f in files] == ["fig3.csv", "fig3.png", "fig5.csv", "fig5.png"]
         yield target
@@ -60,13 +58,13 @@ def test_plane_stress_is_capped_near_the_yield_stress_and_plane_strain_is_not(fo
 
 def test_an_interrupted_run_is_solved_again(folder):
     """A run folder whose run.json does not say done is not taken."""
-    case = Case("elastic", "stress", "coarse")
-    report = folder / "runs" / case.name / "run.json"
+    stopped = case("elastic", "stress", "coarse")
+    report = stopped.folder(folder / "runs") / "run.json"
     said = report.read_text()
     report.write_text(said.replace('"status": "done"', '"status": "interrupted"'))
-    assert not case.is_done(folder / "runs")
+    assert not stopped.is_done(folder / "runs")
     report.write_text(said)
-    assert case.is_done(folder / "runs")
+    assert stopped.is_done(folder / "runs")
 
 
 def test_first_yield_scales_with_the_yield_stress(folder):
@@ -80,13 +78,15 @@ def test_first_yield_scales_with_the_yield_stress(folder):
 
 def test_every_scene_of_the_paper_is_in_its_plane_with_unit_contact_modulus():
     """E* = 1 in both planes, and the pairs are what their names say."""
-    for case in cases({scene for _, scenes, _ in FIGURES.values() for scene in scenes}):
-        scene = case.load()
-        assert scene.E_star == pytest.approx(1.0)
-        assert scene.analysis.plane == case.plane
+    for joint in JOINTS:
+        for plane in PLANES:
+            scene = case(joint, plane).scene
+            assert scene.E_star == pytest.approx(1.0)
+            assert scene.analysis.plane == plane
     for dR, sigma in PAIRS:
-        scene = Case(plastic((dR, sigma)), "strain").load()
+        scene = case(plastic((dR, sigma)), "strain").scene
         assert (scene.joint.dR, scene.block.yield_stress) == pytest.approx((dR / 100, sigma / 100))
+    assert set(JOINTS) == {joint for _, joints in FIGURES.values() for joint in joints}
 
 
 def test_figures_are_chosen_by_name():
@@ -99,4 +99,4 @@ def test_figures_are_chosen_by_name():
 
 def test_verdicts_follow_the_deviation():
     """Within 5 %, within 15 %, beyond."""
-    assert [_grade(d) for d in (0.9 * GOOD, 0.9 * FAIR, 1.1 * FAIR)] == ["holds", "holds with a limit", "does not hold"]
+    assert [grade(d) for d in (0.9 * GOOD, 0.9 * FAIR, 1.1 * FAIR)] == ["holds", "holds with a limit", "does not hold"]
