@@ -17,9 +17,8 @@ from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene as load_scene_file
-from archord.scene.reference import toml_value
-from archord.scene.scene import Scene
-from archord.scene.sections import plain
+from archord.scene.keys import toml_value
+from archord.scene.scene import Scene, plain
 
 if TYPE_CHECKING:
     from mpi4py import MPI

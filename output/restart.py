@@ -16,7 +16,7 @@ from archord.output.folder import CHECKPOINT
 from archord.presets.measures import Measures
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
-from archord.scene.reference import toml_value
+from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
 
 _MAY_DIFFER = ("stepping.", "analysis.max_iterations")

@@ -22,7 +22,8 @@ from archord.geometry.basis import Array
 from archord.geometry.joint_mesh import Cells, Facets
 from archord.geometry.quarter_joint import quarter_joint
 from archord.output.user_file import writing
-from archord.scene.scene import Pin, Scene, Solid
+from archord.scene.scene import Scene
+from archord.scene.sections import Pin, Solid
 
 Ints = npt.NDArray[np.int64]
 Elements = Literal["quadratic", "linear"]

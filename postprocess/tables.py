@@ -13,7 +13,8 @@ from archord.postprocess.curve import gap_name
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep, short
 from archord.report.table import Table
-from archord.scene.scene import Pin, Scene, Solid
+from archord.scene.scene import Scene
+from archord.scene.sections import Pin, Solid
 
 _MOST_STEPS, _MOST_CASES, _MOST_LOADS = 40, 60, 20  # rows of a table
 _LONGEST = 40  # characters of a value

@@ -1,20 +1,18 @@
-"""Scene files: TOML to a checked scene and back, and one sentence for every fault."""
+"""Scene files: TOML to a checked scene and back."""
 
 from __future__ import annotations
 
 import csv
-import difflib
 import json
 import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from archord.scene.errors import InputError
-from archord.scene.reference import key_names, limits_in_words, toml_value
-from archord.scene.scene import CHOSEN, FORMAT, LOADS, Scene
+from archord.scene.faults import shortened
+from archord.scene.scene import CHOSEN, Scene, parse_scene
+from archord.scene.sections import LOADS
 
 ALTERNATIVES = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
@@ -24,7 +22,6 @@ _LARGEST_FILE = 10**6  # bytes
 _DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_CHAIN = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}")
-_MOST_SENTENCES = 20
 
 
 def load_scene(path: str | Path, overrides: list[str] | tuple[str, ...] = ()) -> Scene:
@@ -95,7 +92,7 @@ def _target(file: Path, line: int, row: list[str]) -> float:
         (value,) = row  # 0,5 with a decimal comma would be two
         return float(value)
     except ValueError:
-        given = _shortened(json.dumps(",".join(row), ensure_ascii=False))
+        given = shortened(json.dumps(",".join(row), ensure_ascii=False))
         raise InputError(
             f"{file}: line {line}: {given} must be one number, as every row below the heading (0.5, not 0,5)."
         ) from None
@@ -120,51 +117,11 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     except RecursionError:
         raise InputError(f"{path}: is not a scene: its arrays or tables are nested too deeply.") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: is not valid TOML: {_shortened(str(error))}.") from None
+        raise InputError(f"{path}: is not valid TOML: {shortened(str(error))}.") from None
     except InputError:
         raise
     except ValueError as error:  # whole numbers of thousands of digits, dates like 0000-00-00
-        raise InputError(f"{path}: is not valid TOML: {_shortened(str(error))}.") from None
-
-
-def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, str] | None = None) -> Scene:
-    """Check scene ``data`` as read from ``source``; ``origin`` names another source of some keys. Raises
-    `InputError`."""
-    _check_format(data, source)
-    try:
-        return Scene.model_validate(data)
-    except ValidationError as error:
-        faults = _meant(error.errors(), data)
-        sentences = [_sentence(e, data, source, origin or {}) for e in faults[:_MOST_SENTENCES]]
-        if len(faults) > _MOST_SENTENCES:
-            sentences.append(f"{source}: has {len(faults) - _MOST_SENTENCES} more faults like these.")
-        raise InputError("\n".join(sentences)) from None
-
-
-def _check_format(data: dict[str, Any], source: str) -> None:
-    """Look at the version first: a newer scene may hold anything else that is unknown here. Raises `InputError`."""
-    given = data.get("format", FORMAT)
-    shown = _shortened(toml_value(given))
-    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
-        raise InputError(
-            f"{source}: format = {shown} must be a whole number, the version of the scene format: {FORMAT}."
-        )
-    if given > FORMAT:
-        raise InputError(
-            f"{source}: format = {shown} is newer than this archord, which reads format {FORMAT}; use a newer archord."
-        )
-
-
-def _shortened(text: str, length: int = 80) -> str:
-    """``text`` with its middle left out if it is long."""
-    return text if len(text) <= length else f"{text[: length - 20]} ... {text[-15:]}"
-
-
-def _key_shown(part: str) -> str:
-    """One part of a key as TOML writes it, without what would break a line."""
-    return (
-        part if re.fullmatch(r"[\w-]+", part) and len(part) <= 80 else _shortened(json.dumps(part, ensure_ascii=True))
-    )
+        raise InputError(f"{path}: is not valid TOML: {shortened(str(error))}.") from None
 
 
 def override_key(data: dict[str, Any], override: str) -> str:
@@ -210,66 +167,6 @@ def _value(text: str) -> Any:
         return float(text)
     except ValueError:
         return text
-
-
-def _meant(errors: list[Any], data: dict[str, Any]) -> list[Any]:
-    """The errors, less those of the kind that was not given where a key may be one number or a list."""
-    out: dict[tuple, Any] = {}
-    for error in errors:
-        section, key, *rest = [*error["loc"], None, None][: max(2, len(error["loc"]))]
-        if not rest:
-            out[error["loc"]] = error
-            continue
-        listed = isinstance(data[section][key], list)
-        if str(rest[0]).startswith("list") == listed:
-            error = {**error, "loc": (section, key), "entry": rest[1] if len(rest) > 1 else None}
-            if error["type"] in ("float_type", "int_type") and not listed:
-                error["type"] = f"{error['type']}_or_list"
-            out.setdefault((section, key), error)
-    return list(out.values())
-
-
-def _sentence(error: Any, data: dict[str, Any], source: str, origin: dict[str, str]) -> str:
-    """One sentence for one fault that pydantic found."""
-    location, kind, context = [str(part) for part in error["loc"]], error["type"], error.get("ctx", {})
-    said = None
-    if kind == "value_error":
-        name, said = str(context["error"]).split("|", 1)
-        location += name.split(".")
-    key = ".".join(map(_key_shown, location))
-    given: Any = data
-    for part in location:
-        given = given.get(part) if isinstance(given, dict) else None
-    where = next((said_in for name, said_in in origin.items() if name == key or name.startswith(f"{key}.")), source)
-    shown = "" if given is None or isinstance(given, dict) or where != source else f" = {_shortened(toml_value(given))}"
-    if error.get("entry") is not None:
-        shown += f": entry {error['entry'] + 1}"
-    rules = {
-        "float_type_or_list": "must be a number or a list of numbers",
-        "int_type_or_list": "must be a whole number or a list of them",
-        "too_short": "must not be empty",
-        "too_long": "must not have more than {max_length} entries",
-        "literal_error": "must be {expected}",
-        "float_type": "must be a number",
-        "int_type": "must be a whole number",
-        "bool_type": "must be true or false",
-        "string_type": "must be text",
-        "string_too_short": "must not be empty",
-        "string_pattern_mismatch": "must be one line of text",
-        "finite_number": "must be a finite number",
-        "missing": "is missing",
-        "model_type": "must be a section, [{name}]",
-    }
-    if said is None and kind == "extra_forbidden":
-        allowed = key_names(location[:-1])
-        near = difflib.get_close_matches(location[-1], allowed, 1)
-        hint = f"did you mean {near[0]}? " if near else ""
-        said = f"is not a known key; {hint}{'Sections' if len(location) == 1 else 'Keys'} are {', '.join(allowed)}"
-    elif said is None and kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
-        said = f"must be {limits_in_words(*location)}"
-    elif said is None:
-        said = rules.get(kind, error["msg"]).format(**{**context, "name": key})
-    return f"{where}: {key}{shown} {said}."
 
 
 def resolved(scene: Scene) -> str:

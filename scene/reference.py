@@ -1,39 +1,20 @@
-"""What a scene file may hold: the schema, a commented example, the reference tables, and limits in words."""
+"""What a scene file may hold: the schema, a commented example, and the reference tables."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
+from archord.report.table import Table
+from archord.scene.keys import given, limits, toml_value
 from archord.scene.scene import Scene
 
 TOP_LEVEL = ("format",)
 
 
-def toml_value(value: Any) -> str:
-    """``value`` as TOML writes it."""
-    return json.dumps(value, default=str, ensure_ascii=False)
-
-
-def key_names(location: list[str]) -> list[str]:
-    """Keys of the section at ``location`` (none: the sections)."""
-    model: Any = Scene
-    for part in location:
-        model = model.model_fields[part].annotation
-    return list(model.model_fields)
-
-
 def schema() -> dict[str, Any]:
     """The JSON schema of scene files."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema()}
-
-
-def limits_in_words(section: str, key: str) -> str:
-    """Limits of a key: ``greater than -1 and less than 0.5``."""
-    properties = Scene.model_fields[section].annotation.model_json_schema()["properties"]  # type: ignore[union-attr]
-    signs = {">": "greater than", "≥": "at least", "<": "less than", "≤": "at most"}
-    return " and ".join(f"{signs[sign]} {value:g}" for sign, value in _limits(properties[key])[1])
 
 
 def _sections() -> Iterator[tuple[str, Any, list[tuple[str, Any]]]]:
@@ -82,52 +63,32 @@ def example() -> str:
 
 def reference() -> str:
     """All sections and keys as Markdown tables."""
-    lines = [
-        "# Scene reference",
-        "",
-        "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.",
-        "",
-        "Above the sections a scene may say, and what archord writes does say:",
-        "",
-        "| key | default | what |",
-        "|---|---|---|",
-    ]
+    top = Table("key", "default", "what")
     for name in TOP_LEVEL:
         info = Scene.model_fields[name]
-        lines.append(f"| `{name}` | `{toml_value(info.default)}` | {info.description} |")
-    lines.append("")
+        top.add(f"`{name}`", f"`{toml_value(info.default)}`", info.description)
+    parts = [
+        "# Scene reference\n",
+        "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.\n",
+        "Above the sections a scene may say, and what archord writes does say:\n",
+        top.markdown(),
+    ]
     for section, info, keys in _sections():
-        lines += [f"## [{section}]", "", f"{info.description[0].upper()}{info.description[1:]}.", ""]
-        lines += ["| key | unit | default | allowed | what |", "|---|---|---|---|---|"]
         schema = info.annotation.model_json_schema()["properties"]
+        table = Table("key", "unit", "default", "allowed", "what")
         for name, key in keys:
             default = "required" if key.is_required() else "" if key.default is None else f"`{toml_value(key.default)}`"
-            what = key.description.replace("|", "\\|")
-            lines.append(f"| `{name}` | {_unit(key)} | {default} | {_allowed(schema[name])} | {what} |")
-        lines.append("")
-    return "\n".join(lines)
+            table.add(f"`{name}`", _unit(key), default, _allowed(schema[name]), key.description)
+        parts += [f"## [{section}]\n", f"{info.description[0].upper()}{info.description[1:]}.\n", table.markdown()]
+    return "\n".join(parts)
 
 
 def _allowed(schema: dict[str, Any]) -> str:
     """Type and limits of a key from its JSON schema, for a table."""
-    given = _given(schema)
-    if "enum" in given:
-        return ", ".join(f"`{toml_value(value)}`" for value in given["enum"])
-    if given["type"] == "boolean":
-        return "true, false"
-    kind, limits = _limits(schema)
-    return " ".join([kind, ", ".join(f"{sign} {value:g}" for sign, value in limits)]).strip()
-
-
-def _given(schema: dict[str, Any]) -> dict[str, Any]:
-    """The schema of a key that may be absent, when it is not."""
-    return next((s for s in schema.get("anyOf", []) if s.get("type") != "null"), schema)
-
-
-def _limits(schema: dict[str, Any]) -> tuple[str, list[tuple[str, float]]]:
-    listed = any(s.get("type") == "array" for s in schema.get("anyOf", []))
-    schema = _given(schema)
-    signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
-    kind = {"number": "number", "integer": "whole number", "string": "text"}[schema["type"]]
-    kind += " or list" if listed else ""
-    return kind, [(sign, schema[name]) for name, sign in signs.items() if name in schema]
+    one = given(schema)
+    if "enum" in one:
+        return ", ".join(f"`{toml_value(value)}`" for value in one["enum"])
+    kind = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false"}[one["type"]]
+    if any(s.get("type") == "array" for s in schema.get("anyOf", [])):
+        kind += " or list"
+    return " ".join([kind, ", ".join(f"{sign} {value:g}" for sign, value in limits(schema))]).strip()

@@ -1,109 +1,28 @@
 """The scene: a joint and its loading, checked, with every key's unit and default.
 
 Any consistent set of units will do; ``[units]`` only names them. Where a key has an alternative (``clearance`` and
-``relative_clearance``), the scene gives one of the two. What a geometry, a body and a load are is in files of their
-own beside this one; their names are here as well.
+``relative_clearance``), the scene gives one of the two.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from archord.materials.elasticity import contact_modulus
-from archord.scene.bodies import Pin, Solid
 from archord.scene.errors import InputError
+from archord.scene.faults import in_sentences, shortened
 from archord.scene.geometry import JointGeometry
-from archord.scene.keys import LINE, Section, key
-from archord.scene.load import LOADS, Load
+from archord.scene.keys import Section, key, toml_value
+from archord.scene.sections import Analysis, Load, Output, Pin, Solid, Stepping, Units
 
-__all__ = (
-    "CHOSEN", "FORMAT", "LOADS", "Analysis", "JointGeometry", "Load", "Output", "Pin", "Scene", "Solid",
-    "Stepping", "Units",
-)  # fmt: skip
 _RANGE = 1e-30, 1e30  # of lengths and moduli; powers of them must not leave the range of numbers
 FORMAT = 1  # version of the scene format: rises when a scene gets a meaning that an older archord would get wrong
 _SOFTEST = 1e-8  # ratio of the moduli
 _WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
-
-
-class Units(Section):
-    """Names of the scene's units, for headings; they must be consistent (force = stress times length squared)."""
-
-    length: str = key("unit of length", default="mm", min_length=1, pattern=LINE)
-    stress: str = key("unit of stress and of Young's modulus", default="MPa", min_length=1, pattern=LINE)
-
-    @property
-    def force(self) -> str:
-        """Unit of force per unit thickness."""
-        return {("mm", "MPa"): "N/mm", ("m", "Pa"): "N/m"}.get(
-            (self.length, self.stress), f"{self.stress} {self.length}"
-        )
-
-    @property
-    def energy(self) -> str:
-        """Unit of energy per unit thickness."""
-        return {("mm", "MPa"): "N", ("m", "Pa"): "N"}.get((self.length, self.stress), f"{self.stress} {self.length}2")
-
-
-class Analysis(Section):
-    """How the joint is modelled and solved."""
-
-    plane: Literal["strain", "stress"] = key("plane strain or plane stress", default="strain")
-    kinematics: Literal["current", "reference"] = key(
-        "contact pairs: closest points on the deformed curves, or fixed pairs of the touching configuration",
-        default="current",
-    )
-    integration: Literal["both", "pin", "block"] = key(
-        "whose contact edge carries the integral: both halves (unbiased), or one side's alone", default="both"
-    )
-    gamma_factor: float = key(
-        "Nitsche's gamma over the trace constant of each contact cell; coercive above 0.25",
-        default=0.5,
-        ge=1e-3,
-        le=1e6,
-    )
-    accuracy: float | None = key(
-        "relative error of P (of delta under a force) to reach, 1e-5 to 0.1: element_size, growth and the length of "
-        "the steps are chosen accordingly, and the error is estimated",
-        default=None,
-        ge=1e-5,
-        le=0.1,
-    )
-    degree: Literal[2, 3] = key("polynomial degree of displacements and of the curved geometry", default=2)
-    coarse_start: bool = key(
-        "take the guess for every step from a coarser mesh, where the mesh is fine; false is for comparison",
-        default=True,
-    )
-    tolerance: float = key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
-    max_iterations: int = key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
-
-
-class Stepping(Section):
-    """Control of the steps between outputs; lengths are in output steps."""
-
-    initial: float = key("length of the first step", default=1.0, gt=0, le=1)
-    minimum: float = key("length below which a step is not cut", default=1e-3, gt=0, le=1)
-    maximum: float = key("length beyond which a step does not grow", default=1.0, gt=0, le=1)
-    growth: float = key("factor on the length after an easy step", default=2.0, ge=1, le=10)
-    cutback: float = key("factor on the length after a failed step", default=0.5, ge=0.05, le=0.9)
-    target_iterations: int = key("Newton iterations up to which a step was easy", default=15, ge=1, le=1000)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Stepping:
-        if not self.minimum <= self.initial <= self.maximum:
-            raise ValueError("initial|must be between stepping.minimum and stepping.maximum")
-        return self
-
-
-class Output(Section):
-    """What a run writes besides its curves."""
-
-    fields: bool = key("write the fields of every step to fields.xdmf and fields.h5", default=True)
-
-
 # what an accuracy chooses
 CHOSEN = (
     ("joint", "element_size"),
@@ -114,25 +33,12 @@ CHOSEN = (
 )
 
 
-class _Checked(type(BaseModel)):  # type: ignore[misc]
-    """Calls of the class are checked like a scene file, so that faults are the same sentences."""
-
-    def __call__(cls, **sections: Any) -> Any:
-        from archord.scene.sections import scene_from
-
-        return scene_from(sections)
-
-
-class Scene(Section, metaclass=_Checked):
+class Scene(Section):
     """A pin joint and how to load it.
 
-    ``Scene(joint={"radius": 10.0, "clearance": 0.05}, ...)`` makes one from sections, tables or their classes. Raises
-    `InputError`, a sentence for each fault.
+    ``Scene(joint={"radius": 10.0, "clearance": 0.05}, ...)`` makes one from sections: tables or their classes, whose
+    numbers and lists may be numpy's; None means absent. Raises `InputError`, a sentence for each fault.
     """
-
-    if TYPE_CHECKING:
-
-        def __init__(self, **sections: Any) -> None: ...
 
     format: Literal[1] = key("version of the scene format; a scene of a newer version is refused", default=FORMAT)
     units: Units = Field(default_factory=Units, description="names of the units")
@@ -143,6 +49,23 @@ class Scene(Section, metaclass=_Checked):
     load: Load = Field(description="loading")
     stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
     output: Output = Field(default_factory=Output, description="what is written")
+
+    def __init__(self, **sections: Any) -> None:
+        data = plain(sections)
+        load = data.get("load")
+        if isinstance(load, dict) and "path" in load:
+            raise InputError(
+                f'scene: load.path = "{load["path"]}" is for scene files alone; give the list of its targets instead.'
+            )
+        self._fill(data, "scene", {})
+
+    def _fill(self, data: dict[str, Any], source: str, origin: dict[str, str]) -> None:
+        """Take the keys of ``data``. Raises `InputError`."""
+        _check_format(data, source)
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise InputError(in_sentences(error.errors(), data, Scene, source, origin)) from None
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
@@ -229,3 +152,32 @@ class Scene(Section, metaclass=_Checked):
     def plastic(self) -> bool:
         """Whether any body can yield."""
         return self.pin.yield_stress is not None or self.block.yield_stress is not None
+
+
+def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, str] | None = None) -> Scene:
+    """Check scene ``data`` as read from ``source``; ``origin`` names another source of some keys. Raises
+    `InputError`."""
+    scene = Scene.__new__(Scene)
+    scene._fill(data, source, origin or {})
+    return scene
+
+
+def plain(value: Any) -> Any:
+    """``value`` as a TOML file would give it: tables, lists and numbers of Python."""
+    if isinstance(value, BaseModel):
+        value = value.model_dump(exclude_unset=True)
+    if isinstance(value, Mapping):
+        return {str(name): plain(part) for name, part in value.items() if part is not None}
+    if isinstance(value, (list, tuple)):
+        return [plain(part) for part in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _check_format(data: dict[str, Any], source: str) -> None:
+    """Look at the version first: a newer scene may hold anything else that is unknown here. Raises `InputError`."""
+    version = data.get("format", FORMAT)
+    said = f"{source}: format = {shortened(toml_value(version))}"
+    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
+        raise InputError(f"{said} must be a whole number, the version of the scene format: {FORMAT}.")
+    if version > FORMAT:
+        raise InputError(f"{said} is newer than this archord, which reads format {FORMAT}; use a newer archord.")

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.scene.reference import toml_value
+from archord.scene.keys import toml_value
 
 R, E_STAR = 10.0, 1e5  # mm, MPa
 NU = (0.0, 0.49)

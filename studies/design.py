@@ -11,7 +11,7 @@ import numpy as np
 
 from archord.scene.errors import InputError
 from archord.scene.file import ALTERNATIVES
-from archord.scene.reference import toml_value
+from archord.scene.keys import toml_value
 from archord.studies.sweep_file import LatinHypercube, Overrides, SweepFile, flattened
 
 ABSENT = "none"  # the value that drops a key, so that its default holds

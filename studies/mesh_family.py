@@ -10,7 +10,9 @@ import math
 
 from pydantic import ValidationError
 
-from archord.scene.scene import JointGeometry, Scene, Stepping
+from archord.scene.geometry import JointGeometry
+from archord.scene.scene import Scene
+from archord.scene.sections import Stepping
 
 RATIO = 1.5  # of the element sizes from one mesh to the next
 _GROWTH = 6.25  # over the element size in R, for a wide contact

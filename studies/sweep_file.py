@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr,
 
 from archord.scene.errors import InputError
 from archord.scene.file import override_key, read_toml
-from archord.scene.reference import toml_value
+from archord.scene.keys import toml_value
 
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from archord.output.disk import replace_file
-from archord.scene.reference import toml_value
+from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
 from archord.studies.case_run import Result, report_of, standing
 from archord.studies.cases import Case, Sweep

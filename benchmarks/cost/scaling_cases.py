@@ -9,7 +9,8 @@ from scipy.optimize import brentq
 
 from archord.benchmarks.case import paper_joint
 from archord.scene.errors import InputError
-from archord.scene.scene import JointGeometry, Scene
+from archord.scene.geometry import JointGeometry
+from archord.scene.scene import Scene
 
 ELASTIC = (5_000, 30_000, 100_000, 300_000, 1_000_000)  # dofs
 PLASTIC = (5_000, 30_000, 100_000)

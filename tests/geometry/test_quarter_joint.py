@@ -11,7 +11,7 @@ from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.geometry.half_ring import half_ring
 from archord.geometry.joint_mesh import Cells, Facets
 from archord.geometry.quarter_joint import quarter_joint
-from archord.scene.scene import JointGeometry
+from archord.scene.geometry import JointGeometry
 
 R, DR, W = 1.0, 0.005, 10.0
 SIZE, GROWTH = 0.2, 0.4

@@ -9,7 +9,7 @@ from archord.output.run import solve_scene
 from archord.output.run_json import energy_balance
 from archord.postprocess.laws.elastic_laws import persson_pressure
 from archord.postprocess.laws.joint import LawJoint
-from archord.scene.scene import Load
+from archord.scene.sections import Load
 from tests.solver.solving import solve
 
 LIKE = LawJoint(1.0, DR, 1.0)

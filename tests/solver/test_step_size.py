@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from archord.scene.scene import Stepping
+from archord.scene.sections import Stepping
 from archord.solver.load_path import LoadPath
 from archord.solver.newton import Newton
 from archord.solver.stepping import StepFailure, StepRules, StepSize, march
