@@ -5,7 +5,7 @@ from __future__ import annotations
 import h5py
 import numpy as np
 
-from archord.geometry.basis import Array
+from archord.materials.material import Array
 from archord.output.step_file import step_name
 from archord.postprocess.curve import RunCurve
 from archord.presets.arc import ArcProfile

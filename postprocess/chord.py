@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from archord.geometry.basis import Array
+from archord.materials.material import Array
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 

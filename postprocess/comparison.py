@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.geometry.basis import Array
+from archord.materials.material import Array
 from archord.postprocess.curve import RunCurve, gap_name
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError

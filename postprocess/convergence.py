@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from archord.geometry.basis import Array
+from archord.materials.material import Array
 from archord.postprocess.curve import RunCurve
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
@@ -54,22 +54,10 @@ def observed_order(sizes: Sequence[float], finer: float, coarser: float) -> floa
 
 @dataclass(frozen=True)
 class Order:
-    """Order of convergence taken for a curve; ``estimate`` is what three meshes say, None if they cannot, or if there
-    are but two."""
+    """Order of convergence taken for a curve, and in ``words`` where it comes from."""
 
     value: float
-    estimate: float | None
-    meshes: int
-
-    @property
-    def words(self) -> str:
-        """The order and where it comes from."""
-        if self.meshes < 3:
-            return f"{self.value:g} (assumed)"
-        if self.estimate is None:
-            return f"{self.value:g} (assumed: the differences of three meshes show none)"
-        bounded = "" if self.value == self.estimate else f", which give {self.estimate:.1f}: bounded"
-        return f"{self.value:.2g} (from three meshes{bounded})"
+    words: str
 
 
 @dataclass(frozen=True)
@@ -91,16 +79,18 @@ class Refined:
         first order is assumed with two meshes, and where the differences have no common sign or do not shrink.
         """
         if len(curves) < 3:
-            return Order(_ASSUMED, None, len(curves))
+            return Order(_ASSUMED, f"{_ASSUMED:g} (assumed)")
         n = min(map(len, curves[:3]))
         finer, coarser = curves[1][:n] - curves[0][:n], curves[2][:n] - curves[1][:n]
-        estimate = -math.inf
+        found = -math.inf
         if finer @ coarser > 0:
             sizes = [run.scene.joint.h for run in self.runs[:3]]
-            estimate = observed_order(sizes, float(np.linalg.norm(finer)), float(np.linalg.norm(coarser)))
-        if not math.isfinite(estimate):
-            return Order(_ASSUMED, None, len(curves))
-        return Order(min(max(estimate, _LOWEST), _HIGHEST), estimate, len(curves))
+            found = observed_order(sizes, float(np.linalg.norm(finer)), float(np.linalg.norm(coarser)))
+        if not math.isfinite(found):
+            return Order(_ASSUMED, f"{_ASSUMED:g} (assumed: the differences of three meshes show none)")
+        value = min(max(found, _LOWEST), _HIGHEST)
+        bounded = "" if value == found else f", which give {found:.1f}: bounded"
+        return Order(value, f"{value:.2g} (from three meshes{bounded})")
 
     def shift(self, curves: Sequence[Array]) -> Array:
         """What refinement still adds to the finest of ``curves`` ``(n,)``, by `richardson` from the next coarser run

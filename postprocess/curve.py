@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.geometry.basis import Array
+from archord.materials.material import Array
 from archord.output.folder import no_run
 from archord.output.history import read_history
 from archord.scene.errors import InputError

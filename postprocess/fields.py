@@ -17,7 +17,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from archord.geometry.basis import Array
+from archord.materials.material import Array
 from archord.output.step_file import step_name
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from archord.geometry.basis import Array
+from archord.materials.material import Array
 from archord.output.user_file import make_folder, writing
 from archord.postprocess import panels
 from archord.postprocess.comparison import same_size, same_units, scaled

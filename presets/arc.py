@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from archord.geometry.basis import Array
+from archord.materials.material import Array
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
     from archord.solver.contact.contact import Contact

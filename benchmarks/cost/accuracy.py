@@ -14,7 +14,7 @@ from archord.benchmarks.case import E, paper_joint
 from archord.benchmarks.report_files import rows_table, write_files
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome, solve_scene
-from archord.postprocess.convergence import difference
+from archord.postprocess.convergence import difference, richardson
 from archord.scene.scene import Scene
 from archord.studies.accuracy import Accuracy, solve_to_accuracy
 from archord.studies.mesh_family import RATIO, MeshFamily
@@ -117,7 +117,7 @@ def reference(case: Case, folder: Path, said: Said) -> np.ndarray:
 
     finest, steps = (_FINE - 1, _STEPS) if scene.plastic else (_FINE, 1)
     before, last = curve(finest - 1, steps), curve(finest, steps)
-    limit = last + (last - before) / (RATIO**3 - 1)
+    limit = last + richardson(last - before, RATIO, 3)
     return limit + (before - curve(finest - 1, steps // 2)) if scene.plastic else limit
 
 

@@ -122,7 +122,7 @@ def test_tables_load_no_plotting_and_no_solver(runs):
     """Nor pandas."""
     code = (
         "import sys; from archord.cli import run; code = run(sys.argv[1:]); "
-        "print(code, {'matplotlib', 'pandas', 'dolfinx', 'scipy', 'pyvista'} & {*sys.modules})"
+        "print(code, {'matplotlib', 'pandas', 'dolfinx', 'basix', 'cffi', 'scipy', 'pyvista'} & {*sys.modules})"
     )
     command = [sys.executable, "-c", code, "show", str(runs["coarse"]), "--no-pictures"]
     result = subprocess.run(command, capture_output=True, text=True, timeout=60)
