@@ -36,16 +36,11 @@ def comm() -> MPI.Comm:
 def runs(tmp_path_factory):
     """Folders of small runs, solved once, by name: an elastic joint on two meshes, one of plane stress that yields."""
     from archord.benchmarks.case import paper_joint
-    from archord.output.folder import claim_folder
-    from archord.output.run import solve_scene
+    from tests.output.run_files import solved
 
     scenes = {
         "elastic": paper_joint(0.1, 6),
         "coarse": paper_joint(0.15, 6),
         "plastic": paper_joint(0.1, 8, 0.002, analysis={"plane": "stress"}),
     }
-    folder = tmp_path_factory.mktemp("runs")
-    for name, scene in scenes.items():
-        claim_folder(folder / name, False)
-        solve_scene(scene, folder / name, MPI.COMM_SELF)
-    return {name: folder / name for name in scenes}
+    return solved(scenes, tmp_path_factory.mktemp("runs"))

@@ -8,11 +8,24 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from mpi4py import MPI
 
 from archord.output import checkpoint
+from archord.output.folder import claim_folder
 from archord.output.history import read_history
+from archord.output.run import solve_scene
 from archord.output.step_file import all_arrays
 from archord.scene.file import load_scene
+from archord.scene.scene import Scene
+
+
+def solved(scenes: dict[str, Scene], folder: Path) -> dict[str, Path]:
+    """The run folders of ``scenes`` by name, made in ``folder`` and solved on this rank alone."""
+    folders = {name: folder / name for name in scenes}
+    for name, scene in scenes.items():
+        claim_folder(folders[name], False)
+        solve_scene(scene, folders[name], MPI.COMM_SELF)
+    return folders
 
 
 def accepted_steps(folder: Path) -> int:

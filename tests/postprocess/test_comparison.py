@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from archord.benchmarks.case import E, paper_joint
 from archord.cli import run as command
-from archord.output.run import solve_scene
 from archord.postprocess.comparison import compare_runs, differing_keys, short_names
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
+from tests.output.run_files import solved
 
 
 @pytest.fixture(scope="module")
@@ -24,11 +23,7 @@ def more(tmp_path_factory):
         "stepped": paper_joint(0.15, 4),
         "released": paper_joint(0.15, 4, load={"displacement": [2.0, 1.0], "steps": [4, 2]}),
     }
-    folder = tmp_path_factory.mktemp("more")
-    for name, scene in scenes.items():
-        (folder / name).mkdir()
-        solve_scene(scene, folder / name, MPI.COMM_SELF)
-    return {name: folder / name for name in scenes}
+    return solved(scenes, tmp_path_factory.mktemp("more"))
 
 
 def test_a_run_does_not_differ_from_itself(runs, capsys):

@@ -7,12 +7,11 @@ import sys
 
 import matplotlib.image
 import pytest
-from mpi4py import MPI
 
 from archord.benchmarks.case import paper_joint
 from archord.cli import run as command
-from archord.output.run import solve_scene
 from archord.postprocess.run import Run
+from tests.output.run_files import solved
 
 PICTURES = ["force.png", "pressure.png", "field.png", "iterations.png"]
 
@@ -27,11 +26,7 @@ def odd(tmp_path_factory):
         ),
         "stuck": paper_joint(0.2, 1, analysis={"max_iterations": 2}, stepping={"minimum": 1.0}),
     }
-    folder = tmp_path_factory.mktemp("odd")
-    for name, scene in scenes.items():
-        (folder / name).mkdir()
-        solve_scene(scene, folder / name, MPI.COMM_SELF)
-    return {name: folder / name for name in scenes}
+    return solved(scenes, tmp_path_factory.mktemp("odd"))
 
 
 @pytest.fixture
