@@ -16,13 +16,22 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from archord.api import load, load_scene, solve
+    from archord.geometry.fenicsx import gmsh_to_mesh
+    from archord.materials.elasticity import Elastic
+    from archord.materials.hardening import LinearHardening
+    from archord.materials.j2 import J2Material
     from archord.postprocess.run import Run
     from archord.postprocess.sweep import Sweep
     from archord.scene.errors import InputError
     from archord.scene.scene import Scene
+    from archord.solver.problem import Body, Interaction, Load, Problem, Support
+    from archord.solver.system import System
 
-__all__ = ["InputError", "Run", "Scene", "Sweep", "load", "load_scene", "solve"]
 
+__all__ = [
+    "Body", "Elastic", "InputError", "Interaction", "J2Material", "LinearHardening", "Load", "Problem", "Run", "Scene",
+    "Support", "Sweep", "System", "gmsh_to_mesh", "load", "load_scene", "solve",
+]  # fmt: skip
 _HOME = {
     "Run": "archord.postprocess.run",
     "Scene": "archord.scene.scene",
@@ -31,6 +40,12 @@ _HOME = {
     "load": "archord.api",
     "load_scene": "archord.api",
     "solve": "archord.api",
+    "gmsh_to_mesh": "archord.geometry.fenicsx",
+    "Elastic": "archord.materials.elasticity",
+    "J2Material": "archord.materials.j2",
+    "LinearHardening": "archord.materials.hardening",
+    "System": "archord.solver.system",
+    **dict.fromkeys(("Body", "Interaction", "Load", "Problem", "Support"), "archord.solver.problem"),
 }
 
 

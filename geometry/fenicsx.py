@@ -13,13 +13,14 @@ import basix.ufl
 import numpy as np
 from dolfinx.cpp.graph import AdjacencyList_int32
 from dolfinx.io import distribute_entity_data
-from dolfinx.mesh import Mesh, MeshTags, create_mesh, meshtags, meshtags_from_entities
+from dolfinx.mesh import create_mesh, meshtags, meshtags_from_entities
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.mesh_cache import MESHES
 from archord.geometry.partition import sector_partitioner
 from archord.geometry.plane_mesh import PlaneMesh
+from archord.geometry.tagged_mesh import TaggedMesh
 
 try:
     from dolfinx.la.petsc import create_vector  # dolfinx >= 0.10
@@ -50,13 +51,13 @@ def gmsh_to_mesh(
     refinements: int = 0,
     partitioner=None,
     key: tuple = (),
-) -> tuple[Mesh, MeshTags, MeshTags]:
+) -> TaggedMesh:
     """Mesh what ``build(gmsh)`` describes, in triangles of the given ``order``, and distribute it over ``comm``.
 
     The triangles are cut in four ``refinements`` times before they get nodes of higher order.
     ``adjust(x, tag)`` moves the nodes ``x`` ``(n, 2)`` of the physical curve ``tag``; without it, second-order edges
-    are straight. The mesh is scaled by ``scale`` at the end. An error on rank 0 is raised on every rank. Returns mesh,
-    cell tags and facet tags. ``partitioner`` replaces `sector_partitioner`.
+    are straight. The mesh is scaled by ``scale`` at the end. An error on rank 0 is raised on every rank. Its sets
+    have the names of gmsh's physical groups. ``partitioner`` replaces `sector_partitioner`.
     ``key`` says all that enters ``build`` and ``adjust``; a mesh that `MESHES` keeps by the same key is used again.
     """
     made, failure = PlaneMesh.empty(order), None
@@ -71,9 +72,9 @@ def gmsh_to_mesh(
     failure = comm.bcast(failure)
     if failure:
         raise RuntimeError(failure)
-    mesh, cells, facets = _distribute(comm, made, order, partitioner)
-    mesh.geometry.x[:] *= scale
-    return mesh, cells, facets
+    mesh = _distribute(comm, made, order, partitioner)
+    mesh.mesh.geometry.x[:] *= scale
+    return mesh
 
 
 def _made(build: Callable, adjust: Callable[[Array, int], Array] | None, order: int, refinements: int) -> PlaneMesh:
@@ -103,8 +104,8 @@ def _made(build: Callable, adjust: Callable[[Array, int], Array] | None, order: 
     return mesh
 
 
-def _distribute(comm: MPI.Comm, made: PlaneMesh, order: int, partitioner) -> tuple[Mesh, MeshTags, MeshTags]:
-    """The mesh that rank 0 ``made`` and its tags, on all ranks."""
+def _distribute(comm: MPI.Comm, made: PlaneMesh, order: int, partitioner) -> TaggedMesh:
+    """The mesh that rank 0 ``made`` and its sets, on all ranks."""
     if partitioner is None and comm.size > 1:
         partitioner = sector_partitioner(lambda: made.x)
     equispaced = basix.LagrangeVariant.equispaced
@@ -114,4 +115,5 @@ def _distribute(comm: MPI.Comm, made: PlaneMesh, order: int, partitioner) -> tup
     cells = meshtags(mesh, 2, np.arange(len(number), dtype=np.int32), comm.bcast(made.bodies)[number])
     edges, tags = distribute_entity_data(mesh, 1, made.edges, made.tags)
     mesh.topology.create_connectivity(1, 2)
-    return mesh, cells, meshtags_from_entities(mesh, 1, AdjacencyList_int32(edges), tags)
+    facets = meshtags_from_entities(mesh, 1, AdjacencyList_int32(edges), tags)
+    return TaggedMesh(mesh, cells, facets, *comm.bcast((made.cell_sets, made.facet_sets)))

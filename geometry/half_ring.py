@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.fenicsx import gmsh_to_mesh
-from archord.geometry.joint_mesh import Cells, Facets, edges_on, joint_mesh, on_circle, tag_and_size
+from archord.geometry.joint_mesh import Cells, Facets, edges_on, on_circle, tag_and_size
 from archord.geometry.tagged_mesh import TaggedMesh
 
 
@@ -76,4 +76,4 @@ def half_ring(
 
     key = ("half ring", hole, outer, size, growth, core, size_ratio)
     options = {"order": degree, "scale": radius, "refinements": refinements, "partitioner": partitioner}
-    return joint_mesh(*gmsh_to_mesh(comm, build, exact, **options, key=key))
+    return gmsh_to_mesh(comm, build, exact, **options, key=key)

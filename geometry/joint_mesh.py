@@ -6,10 +6,8 @@ import math
 from enum import IntEnum
 
 import numpy as np
-from dolfinx.mesh import Mesh, MeshTags
 
 from archord.geometry.basis import Array
-from archord.geometry.tagged_mesh import TaggedMesh
 
 
 class Cells(IntEnum):
@@ -32,22 +30,15 @@ class Facets(IntEnum):
 _CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
 
 
-def joint_mesh(mesh: Mesh, cells: MeshTags, facets: MeshTags) -> TaggedMesh:
-    """The mesh of a joint with named sets: the facets "pin" and "hole" are the arcs, "block held" is the support."""
-    bodies = {"pin": Cells.PIN, "block": Cells.BLOCK}
-    names = ("pin", "hole", "pin top", "block held", "symmetry")
-    return TaggedMesh(mesh, cells, facets, bodies, dict(zip(names, Facets, strict=True)))
-
-
 def tag_and_size(gmsh, faces: dict[Cells, int], curves: dict[Facets, list[int]], sizes: dict[Cells, str]) -> None:
     """Make the physical groups of ``faces`` and ``curves``, and ``sizes`` (expressions in x, y) the element sizes of
     the bodies."""
     gmsh.model.geo.synchronize()
     for tag, face in faces.items():
-        gmsh.model.addPhysicalGroup(2, [face], tag)
+        gmsh.model.addPhysicalGroup(2, [face], tag, _set_name(tag))
     for edge, lines in curves.items():
         if lines:
-            gmsh.model.addPhysicalGroup(1, lines, edge)
+            gmsh.model.addPhysicalGroup(1, lines, edge, _set_name(edge))
     field, parts = gmsh.model.mesh.field, []
     for size in dict.fromkeys(sizes[tag] for tag in faces):
         parts.append(field.add("MathEval"))
@@ -60,6 +51,11 @@ def tag_and_size(gmsh, faces: dict[Cells, int], curves: dict[Facets, list[int]],
         parts.append(field.add("Min"))
         field.setNumbers(parts[-1], "FieldsList", parts[:-1])
     field.setAsBackgroundMesh(parts[-1])
+
+
+def _set_name(tag: Cells | Facets) -> str:
+    """Name of a set in a problem: "pin" and "block", and of facets "pin" and "hole" (the arcs), "pin top", ..."""
+    return tag.name.removesuffix("_ARC").replace("_", " ").lower()
 
 
 def edges_on(angle: float, size: float) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import basix
 import numpy as np
@@ -18,13 +18,16 @@ _ENDS = basix.topology(basix.CellType.triangle)[1]  # vertices of a triangle's e
 @dataclass(frozen=True)
 class PlaneMesh:
     """Nodes ``x`` ``(n, 2)``, ``cells`` ``(m, a)`` of the ``bodies`` ``(m,)`` and ``edges`` ``(k, b)`` of the curves
-    ``tags`` ``(k,)``; the nodes of cells and edges come in basix' order."""
+    ``tags`` ``(k,)``; the nodes of cells and edges come in basix' order. ``cell_sets`` and ``facet_sets`` name bodies
+    and tags."""
 
     x: Array
     cells: np.ndarray
     bodies: np.ndarray
     edges: np.ndarray
     tags: np.ndarray
+    cell_sets: dict[str, int] = field(default_factory=dict)
+    facet_sets: dict[str, int] = field(default_factory=dict)
 
     @classmethod
     def empty(cls, order: int) -> PlaneMesh:
@@ -45,7 +48,7 @@ class PlaneMesh:
         nodes = np.empty((number[-1] + 1, 2))
         kept = used[numbers]
         nodes[number[numbers[kept]]] = x.reshape(-1, 3)[kept, :2]
-        return cls(nodes, number[cells], bodies, number[edges], tags)
+        return cls(nodes, number[cells], bodies, number[edges], tags, _named_groups(gmsh, 2), _named_groups(gmsh, 1))
 
     def second_order(self) -> PlaneMesh:
         """This mesh of straight triangles with nodes on the middles of their edges, behind the others."""
@@ -55,7 +58,7 @@ class PlaneMesh:
         middle = len(self.x) + which
         of_cells, of_edges = np.split(middle, [3 * len(self.cells)])
         cells, edges = np.hstack([self.cells, of_cells.reshape(-1, 3)]), np.column_stack([self.edges, of_edges])
-        return PlaneMesh(x, cells, self.bodies, edges, self.tags)
+        return replace(self, x=x, cells=cells, edges=edges)
 
     def adjust(self, move: Callable[[Array, int], Array]) -> None:
         """Put the nodes ``x`` ``(n, 2)`` of each curve where ``move(x, tag)`` says."""
@@ -71,6 +74,12 @@ def distinct_edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     number = low * (high.max(initial=0) + 1) + high
     _, first, which = np.unique(number, return_index=True, return_inverse=True)
     return first, which
+
+
+def _named_groups(gmsh, dim: int) -> dict[str, int]:
+    """Tags of gmsh's physical groups of dimension ``dim`` by their names, by their numbers where they have none."""
+    tags = [tag for _, tag in gmsh.model.getPhysicalGroups(dim)]
+    return {gmsh.model.getPhysicalName(dim, tag) or str(tag): tag for tag in tags}
 
 
 def _elements(gmsh, kind: CellType, dim: int) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.fenicsx import gmsh_to_mesh
-from archord.geometry.joint_mesh import Cells, Facets, edges_on, joint_mesh, on_circle, tag_and_size
+from archord.geometry.joint_mesh import Cells, Facets, edges_on, on_circle, tag_and_size
 from archord.geometry.tagged_mesh import TaggedMesh
 
 _EDGE_GROWTH = 0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
@@ -89,4 +89,4 @@ def quarter_joint(
 
     key = ("quarter joint", hole, width, size, growth, size_ratio, edge and (edge[0], edge[1] / radius), rigid_pin)
     options = {"order": degree, "scale": radius, "refinements": refinements, "partitioner": partitioner}
-    return joint_mesh(*gmsh_to_mesh(comm, build, exact, **options, key=key))
+    return gmsh_to_mesh(comm, build, exact, **options, key=key)

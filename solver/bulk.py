@@ -6,7 +6,7 @@ tangent that changes; without them nothing of it is compiled or stored.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import basix.ufl
@@ -21,19 +21,6 @@ from archord.geometry.basis import Array, bulk_quadrature, bulk_quadrature_degre
 from archord.materials.elasticity import mean_stress, von_mises
 from archord.materials.material import Material
 from archord.materials.points import Points
-
-
-@dataclass(frozen=True)
-class Body:
-    """One body: its cell tag and its material."""
-
-    tag: int
-    material: Material
-
-    @property
-    def plastic(self) -> bool:
-        """Whether the body carries plastic history."""
-        return self.material.yields
 
 
 @dataclass(frozen=True)
@@ -113,23 +100,21 @@ class _PlasticBody:
 
 
 class Bulk:
-    """Internal forces of all bodies in the displacement space ``V`` (blocked, two components)."""
+    """Internal forces of all bodies in the displacement space ``V`` (blocked, two components): those of the cells that
+    ``tags`` give the tags of ``materials``."""
 
-    def __init__(self, V: fem.FunctionSpace, tags: MeshTags, bodies: list[Body]) -> None:
+    def __init__(self, V: fem.FunctionSpace, tags: MeshTags, materials: Mapping[int, Material]) -> None:
         self.V = V
-        self.bodies = bodies
+        self.materials = materials
         self.degree = V.element.basix_element.degree
         rule = bulk_quadrature_degree(self.degree)
         n_owned = V.mesh.topology.index_map(2).size_local
-        cells = {body.tag: tags.find(body.tag) for body in bodies}
+        cells = {tag: tags.find(tag) for tag in materials}
         self.cells = {tag: c[c < n_owned] for tag, c in cells.items()}
         v = ufl.TestFunction(V)
-        self._plastic: dict[int, _PlasticBody] = {}
-        for body in bodies:
-            if body.plastic:
-                self._plastic[body.tag] = _PlasticBody(V, self.cells[body.tag], body.material)
-        forms = {body.tag: self._elastic_form(body, ufl.TrialFunction(V)) for body in bodies}
-        self._elastic_forms = [fem.form(form) for form in forms.values()]
+        self._plastic = {tag: _PlasticBody(V, self.cells[tag], m) for tag, m in materials.items() if m.yields}
+        self._elastic_of = {tag: self._elastic_form(tag, ufl.TrialFunction(V)) for tag in materials}
+        self._elastic_forms = [fem.form(form) for form in self._elastic_of.values()]
         self._force_forms = []
         if self._plastic:
             cell, metadata = V.mesh.basix_cell(), {"quadrature_degree": rule, "quadrature_rule": "default"}
@@ -144,19 +129,18 @@ class Bulk:
         self._corrected_cells: np.ndarray | None = None  # those of the form that was made last
         self._correction_forms: list[fem.Form] = []
         self._action_forms: list[fem.Form] | None = None
-        self._elastic_of = forms
         self.stiffness = None
-        elastic = [form for body, form in zip(bodies, self._elastic_forms, strict=True) if not body.plastic]
+        elastic = [form for tag, form in zip(materials, self._elastic_forms, strict=True) if tag not in self._plastic]
         if elastic:
             self.stiffness = matrix(V, elastic)
             assemble(self.stiffness, elastic)
             self.stiffness.assemble()
 
-    def _elastic_form(self, body: Body, u) -> ufl.Form:
-        """Virtual work of the elastic stresses of ``u`` in ``body``."""
-        mesh, moduli = self.V.mesh, body.material.elastic_tangent
+    def _elastic_form(self, tag: int, u) -> ufl.Form:
+        """Virtual work of the elastic stresses of ``u`` in the body with this ``tag``."""
+        mesh, moduli = self.V.mesh, self.materials[tag].elastic_tangent
         c11, c12, c33 = (fem.Constant(mesh, float(value)) for value in moduli[[0, 0, 2], [0, 1, 2]])
-        domain, rule = [(1, self.cells[body.tag])], bulk_quadrature_degree(self.degree)
+        domain, rule = [(1, self.cells[tag])], bulk_quadrature_degree(self.degree)
         dx = ufl.Measure("dx", mesh, subdomain_data=domain, metadata={"quadrature_degree": rule})
         eu, ev = _voigt(u), _voigt(ufl.TestFunction(self.V))
         sigma = ufl.as_vector([c11 * eu[0] + c12 * eu[1], c12 * eu[0] + c11 * eu[1], c33 * eu[2]])
@@ -286,12 +270,12 @@ class Bulk:
     def _elastic_points(self, u: Array) -> Iterator[tuple[np.ndarray, Array, Array]]:
         """Cells ``(n,)``, weights ``(n, q)`` and stresses ``(n q, 4)`` of each elastic body."""
         X, w = bulk_quadrature(self.degree)
-        for body in self.bodies:
-            if not body.plastic:
-                cells = self.cells[body.tag]
+        for tag, cells in self.cells.items():
+            if tag not in self._plastic:
+                material = self.materials[tag]
                 basis = cell_basis(self.V.mesh, self.degree, cells, X)
                 eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)
-                stress, _, _ = body.material.update(eps, body.material.state(len(eps)))
+                stress, _, _ = material.update(eps, material.state(len(eps)))
                 yield cells, basis.measure * w, stress
 
 

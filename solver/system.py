@@ -11,7 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.solver.bulk import Body, Bulk
+from archord.solver.bulk import Bulk
 from archord.solver.contact import interaction as contact
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.law import LAWS
@@ -20,6 +20,7 @@ from archord.solver.equilibrium import Equilibrium
 from archord.solver.load_path import LoadPath, Position
 from archord.solver.newton import NewtonSolver
 from archord.solver.problem import Interaction, Problem, Rigid
+from archord.solver.stepping import StepRules, march
 from archord.solver.timer import Timer
 
 if TYPE_CHECKING:
@@ -41,8 +42,8 @@ class System:
             variant = basix.LagrangeVariant.equispaced
             element = basix.ufl.element("P", "triangle", problem.degree, shape=(2,), lagrange_variant=variant)
             self.V = fem.functionspace(mesh, element)
-            bodies = [Body(problem.tag(body), body.material) for body in problem.bodies]
-            self.bulk = Bulk(self.V, problem.mesh.cells, bodies)
+            materials = {problem.tag(body): body.material for body in problem.bodies}
+            self.bulk = Bulk(self.V, problem.mesh.cells, materials)
             self.sides: dict[str, Surface] = {}
             self.contact = self._contact(problem.interactions)
             self.equilibrium = Equilibrium(problem, self.V, self.bulk, self.contact, timer=self.timer)
@@ -76,6 +77,10 @@ class System:
     def nodes_of(self, tag: int) -> np.ndarray:
         """Nodes ``(n,)`` of this rank, ghosts included, in the cells with this ``tag``."""
         return np.unique(self.V.dofmap.list[self.problem.mesh.cells.find(tag)])
+
+    def solve(self, loads: Sequence[float], rules: StepRules | None = None) -> None:
+        """Follow the path of the ``loads`` from the beginning. Raises `StepFailure`."""
+        march(self.load_path(), loads, rules=rules)
 
     def load_path(self, at: Position | None = None, coarse: CoarseStart | None = None) -> LoadPath:
         """The path of the problem's loads, from the position ``at`` or the beginning."""

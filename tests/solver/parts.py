@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,13 +19,13 @@ from archord.geometry.tagged_mesh import TaggedMesh
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
-from archord.solver.bulk import Body, Bulk
+from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interaction
 from archord.solver.contact.law import LAWS
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Problem
-from archord.solver.stepping import StepRules, march
+from archord.solver.stepping import StepRules
 from archord.solver.system import System
 
 E, NU = 1.82, 0.3
@@ -118,14 +118,14 @@ def joint_parts(
     """A small quarter joint; without a ``pin`` material the pin is a rigid disc."""
     joint = quarter_joint(comm, R, DR, 4.0, size, 0.4, rigid_pin=pin is None, partitioner=partitioner)
     V = space(joint.mesh)
-    bodies = [Body(Cells.BLOCK, block)]
+    materials = {Cells.BLOCK: block}
     sides = [Surface(V, joint.facets, Facets.HOLE_ARC, block)]
     opposite = RigidSurface(RigidCircle(np.array([0.0, -DR]), R))
     if pin is not None:
-        bodies.insert(0, Body(Cells.PIN, pin))
+        materials = {Cells.PIN: pin} | materials
         opposite = Surface(V, joint.facets, Facets.PIN_ARC, pin)
         sides.insert(0, opposite)
-    bulk = Bulk(V, joint.cells, bodies)
+    bulk = Bulk(V, joint.cells, materials)
     return Parts(V, joint.cells, joint.facets, bulk, sides, interact([opposite, sides[-1]], **contact_options))
 
 
@@ -165,14 +165,15 @@ def blocks(comm: MPI.Comm, *edges: int) -> TaggedMesh:
 
     facets = {f"{name} {end}": 2 * k + e for k, name in enumerate(names) for e, end in ((1, "bottom"), (2, "top"))}
     facets |= {"base": 1, "lid": 2 * len(edges), "left": left, "right": right}
-    return TaggedMesh(*gmsh_to_mesh(comm, build), {name: k for k, name in enumerate(names, 1)}, facets)
+    cells = {name: k for k, name in enumerate(names, 1)}
+    return replace(gmsh_to_mesh(comm, build), cell_sets=cells, facet_sets=facets)
 
 
 INNER, OUTER, ON_X, ON_Y = range(1, 5)
 
 
-def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> tuple[Mesh, MeshTags, MeshTags]:
-    """A quarter of a ring between the radii ``a`` and ``b``, with curved edges on both."""
+def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> TaggedMesh:
+    """A quarter of a "ring" between the radii ``a`` and ``b``, with edges "inner", "outer", "x" and "y"."""
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
@@ -186,9 +187,9 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> tuple[Me
         ]
         face = geo.addPlaneSurface([geo.addCurveLoop(edges)])
         geo.synchronize()
-        gmsh.model.addPhysicalGroup(2, [face], 1)
-        for tag, edge in ((ON_X, edges[0]), (OUTER, edges[1]), (ON_Y, edges[2]), (INNER, edges[3])):
-            gmsh.model.addPhysicalGroup(1, [edge], tag)
+        gmsh.model.addPhysicalGroup(2, [face], 1, "ring")
+        for edge, tag, name in zip(edges, (ON_X, OUTER, ON_Y, INNER), ("x", "outer", "y", "inner"), strict=True):
+            gmsh.model.addPhysicalGroup(1, [edge], tag, name)
         gmsh.option.setNumber("Mesh.MeshSizeMin", size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
@@ -199,5 +200,5 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> tuple[Me
 def solve(problem: Problem, loads) -> System:
     """Step through ``loads`` from rest and return the system at the last; no step may be cut."""
     system = System(problem)
-    march(system.load_path(), loads, rules=StepRules(minimum=1.0))
+    system.solve(loads, StepRules(minimum=1.0))
     return system

@@ -7,12 +7,11 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis
-from archord.geometry.tagged_mesh import TaggedMesh
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.problem import Body, Problem, Support
 from archord.solver.system import System
-from tests.solver.parts import INNER, ON_X, ON_Y, OUTER, coordinates, edge_nodes, internal_force, quarter_annulus
+from tests.solver.parts import INNER, OUTER, coordinates, edge_nodes, internal_force, quarter_annulus
 
 A, B = 1.0, 2.0
 E, SIGY = 1.0, 0.001
@@ -33,8 +32,7 @@ class Cylinder:
     """A quarter of the cylinder whose inner wall moves outward by ``load``."""
 
     def __init__(self, size: float, hardening: float = 0.0) -> None:
-        sets = {"inner": INNER, "outer": OUTER, "x": ON_X, "y": ON_Y}
-        mesh = TaggedMesh(*quarter_annulus(MPI.COMM_SELF, A, B, size), {"ring": 1}, sets)
+        mesh = quarter_annulus(MPI.COMM_SELF, A, B, size)
         body = Body("ring", J2Material(E, NU, "strain", LinearHardening(SIGY, hardening)))
         supports = [Support("wall", "inner", k, lambda x, k=k: x[:, k] / A) for k in range(2)]
         supports += [Support("x", "x", 1), Support("y", "y", 0)]

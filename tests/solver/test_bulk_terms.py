@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.materials.elasticity import von_mises
-from archord.solver.bulk import Body, Bulk, matrix
+from archord.solver.bulk import Bulk, matrix
 from tests.solver.parts import (
     ELASTIC,
     HARDENING,
@@ -41,10 +41,10 @@ def warped():
 
 
 def warped_annulus(comm, size=0.4):
-    mesh, cells, facets = quarter_annulus(comm, 1.0, 2.0, size)
-    x = mesh.geometry.x
+    tagged = quarter_annulus(comm, 1.0, 2.0, size)
+    mesh, x = tagged.mesh, tagged.mesh.geometry.x
     x[:, :2] += 0.02 * np.stack([np.sin(9 * x[:, 0] + 5 * x[:, 1]), np.cos(8 * x[:, 0] - 7 * x[:, 1])], axis=1)
-    return mesh, cells, facets
+    return mesh, tagged.cells, tagged.facets
 
 
 def stiffness(bulk):
@@ -60,7 +60,7 @@ def stiffness(bulk):
 def test_a_free_body_has_three_rigid_motions_and_no_other(material, warped):
     """Exactly three zero eigenvalues: the three-point rule leaves no spurious mode."""
     mesh, cells, _ = warped
-    bulk = Bulk(space(mesh), cells, [Body(1, material)])
+    bulk = Bulk(space(mesh), cells, {1: material})
     bulk.update(np.zeros((n_nodes(bulk.V), 2)))
     K = stiffness(bulk).toarray()
     np.testing.assert_allclose(K, K.T, rtol=0, atol=1e-14 * np.abs(K).max())
@@ -76,7 +76,7 @@ def test_patch(material, amount, comm):
     """A linear displacement gives constant stress, on warped cells and beyond yield, and no force inside."""
     mesh, cells, facets = warped_annulus(comm)
     V = space(mesh)
-    bulk = Bulk(V, cells, [Body(1, material)])
+    bulk = Bulk(V, cells, {1: material})
     A = amount * YIELD_STRAIN * np.array([[1.0, 0.7], [-0.2, -0.5]])
     u = coordinates(V) @ A.T + [0.1, 0.2]
     force = internal_force(bulk, u)
@@ -101,7 +101,7 @@ def test_the_tangent_is_the_derivative_of_the_internal_force(material, warped):
     """Central differences in random directions, from a state with a history and partly yielding."""
     mesh, cells, _ = warped
     V = space(mesh)
-    bulk = Bulk(V, cells, [Body(1, material)])
+    bulk = Bulk(V, cells, {1: material})
     x = coordinates(V)
     rng = np.random.default_rng(0)
     for step in (1.0, 1.5):
@@ -130,7 +130,7 @@ def test_the_tangent_is_the_derivative_of_the_internal_force(material, warped):
 def test_internal_forces_do_no_work_on_rigid_motions(material, warped):
     """Their sum and their moment are zero to round-off, whatever the displacement."""
     mesh, cells, _ = warped
-    bulk = Bulk(space(mesh), cells, [Body(1, material)])
+    bulk = Bulk(space(mesh), cells, {1: material})
     x = coordinates(bulk.V)
     force = internal_force(bulk, YIELD_STRAIN * np.random.default_rng(0).normal(size=x.shape))
     size = np.abs(force).sum()
@@ -145,7 +145,7 @@ def test_elastic_energy_is_half_the_work_of_the_forces(warped):
     u = 1e-3 * YIELD_STRAIN * np.random.default_rng(0).normal(size=(n_nodes(V), 2))
     energies = []
     for material in (ELASTIC, PERFECT):
-        bulk = Bulk(V, cells, [Body(1, material)])
+        bulk = Bulk(V, cells, {1: material})
         force = internal_force(bulk, u)
         stored, dissipated = bulk.energies(u)
         assert stored == pytest.approx((u * force).sum() / 2, rel=1e-12)
@@ -159,7 +159,7 @@ def test_an_update_without_commit_leaves_no_trace(material, warped):
     """Forces after an excursion far beyond yield are those of a body that never made it."""
     mesh, cells, _ = warped
     V = space(mesh)
-    bulk = Bulk(V, cells, [Body(1, material)])
+    bulk = Bulk(V, cells, {1: material})
     u = 0.3 * YIELD_STRAIN * np.random.default_rng(0).normal(size=(n_nodes(V), 2))
     before = internal_force(bulk, u)
     internal_force(bulk, 50 * u)
@@ -179,11 +179,9 @@ def test_bodies_keep_their_own_materials(warped):
     tags = meshtags(mesh, 2, np.arange(n, dtype=np.int32), np.where(np.arange(n) < n // 2, 1, 2).astype(np.int32))
     V = space(mesh)
     u = YIELD_STRAIN * np.random.default_rng(0).normal(size=(n_nodes(V), 2))
-    together = internal_force(Bulk(V, tags, [Body(1, ELASTIC), Body(2, PERFECT)]), u)
-    apart = internal_force(Bulk(V, tags, [Body(1, ELASTIC)]), u) + internal_force(Bulk(V, tags, [Body(2, PERFECT)]), u)
+    together = internal_force(Bulk(V, tags, {1: ELASTIC, 2: PERFECT}), u)
+    apart = internal_force(Bulk(V, tags, {1: ELASTIC}), u) + internal_force(Bulk(V, tags, {2: PERFECT}), u)
     np.testing.assert_allclose(together, apart, rtol=0, atol=1e-15 * E)
-    plastic = internal_force(Bulk(V, tags, [Body(1, HARDENING), Body(2, PERFECT)]), u)
-    apart = internal_force(Bulk(V, tags, [Body(1, HARDENING)]), u) + internal_force(
-        Bulk(V, tags, [Body(2, PERFECT)]), u
-    )
+    plastic = internal_force(Bulk(V, tags, {1: HARDENING, 2: PERFECT}), u)
+    apart = internal_force(Bulk(V, tags, {1: HARDENING}), u) + internal_force(Bulk(V, tags, {2: PERFECT}), u)
     np.testing.assert_allclose(plastic, apart, rtol=0, atol=1e-15 * E)
