@@ -65,6 +65,7 @@ class Report:
                 "newton": joint.solver.tolerance,
                 "gamma_factor": joint.scene.analysis.gamma_factor,
             },
+            "linear_solver": {},
             "restarts": [],
             "warnings": _rough_arcs(joint),
             "steps": [],
@@ -113,6 +114,7 @@ class Report:
     def write(self) -> None:
         """Replace run.json in one move, so that a reader never sees half of it. Raises `OSError`."""
         self.content |= {"totals": self._totals(), "seconds": self._seconds(), "error_estimates": self._errors()}
+        self.content["linear_solver"] = self.joint.equilibrium.choice.words()  # a matrix may decide otherwise later
         self.content["peak_memory"] = self.peak_memory
         replace_file(self.path, json.dumps(_finite(self.content), indent=1, allow_nan=False) + "\n")
 

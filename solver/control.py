@@ -5,13 +5,16 @@ Under force control the load factor is one more unknown, with the equation that 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.fenicsx import create_vector
 from archord.solver.linear.bordered import Bordered
-from archord.solver.linear.tangent_matrix import TangentMatrix
+from archord.solver.linear.facts import Strategy
+from archord.solver.tangent import TangentMatrix
 
 
 class FactorControl:
@@ -51,16 +54,24 @@ class FactorControl:
     @property
     def singular(self) -> bool:
         """Whether the last linear solve found that nothing resists the force."""
-        return self.border is not None and self.border.came_free
+        return self.border is not None and self.border.singular
 
 
 class ForceControl(FactorControl):
     """The load is the force that works on the load factor, along the ``rate`` ``(n_local, 2)`` of prescribed
-    displacements and those of rigid discs. ``stiffness`` is that of the stiffest body."""
+    displacements and those of rigid discs. ``stiffness`` is that of the stiffest body,
+    ``factoriser`` gives the strategy for a matrix."""
 
-    def __init__(self, V: fem.FunctionSpace, tangent: TangentMatrix, rate: Array, stiffness: float) -> None:
+    def __init__(
+        self,
+        V: fem.FunctionSpace,
+        tangent: TangentMatrix,
+        rate: Array,
+        stiffness: float,
+        factoriser: Callable[[PETSc.Mat], Strategy],
+    ) -> None:
         super().__init__(V)
-        self.border: Bordered = Bordered(tangent.A, stiffness, V)
+        self.border: Bordered = Bordered(tangent.A, stiffness, factoriser)
         self._direction = fem.Function(V)
         self._direction.x.array[:] = rate.ravel()
 
@@ -70,12 +81,12 @@ class ForceControl(FactorControl):
 
     def start(self, load: float, guess: float) -> float:
         """The guess itself."""
-        self.border.came_free = False
+        self.border.singular = False
         return guess
 
     def factor(self, load: float, x: PETSc.Vec) -> float:
         """The load factor in ``x``, on every rank."""
-        return self.border.level(x)
+        return self.border.factor(x)
 
     def join(self, x: PETSc.Vec, u: Array, factor: float) -> None:
         """Put both into ``x``."""

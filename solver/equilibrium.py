@@ -23,13 +23,13 @@ from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.control import FactorControl, ForceControl
 from archord.solver.interrupt import Interrupt, Interrupted
-from archord.solver.linear.tangent_matrix import TangentMatrix
+from archord.solver.linear.choose import choose
+from archord.solver.linear.facts import Facts, Strategy
 from archord.solver.problem import Load, Problem
+from archord.solver.tangent import TangentMatrix
 from archord.solver.timer import Timer
 
 _LOAD_DEGREE = 6  # of the quadrature of distributed forces
-_MOST_CONDENSED = 8_000  # dofs
-_LARGE_GAMMA = 5.0
 _MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which supports do not hold it
 
 
@@ -71,20 +71,25 @@ class Equilibrium:
         self.reaction_norm = self.noise = 0.0
         self.largest_reaction = 0.0  # norm, of all accepted states
         self._stiffest = max(float(body.material.elastic_tangent[0, 0]) for body in problem.bodies)
+        self.choice = choose(self._facts())
         matrix = V, bulk, contact, self.fixed, self.rate, self.timer
-        self.tangent = TangentMatrix(*matrix, condense=self._condensable())
+        self.tangent = TangentMatrix(*matrix, condense=self.choice.uses("condensed"))
         self.control = FactorControl(V)
         if problem.control == "force":
-            self.control = ForceControl(V, self.tangent, self.rate, self._stiffest)
+            self.control = ForceControl(V, self.tangent, self.rate, self._stiffest, self.factoriser)
 
-    def _condensable(self) -> bool:
-        """Whether the linear systems shrink to the contact (`condensed`): the bodies are elastic and held, the mesh is
-        small (the work on contact dofs grows faster than a factorisation), gamma leaves the small system regular."""
-        problem, n_dofs = self.problem, 2 * self.V.dofmap.index_map.size_global
-        if self.contact is None or self.bulk.plastic or problem.control == "force" or n_dofs >= _MOST_CONDENSED:
-            return False
-        regular = all(i.gamma_factor <= _LARGE_GAMMA and i.law == "frictionless" for i in problem.interactions)
-        return regular and all(self._held(problem.tag(body)) for body in problem.bodies)
+    def _facts(self) -> Facts:
+        """What the choice of linear strategies depends on."""
+        problem = self.problem
+        frictionless = bool(problem.interactions) and all(i.law == "frictionless" for i in problem.interactions)
+        return Facts(
+            self.comm,
+            2 * self.V.dofmap.index_map.size_global,
+            self.bulk.plastic,
+            problem.control == "force",
+            max(i.gamma_factor for i in problem.interactions) if frictionless else None,
+            lambda: all(self._held(problem.tag(body)) for body in problem.bodies),
+        )
 
     def _held(self, tag: int) -> bool:
         """Whether supports alone keep the body whose cells have this ``tag`` from moving rigidly. Collective."""
@@ -128,6 +133,15 @@ class Equilibrium:
         self.u.x.array[self.fixed.ravel()] = self.factor * self.rate[self.fixed]
 
     # ------------------------------------------------------------------ tangent
+
+    def factoriser(self, A: PETSc.Mat) -> Strategy:
+        """The strategy that factorises ``A``, a tangent of all displacements. Collective."""
+        return self.choice.factoriser(A, self.V)
+
+    @property
+    def linear(self) -> Strategy:
+        """The strategy that solves with the tangent of all unknowns. Collective."""
+        return self.control.border or self.tangent.condensed or self.factoriser(self.tangent.A)
 
     def update_tangent(self, *, factorise: bool = True) -> None:
         """Assemble the tangent of the last evaluation, to be factorised or not. Collective."""

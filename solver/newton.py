@@ -14,7 +14,7 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.solver.contact.interaction import GAMMA_FACTOR
 from archord.solver.equilibrium import Equilibrium
-from archord.solver.linear.bordered import direct_solver
+from archord.solver.linear.lagged import Lagged
 from archord.solver.timer import BEFORE_SOLVING
 
 _STIFF_CONTACT = 5.0  # gamma factor above which it is raised in stages where a solve fails
@@ -22,11 +22,6 @@ _GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 _CIRCLING = 4  # the same where the active set stands still
 _ROUGH = 1e-3  # residual over reaction at which a solution is good enough for a guess
-_MANY_DOFS = 20_000  # of an elastic problem for which a factorisation takes longer than some solves with an old one
-_LINEAR_TOLERANCE = 1e-3  # residual of a linear system over its right-hand side, where it is solved so
-_NEVER = 1_000_000  # iterations
-_MANY_SOLVES = 12  # that cost what a factorisation does
-_MANY_CHANGES = 100  # of the active set, which make so many solves
 
 
 @dataclass
@@ -76,9 +71,7 @@ class NewtonSolver:
         self._raised: BaseException | None = None
         self._failure = ""
         self._renewed = True  # the last factorisation is of another matrix
-        self._changed = 0  # active-set changes since
-        many = 2 * equilibrium.V.dofmap.index_map.size_global >= _MANY_DOFS
-        self._iterative = many and self.elastic and equilibrium.tangent.condensed is None
+        self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
         with equilibrium.timer(BEFORE_SOLVING):
             self._snes = self._make_snes()
 
@@ -91,32 +84,24 @@ class NewtonSolver:
         snes = PETSc.SNES().create(self.comm)
         snes.setOptionsPrefix("archord_")
         snes.setType("newtonls")
-        tangent = self.equilibrium.tangent
-        system = self.equilibrium.control.border or tangent.condensed
         self._x = self.equilibrium.control.vector()
         snes.setFunction(self._guarded(self._residual), self._x.duplicate())
-        snes.setJacobian(self._guarded(self._jacobian), tangent.A if system is None else system.matrix)
         snes.setTolerances(max_it=self.max_iterations)
         snes.setConvergenceTest(self._test)
-        ksp = snes.getKSP()
-        if system is None:
-            direct_solver(ksp, tangent.A, self.equilibrium.V)
-        else:
-            ksp.setType("preonly")
-            ksp.setOperators(system.matrix)
-            ksp.getPC().setType("python")
-            ksp.getPC().setPythonContext(system)
-        self._iterate(ksp)
+        self._attach(snes)
         options = PETSc.Options("archord_")
         options["snes_linesearch_type"] = "bt"
         options["snes_linesearch_max_it"] = 8
         snes.setFromOptions()
         return snes
 
-    def _iterate(self, ksp: PETSc.KSP) -> None:
-        if self._iterative:
-            ksp.setType("fgmres")  # which needs one solve less than GMRES: it keeps the preconditioned vectors
-            ksp.setConvergenceTest(self._linear_test)
+    def _attach(self, snes: PETSc.SNES) -> None:
+        """Let ``snes`` solve with the tangent as it is chosen."""
+        linear = self.equilibrium.linear
+        snes.setJacobian(self._guarded(self._jacobian), linear.matrix)
+        linear.attach(snes.getKSP())
+        if self._lagged is not None:
+            self._lagged.attach(snes.getKSP())
 
     def _guarded(self, callback: Callable) -> Callable:
         """Keep what ``callback`` raises, which PETSc would turn into an error number."""
@@ -138,48 +123,18 @@ class NewtonSolver:
             self._failure = str(error)
             f.set(np.nan)
             return
-        tangent = self.equilibrium.tangent
-        if renewed and self.equilibrium.control.border is None and tangent.condensed is None:
-            self._snes.setJacobian(self._guarded(self._jacobian), tangent.A)
-            direct_solver(self._snes.getKSP(), tangent.A, self.equilibrium.V)
-            self._iterate(self._snes.getKSP())
+        if renewed and self.equilibrium.control.border is None and self.equilibrium.tangent.condensed is None:
+            self._attach(self._snes)
         self._renewed |= renewed
 
     def _jacobian(self, snes, x, A, P) -> None:
         if not self._close():
             before = self.equilibrium.tangent.factorisations
-            factorise = self._factorise(snes)
+            lagged, changes = self._lagged, self._changes[-1]
+            factorise = lagged is None or lagged.factorises(snes, changes, renewed=self._renewed)
             self.equilibrium.update_tangent(factorise=factorise)
             self._factorisations += self.equilibrium.tangent.factorisations - before
             self._renewed = False
-
-    def _linear_test(self, ksp: PETSc.KSP, iteration: int, norm: float) -> PETSc.KSP.ConvergedReason:
-        """GMRES is done when the residual is small, or when a new factorisation would have been quicker."""
-        if iteration == 0:
-            self._right_side = norm
-        if norm <= _LINEAR_TOLERANCE * self._right_side:
-            return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
-        many = iteration >= 2 * _MANY_SOLVES
-        return PETSc.KSP.ConvergedReason.CONVERGED_ITS if many else PETSc.KSP.ConvergedReason.ITERATING
-
-    def _factorise(self, snes: PETSc.SNES) -> bool:
-        """Whether the next matrix is to be factorised, and not solved with by GMRES and the last factorisation.
-
-        With a good guess few contact points change from one iteration to the next of a large elastic problem: GMRES
-        needs one to three iterations. From step to step there are too many of them, and plastic bodies change all over.
-        """
-        if not self._iterative:
-            return True
-        self._changed += self._changes[-1]
-        many = snes.getKSP().getIterationNumber() > _MANY_SOLVES or self._changed > _MANY_CHANGES
-        factorise = self._renewed or many
-        if factorise:
-            self._changed = 0
-        options = PETSc.Options("archord_")
-        options["snes_lag_preconditioner"] = 1 if factorise else _NEVER
-        snes.setFromOptions()
-        options.delValue("snes_lag_preconditioner")  # or every other solver of this process would take it for its own
-        return factorise
 
     def _close(self) -> bool:
         """Whether one more step with the last factorisation will do: Newton's method converges, and the residual that

@@ -1,55 +1,43 @@
-"""Newton's linear system with one more unknown: the level of a rigid motion on which a given force acts.
+"""Newton's linear system with one more unknown: the load factor of a rigid motion on which a given force acts.
 
-``[A b; c d] (u, s) = (r, rho)`` is solved by one factorisation of A, the matrix at a given level, and two solves with
-it: displacement control is regular wherever force control is, and beyond.
+``[A b; c d] (u, s) = (r, rho)`` is solved by one factorisation of A, the matrix at a given load factor, and two solves
+with it: displacement control is regular wherever force control is, and beyond.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.linear.substructures import substructures
+from archord.solver.linear.direct import Direct
+from archord.solver.linear.facts import Facts, Strategy, solve_by
 
-_FREE = 1e-9  # stiffness of the joint over ``stiffness`` below which nothing resists the force
+_SINGULAR = 1e-9  # stiffness against the motion over ``stiffness`` below which nothing resists the force
 
 
-def direct_solver(ksp: PETSc.KSP, A: PETSc.Mat, V: fem.FunctionSpace | None = None) -> None:
-    """Let ``ksp`` factorise ``A`` by MUMPS; on several ranks, of the displacements ``V``, by `Substructures` where that
-    goes. Collective."""
-    ksp.setType("preonly")
-    ksp.setOperators(A)
-    pc = ksp.getPC()
-    parts = None if V is None else substructures(A, V)
-    if parts is not None:
-        pc.setType("python")
-        pc.setPythonContext(parts)
-        return
-    pc.setType("lu")
-    pc.setFactorSolverType("mumps")
-    pc.setFactorSetUpSolverType()
-    factors = pc.getFactorMatrix()
-    factors.setMumpsIcntl(14, 60)
-    factors.setMumpsIcntl(8, 1)  # scale by the diagonal: what MUMPS does by itself takes a seventh of a factorisation
+def why_not(facts: Facts) -> str | None:
+    """Why the system has no border."""
+    return None if facts.by_force else "the load is no force"
 
 
 class Bordered:
     """Python context of the bordered matrix and of its preconditioner, which solves with the last one that was
     factorised.
 
-    The level is the last entry of rank 0. ``stiffness`` scales what counts as resistance; ``V`` as for `direct_solver`.
-    Collective.
+    The load factor is the last entry of rank 0. ``stiffness`` scales what counts as resistance; ``factoriser``
+    gives the strategy for ``A``. Collective.
     """
 
-    def __init__(self, A: PETSc.Mat, stiffness: float, V: fem.FunctionSpace | None = None) -> None:
-        self.comm, self._stiffness, self._V = A.comm.tompi4py(), stiffness, V
+    def __init__(self, A: PETSc.Mat, stiffness: float, factoriser: Callable[[PETSc.Mat], Strategy] = Direct) -> None:
+        self.comm, self._stiffness, self._factoriser = A.comm.tompi4py(), stiffness, factoriser
         self._n = A.getLocalSize()[0]
         self._extra = int(self.comm.rank == 0)
         self.b, self.c, self.d = np.zeros(self._n), np.zeros(self._n), 0.0
         self._factorised = self.c, self.d  # with the matrix that the preconditioner is of
-        self._stale, self.came_free = True, False
+        self._stale, self.singular = True, False
         self._x, self._y = A.createVecs()
         self._along_b = np.zeros(self._n)
         self._ksp = PETSc.KSP()
@@ -63,20 +51,24 @@ class Bordered:
         self._A, self._stale = A, True
         self._ksp.destroy()
         self._ksp = PETSc.KSP().create(self.comm)
-        direct_solver(self._ksp, A, self._V)
+        self._factoriser(A).attach(self._ksp)
+
+    def attach(self, ksp: PETSc.KSP) -> None:
+        """Let ``ksp`` solve with the bordered matrix."""
+        solve_by(ksp, self.matrix, self)
 
     def vector(self) -> PETSc.Vec:
-        """A vector with the level as its last entry."""
+        """A vector with the load factor as its last entry."""
         return PETSc.Vec().createMPI((self._n + self._extra, None), comm=self.comm)
 
-    def level(self, x: PETSc.Vec) -> float:
-        """The level in ``x``, on every rank."""
+    def factor(self, x: PETSc.Vec) -> float:
+        """The load factor in ``x``, on every rank."""
         return float(self.comm.bcast(x.array_r[-1] if self._extra else None))
 
-    def join(self, x: PETSc.Vec, u: Array, level: float) -> None:
-        """Put ``u`` ``(n_owned dofs,)`` and ``level`` into ``x``."""
+    def join(self, x: PETSc.Vec, u: Array, factor: float) -> None:
+        """Put ``u`` ``(n_owned dofs,)`` and ``factor`` into ``x``."""
         x.array[: self._n] = u
-        x.array[self._n :] = level
+        x.array[self._n :] = factor
 
     def update(self, b: Array, c: Array, d: float, *, factorise: bool = True) -> None:
         """New border for a matrix with new values: ``b`` and ``c`` of this rank's dofs, ``d`` of all ranks.
@@ -97,19 +89,19 @@ class Bordered:
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """``y = [A b; c d] x``, called by PETSc."""
-        s, u = self.level(x), x.array_r[: self._n]
+        s, u = self.factor(x), x.array_r[: self._n]
         self._x.array[:] = u
         self._A.mult(self._x, self._y)
         self.join(y, self._y.array_r + s * self.b, self._dot(self.c, u) + self.d * s)
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
-        """``x = [A b; c d]^-1 r``, called by PETSc; where nothing resists the level, it stays."""
+        """``x = [A b; c d]^-1 r``, called by PETSc; where nothing resists the motion, the load factor stays."""
         if self._stale:
             self._along_b, self._factorised = self._solve(self.b), (self.c, self.d)
             self._stale = False
-        rho, u = self.level(r), self._solve(r.array_r[: self._n])
+        rho, u = self.factor(r), self._solve(r.array_r[: self._n])
         c, d = self._factorised
         pivot = d - self._dot(c, self._along_b)
-        self.came_free = abs(pivot) < _FREE * self._stiffness
-        s = 0.0 if self.came_free else (rho - self._dot(c, u)) / pivot
+        self.singular = abs(pivot) < _SINGULAR * self._stiffness
+        s = 0.0 if self.singular else (rho - self._dot(c, u)) / pivot
         self.join(x, u - s * self._along_b, s)

@@ -1,4 +1,4 @@
-"""Newton's linear systems of an elastic joint, solved with one sparse factorisation for all.
+"""Newton's linear systems of elastic bodies, solved with one sparse factorisation for all.
 
 Nothing changes but the contact: the tangent is ``K + E D`` with the constant stiffness ``K``, the rows ``D`` of the
 contact forces, and ``E`` that puts them in their places. By the formula of Woodbury (Golub and Van Loan 2013, 2.1.4)
@@ -22,8 +22,26 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.solver.linear.facts import Facts, solve_by
 
+_MOST_DOFS = 8_000  # beyond, the work on contact dofs takes longer than factorisations
+_LARGE_GAMMA = 5.0  # beyond, the small system is close to singular
 _MOST_REVISIONS = 2  # of the closed points in one solve: more cost what the iterations cost that they save
+
+
+def why_not(facts: Facts) -> str | None:
+    """Why the systems do not shrink to the contact."""
+    if facts.yields:
+        return "bodies can yield"
+    if facts.by_force:
+        return "the load is a force"
+    if facts.dofs >= _MOST_DOFS:
+        return f"{_MOST_DOFS} dofs or more"
+    if facts.gamma_factor is None:
+        return "there is no contact, or one with another law than frictionless"
+    if facts.gamma_factor > _LARGE_GAMMA:
+        return f"gamma_factor is above {_LARGE_GAMMA:g}"
+    return None if facts.held() else "supports alone do not hold every body"
 
 
 class Condensed:
@@ -53,6 +71,10 @@ class Condensed:
         sizes = K.getSizes()
         self.matrix = PETSc.Mat().createPython(sizes, context=self, comm=K.comm)
         self.matrix.setUp()
+
+    def attach(self, ksp: PETSc.KSP) -> None:
+        """Let ``ksp`` solve with the matrix."""
+        solve_by(ksp, self.matrix, self)
 
     def _responses(self, dofs: np.ndarray) -> Array:
         """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one after the other."""

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from archord.benchmarks.case import paper_joint
 from archord.presets.joint import Joint
-from archord.solver import equilibrium as equilibrium_module
+from archord.solver.linear import choose
 from archord.solver.linear import condensed as condensed_module
 from archord.solver.linear.condensed import Condensed
 from tests.solver.solving import solve
@@ -72,7 +72,7 @@ def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin
     short = solve(scene)
     monkeypatch.setattr(condensed_module, "_MOST_REVISIONS", 20)
     patient = solve(scene)
-    monkeypatch.setattr(equilibrium_module, "_MOST_CONDENSED", 0)
+    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
     long = solve(scene)
     assert short.joint.factorisations == 1 < long.joint.factorisations
     counts = [[m.iterations for m in run.steps] for run in (short, long)]

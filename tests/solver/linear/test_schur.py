@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.kernels.compiled import pointer
-from archord.solver.linear.substructures import schur_kernels
+from archord.solver.linear.substructured import schur_kernels
 
 
 def created(matrix, kept):

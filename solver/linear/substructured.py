@@ -21,25 +21,39 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.kernels.compiled import CompilerError, library, pointer
-from archord.solver.linear.elimination_order import available, before_corners, corners
+from archord.solver.linear.facts import Facts, solve_by
+from archord.solver.linear.nested_dissection import available, before_corners, corners
 
 _LARGEST_INTERFACE = 4000  # unknowns: every rank factorises a dense matrix of that size
 
 
-def substructures(A: PETSc.Mat, V: fem.FunctionSpace) -> Substructures | None:
-    """Substructures for matrices with the pattern of ``A``, of the displacements ``V``. Collective.
+def why_not(facts: Facts) -> str | None:
+    """Why the ranks do not eliminate unknowns of their own, as far as that is known before there is a matrix."""
+    if facts.comm.size == 1:
+        return "one rank"
+    return next((said for said in facts.comm.allgather(_missing()) if said), None)
 
-    None on one rank, where the interface is too large, where a rank has no unknowns of its own, and where MUMPS's
-    headers or METIS are not installed.
-    """
+
+def _missing() -> str:
+    """What is not installed here."""
+    try:
+        schur_kernels()
+    except CompilerError as error:
+        return f"MUMPS's C interface is not installed ({error})"
+    return "" if available() else "METIS is not installed"
+
+
+def substructures(A: PETSc.Mat, V: fem.FunctionSpace) -> Substructures | str:
+    """Substructures for matrices with the pattern of ``A``, of the displacements ``V``; a reason where they do not
+    go. Collective."""
     comm = A.comm.tompi4py()
-    if comm.size == 1 or not comm.allreduce(_available(), op=MPI.LAND):
-        return None
     interface = _interface(A, comm)
+    if len(interface) > _LARGEST_INTERFACE:
+        return f"the interface has {len(interface)} unknowns, more than {_LARGEST_INTERFACE}"
     start, end = A.getOwnershipRange()
-    alone = end - start > ((interface >= start) & (interface < end)).sum()  # whether this rank has unknowns of its own
-    if not 0 < len(interface) <= _LARGEST_INTERFACE or not comm.allreduce(bool(alone), op=MPI.LAND):
-        return None
+    alone = end - start > ((interface >= start) & (interface < end)).sum()
+    if not len(interface) or not comm.allreduce(bool(alone), op=MPI.LAND):
+        return "a rank has no unknowns of its own"
     return Substructures(A, interface, corners(V))
 
 
@@ -70,16 +84,8 @@ def _within(dofs: np.ndarray, some: np.ndarray) -> np.ndarray:
 
 
 def schur_kernels() -> Any:
-    """The functions of kernels/schur.c. Raises `CompilerError` where MUMPS's headers are not installed."""
+    """The functions of schur.c. Raises `CompilerError` where MUMPS's headers are not installed."""
     return library(Path(__file__).with_name("schur.c"), libraries=("dmumps",))
-
-
-def _available() -> bool:
-    try:
-        schur_kernels()
-    except CompilerError:
-        return False
-    return available()
 
 
 class Substructures:
@@ -87,7 +93,7 @@ class Substructures:
     ``(m,)``, sorted, separate the ranks, and whose nodes have ``corner`` as in `corners`. Collective."""
 
     def __init__(self, A: PETSc.Mat, interface: np.ndarray, corner: np.ndarray) -> None:
-        self.comm = A.comm.tompi4py()
+        self.matrix, self.comm = A, A.comm.tompi4py()
         self._kernels = schur_kernels()
         start, end = A.getOwnershipRange()
         local = np.union1d(np.arange(start, end), interface)
@@ -117,6 +123,10 @@ class Substructures:
         self._dense.setType("preonly")
         self._dense.getPC().setType("lu")
         self.singular = False
+
+    def attach(self, ksp: PETSc.KSP) -> None:
+        """Let ``ksp`` solve with the matrix."""
+        solve_by(ksp, self.matrix, self)
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factorise the matrix as it is now, called by PETSc."""

@@ -163,7 +163,7 @@ class TangentMatrix:
         return found
 
     def _add_contact(self, rows: np.ndarray, columns: np.ndarray) -> None:
-        """Add the contact's blocks to ``A``, nothing to those of prescribed displacements and of a rigid pin."""
+        """Add the contact's blocks to ``A``, nothing to those of prescribed displacements and of a rigid disc."""
         kept = filled(self._contact_blocks)
         kept = kept[self._in_matrix[kept]]
         if not len(kept):
@@ -176,8 +176,8 @@ class TangentMatrix:
         self.A.setValuesBlockedIJV(offsets, column, values, PETSc.InsertMode.ADD, rowmap)
 
     def update_border(self, border: Bordered, direction: fem.Function, *, factorise: bool = True) -> None:
-        """Derivatives with respect to the level, which moves the joint along ``direction``, and of the force on it;
-        the bulk's are the same, for its tangent is symmetric."""
+        """Derivatives with respect to the load factor, which moves the bodies along ``direction``, and of the force on
+        it; the bulk's are the same, for its tangent is symmetric."""
         action = create_vector(self._index_map, 2)
         self.bulk.add_action(direction, action)
         bulk = action.array_r.reshape(-1, 2).copy()

@@ -4,8 +4,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.case import paper_joint
-from archord.solver import equilibrium as equilibrium_module
-from archord.solver import newton as newton_module
+from archord.solver.linear import choose, lagged
 from archord.solver.linear.bordered import Bordered
 from tests.solver.solving import solve
 
@@ -15,8 +14,8 @@ RING = {"joint": {"model": "ring"}, "load": {"displacement": None, "relative_for
 
 @pytest.fixture
 def small_is_large(monkeypatch):
-    monkeypatch.setattr(equilibrium_module, "_MOST_CONDENSED", 0)
-    monkeypatch.setattr(newton_module, "_MANY_DOFS", 0)
+    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
+    monkeypatch.setattr(lagged, "_MANY_DOFS", 0)
 
 
 @pytest.mark.mpi
@@ -25,7 +24,7 @@ def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
     """To the tolerance of the residual, with fewer factorisations than iterations; on two ranks as on one."""
     scene = paper_joint(0.15, 2, **kind)
     iterative = solve(scene, MPI.COMM_WORLD)
-    monkeypatch.setattr(newton_module, "_MANY_DOFS", 10**9)
+    monkeypatch.setattr(lagged, "_MANY_DOFS", 10**9)
     direct = solve(scene)
     for a, b in zip(iterative.steps, direct.steps, strict=True):
         assert (a.P, a.delta, a.p0, a.eps) == pytest.approx((b.P, b.delta, b.p0, b.eps), rel=1e-8)
@@ -37,7 +36,7 @@ def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
 def test_many_solves_bring_a_new_factorisation(small_is_large, monkeypatch):
     scene = paper_joint(0.15, 2)
     usual = solve(scene)
-    monkeypatch.setattr(newton_module, "_MANY_SOLVES", 1)
+    monkeypatch.setattr(lagged, "_MANY_SOLVES", 1)
     often = solve(scene)
     P = often.steps[-1].P
     assert often.joint.factorisations > usual.joint.factorisations
@@ -48,8 +47,8 @@ def test_solvers_that_follow_factorise_as_ever(monkeypatch):
     """What a large elastic joint asks of PETSc is not asked of the next joint."""
     plastic = paper_joint(0.15, 2, 0.002)
     before = solve(plastic).steps
-    monkeypatch.setattr(newton_module, "_MANY_DOFS", 0)
-    monkeypatch.setattr(equilibrium_module, "_MOST_CONDENSED", 0)
+    monkeypatch.setattr(lagged, "_MANY_DOFS", 0)
+    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
     solve(paper_joint(0.15, 1))
     assert [m.iterations for m in solve(plastic).steps] == [m.iterations for m in before]
 
@@ -57,7 +56,7 @@ def test_solvers_that_follow_factorise_as_ever(monkeypatch):
 def test_plastic_joints_factorise_every_matrix(small_is_large, monkeypatch):
     scene = paper_joint(0.12, 2, 0.002)
     usual = solve(scene)
-    monkeypatch.setattr(newton_module, "_MANY_DOFS", 10**9)
+    monkeypatch.setattr(lagged, "_MANY_DOFS", 10**9)
     assert solve(scene).joint.factorisations == usual.joint.factorisations
 
 
@@ -103,5 +102,5 @@ def test_many_changes_of_the_contact_bring_a_new_factorisation(small_is_large, m
     """A guess from afar opens and closes points everywhere: as many factorisations as these changes ask for."""
     scene = paper_joint(0.15, 2)
     usual = solve(scene).joint.factorisations
-    monkeypatch.setattr(newton_module, "_MANY_CHANGES", 0)
+    monkeypatch.setattr(lagged, "_MANY_CHANGES", 0)
     assert solve(scene).joint.factorisations > usual

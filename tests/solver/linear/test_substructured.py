@@ -7,9 +7,10 @@ from petsc4py import PETSc
 
 from archord.benchmarks.case import paper_joint
 from archord.presets.joint import Joint
-from archord.solver.linear import substructures as module
-from archord.solver.linear.elimination_order import before_corners, corners, nested_dissection
-from archord.solver.linear.substructures import substructures
+from archord.solver.linear import choose
+from archord.solver.linear import substructured as module
+from archord.solver.linear.nested_dissection import before_corners, corners, nested_dissection
+from archord.solver.linear.substructured import substructures
 from tests.solver.solving import solve
 
 SEVERAL = pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="one rank has no interface")
@@ -105,18 +106,12 @@ def test_a_joint_is_solved_as_without(control, monkeypatch):
     load = {} if control == "displacement" else {"load": {"displacement": None, "relative_force": 0.004}}
     scene = paper_joint(0.15, 2, 0.002, **load)
     ours = solve(scene, MPI.COMM_WORLD)
-    monkeypatch.setattr(module, "_LARGEST_INTERFACE", -1)
+    monkeypatch.setattr(choose, "LEFT_OUT", {"substructured"})
     theirs = solve(scene, MPI.COMM_WORLD)
     for a, b in zip(ours.steps, theirs.steps, strict=True):
         assert a.iterations == b.iterations
         assert pytest.approx(b.P, rel=1e-9) == a.P
         assert a.delta == pytest.approx(b.delta, rel=1e-9)
-
-
-@pytest.mark.mpi
-def test_one_rank_has_no_substructures():
-    joint, A = pressed()
-    assert (substructures(A, joint.V) is None) == (MPI.COMM_WORLD.size == 1)
 
 
 @pytest.mark.mpi

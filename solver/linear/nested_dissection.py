@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 from typing import Any
 
@@ -14,14 +15,20 @@ _PROTOTYPES = """
 int METIS_NodeND(int32_t *n, int32_t *offsets, int32_t *neighbours, int32_t *weights, int32_t *options, int32_t *order,
                  int32_t *place);
 """
-_LIBRARY = "libmetis.so.5"  # gmsh's
+_LIBRARIES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")  # Debian's (gmsh needs it), conda's on Linux and macOS
 
 
 @cache
 def _metis() -> tuple[cffi.FFI, Any]:
     ffi = cffi.FFI()
     ffi.cdef(_PROTOTYPES)
-    return ffi, ffi.dlopen(_LIBRARY)
+    for folder in ("", f"{sys.prefix}/lib/"):
+        for name in _LIBRARIES:
+            try:
+                return ffi, ffi.dlopen(folder + name)
+            except OSError:
+                continue
+    raise OSError("METIS is not installed")
 
 
 def available() -> bool:

@@ -1,0 +1,57 @@
+"""Which strategies solve the Newton systems of a problem, and why not the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dolfinx import fem
+from petsc4py import PETSc
+
+from archord.solver.linear import bordered, condensed, lagged, substructured
+from archord.solver.linear.direct import Direct
+from archord.solver.linear.facts import Facts, Strategy
+
+# Every strategy beside MUMPS on the whole matrix, which always goes: None, or why it does not fit the facts.
+RULES = {
+    "bordered": bordered.why_not,
+    "condensed": condensed.why_not,
+    "substructured": substructured.why_not,
+    "lagged": lagged.why_not,
+}
+LEFT_OUT: set[str] = set()  # strategies to do without; benchmarks and tests set it
+
+
+@dataclass
+class Choice:
+    """``why_not`` holds, by the name of a strategy, why it is not used; None if it is."""
+
+    why_not: dict[str, str | None]
+
+    def uses(self, name: str) -> bool:
+        """Whether the strategy ``name`` is used."""
+        return self.why_not[name] is None
+
+    def factoriser(self, A: PETSc.Mat, V: fem.FunctionSpace) -> Strategy:
+        """The strategy that factorises ``A``, of the displacements ``V``. Collective."""
+        if self.uses("substructured"):
+            parts = substructured.substructures(A, V)
+            if not isinstance(parts, str):
+                return parts
+            self.why_not["substructured"] = parts
+        return Direct(A)
+
+    def words(self) -> dict[str, str | dict[str, str]]:
+        """The choice for run.json: ``strategy`` names what is used, ``not_used`` has the reasons."""
+        used = [name for name, reason in self.why_not.items() if reason is None]
+        if "condensed" not in used and "substructured" not in used:
+            used.append("direct")
+        return {"strategy": " + ".join(used), "not_used": {n: r for n, r in self.why_not.items() if r is not None}}
+
+
+def choose(facts: Facts) -> Choice:
+    """The strategies for a problem with these ``facts``. Collective."""
+    reasons = {name: rule(facts) for name, rule in RULES.items()}
+    reasons |= {name: "left out on request" for name in LEFT_OUT & reasons.keys()}
+    if reasons["condensed"] is None:
+        reasons |= {name: "the system is condensed" for name in ("substructured", "lagged")}
+    return Choice(reasons)

@@ -1,0 +1,42 @@
+"""What the choice of a linear strategy depends on, and what every strategy can do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Of a problem: its ``dofs`` on all ranks of ``comm``; whether bodies ``yields``; whether it is controlled
+    ``by_force``; ``gamma_factor``, the largest of its frictionless interactions, None without one or with others; and
+    ``held()``, whether supports alone keep every body from moving rigidly (collective)."""
+
+    comm: MPI.Comm
+    dofs: int
+    yields: bool
+    by_force: bool
+    gamma_factor: float | None
+    held: Callable[[], bool]
+
+
+class Strategy(Protocol):
+    """A way to solve with a matrix, as PETSc's linear solver ``ksp`` is told by `attach`; beside it a function
+    ``why_not(facts)`` returns a reason not to use it, or None. Collective."""
+
+    matrix: PETSc.Mat
+
+    def attach(self, ksp: PETSc.KSP) -> None:
+        """Let ``ksp`` solve so."""
+
+
+def solve_by(ksp: PETSc.KSP, matrix: PETSc.Mat, context: object) -> None:
+    """Let ``ksp`` solve with ``matrix`` by ``context``, a Python preconditioner that is an exact inverse."""
+    ksp.setType("preonly")
+    ksp.setOperators(matrix)
+    ksp.getPC().setType("python")
+    ksp.getPC().setPythonContext(context)
