@@ -164,8 +164,8 @@ def accuracy(output: Path, only: str, quiet: bool) -> int:
 
     Writes accuracy.csv and accuracy.md. Exit code 0 only if all errors are below what was asked.
     """
+    from archord.benchmarks.case import matches
     from archord.benchmarks.cost import accuracy as table
-    from archord.benchmarks.cost.work_precision_cases import matches
 
     cases = tuple(case for case in table.CASES if matches(only, case.name))
     if not cases:
@@ -211,7 +211,7 @@ def _store_reference(cases, folder: Path, say: Say) -> int:
     for case in cases:
         for kinematics in ("current", "reference"):
             compute(case, kinematics, folder, say)
-    print("\n".join(reference_table(cases)))
+    print(reference_table(cases).markdown(), end="")
     print(FILE)
     return 0
 
@@ -229,39 +229,25 @@ def _work_precision(
     warm: bool,
     quiet: bool,
 ) -> int:
-    from archord.benchmarks.cost import work_precision as table
-    from archord.benchmarks.cost.work_precision_figure import draw
-    from archord.benchmarks.cost.work_precision_report import markdown, write_csv
-    from archord.benchmarks.cost.work_precision_run import INTERRUPTED
+    from archord.benchmarks.cost.timing import INTERRUPTED, time_all
+    from archord.benchmarks.cost.work_precision import judge, warm_seconds
+    from archord.benchmarks.cost.work_precision_codes import chosen, tasks
+    from archord.benchmarks.cost.work_precision_report import markdown, write
     from archord.output.folder import claim_folder
 
     claim_folder(output, force=True)
-    found = [t for case in cases for t in table.tasks(case, output / "runs", quick=quick, peers=peers, limit=limit)]
-    found = table.chosen(found, list(only))
+    found = [t for case in cases for t in tasks(case, output / "runs", quick=quick, peers=peers, limit=limit)]
 
     def said(task, repeat: int, sentence: str) -> None:
         counted = f"{repeat} of {repeats}" if repeat else "not counted"
-        say(f"{task.case}: {task.code}, {task.series}, {task.label}: {sentence} ({counted})")
+        say(f"{task.case}: {task.name}: {sentence} ({counted})")
 
-    lines = table.run(found, repeats, said)
-    whole = all(len(line.point.seconds) == repeats for line in lines if line.point.failure in ("", INTERRUPTED))
-    seconds = None
-    if warm and whole:
-        from archord.benchmarks.cost.work_precision_warm import warm_seconds
-
-        seconds = warm_seconds(repeats)
-    text = markdown(lines, seconds)
-    files = [output / "work_precision.csv", output / "work_precision.md"]
-    write_csv(lines, files[0])
-    files[1].write_text(text, encoding="utf-8")
-    for case in cases:
-        some = [line for line in lines if line.task.case == case.name]
-        if some:
-            files.append(output / f"work_precision_{case.name}.png")
-            draw(case, some, files[-1])
-    failed = [line for line in lines if not line.point.done and line.point.failure != INTERRUPTED]
-    faults = [f"{f.task.case}: {f.task.code}, {f.task.series}, {f.task.label}: {f.point.failure}" for f in failed]
-    _conclude(text, files, faults, quiet)
+    lines = [judge(timing) for timing in time_all(chosen(found, only), repeats, said)]
+    whole = all(len(line.timing.runs) == repeats for line in lines if line.timing.failure in ("", INTERRUPTED))
+    seconds = warm_seconds(repeats) if warm and whole else None
+    failed = [line for line in lines if line.timing.failure not in ("", INTERRUPTED)]
+    faults = [f"{line.task.case}: {line.task.name}: {line.timing.failure}" for line in failed]
+    _conclude(markdown(lines, seconds), write(lines, output, seconds), faults, quiet)
     if not whole:
         print("archord: interrupted; the tables have what was timed before.", file=sys.stderr)
         return 130

@@ -7,71 +7,50 @@ should run.
 from __future__ import annotations
 
 import argparse
-import resource
-import statistics
-import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
-from time import perf_counter
+from shutil import rmtree
+from statistics import median
 
 from archord.benchmarks.cost.scaling_run import launcher
-from archord.benchmarks.report_files import markdown_table
+from archord.benchmarks.cost.timing import Process, Run, time_all
+from archord.report.table import Table
+
+_A_DAY = 86400.0  # seconds
 
 
-@dataclass(frozen=True)
-class Pair:
-    """Wall and processor time in seconds of a sweep on one rank and on several, start to end."""
+def measure(
+    sweep: Path, ranks: int, pairs: int, said: Callable[[str], None] = lambda sentence: None
+) -> tuple[list[Run], list[Run]]:
+    """The runs of ``sweep`` on one rank and on ``ranks``, in turn; ``said`` follows each. Raises RuntimeError if one
+    failed, `InputError` without mpirun."""
+    with tempfile.TemporaryDirectory() as place:
+        out = Path(place) / "sweep"
+        archord = (sys.executable, "-m", "archord", "sweep", str(sweep.resolve()), "-q", "-o", str(out))
 
-    alone: float
-    together: float
-    alone_cpu: float
-    together_cpu: float
+        def solved() -> None:
+            rmtree(out)  # what is there is not solved again
 
-    @property
-    def times_faster(self) -> float:
-        """Wall time on one rank over that on several."""
-        return self.alone / self.together
-
-
-def timed(sweep: Path, ranks: int) -> tuple[float, float]:
-    """Wall and processor time of ``sweep`` on ``ranks``. Raises RuntimeError if it failed."""
-    with tempfile.TemporaryDirectory() as folder:
-        command = (sys.executable, "-m", "archord", "sweep", str(sweep), "-q", "-o", folder)
-        before, start = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
-        ended = subprocess.run([*launcher(ranks), *command], capture_output=True, text=True)
-        seconds, after = perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
-    if ended.returncode:
-        raise RuntimeError(f"{sweep} on {ranks} ranks ended with code {ended.returncode}: {ended.stderr.strip()}")
-    return seconds, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        processes = [Process((*launcher(n), *archord), Path(place), solved, _A_DAY) for n in (1, ranks)]
+        timings = time_all(processes, pairs, lambda process, repeat, text: said(f"pair {repeat} of {pairs}: {text}"))
+    for n, timing in zip((1, ranks), timings, strict=True):
+        if timing.failure:
+            raise RuntimeError(f"{sweep} on {n} ranks: {timing.failure}")
+    return timings[0].runs, timings[1].runs
 
 
-def measure(sweep: Path, ranks: int) -> Pair:
-    """One pair. Raises RuntimeError if a sweep failed, `InputError` without mpirun."""
-    alone, alone_cpu = timed(sweep, 1)
-    together, together_cpu = timed(sweep, ranks)
-    return Pair(alone, together, alone_cpu, together_cpu)
-
-
-def table(pairs: list[Pair], ranks: int) -> list[str]:
-    """The pairs and their medians as a table in Markdown."""
-    headings = (
-        "pair",
-        "1 rank [s]",
-        f"{ranks} ranks [s]",
-        "times faster",
-        "CPU, 1 rank [s]",
-        f"CPU, {ranks} ranks [s]",
+def table(alone: list[Run], together: list[Run], ranks: int) -> Table:
+    """The pairs and their medians."""
+    found = Table(
+        "pair", "1 rank [s]", f"{ranks} ranks [s]", "times faster", "CPU, 1 rank [s]", f"CPU, {ranks} ranks [s]"
     )
-
-    def cells(name: str, *values: float) -> list[str]:
-        return [name, *(f"{v:.2f}" if i == 2 else f"{v:.1f}" for i, v in enumerate(values))]
-
-    columns = [(p.alone, p.together, p.times_faster, p.alone_cpu, p.together_cpu) for p in pairs]
-    rows = [cells(str(number), *values) for number, values in enumerate(columns, start=1)]
-    rows.append(cells("median", *(statistics.median(column) for column in zip(*columns, strict=True))))
-    return markdown_table(headings, rows)
+    pairs = [(a.seconds, b.seconds, a.seconds / b.seconds, a.cpu, b.cpu) for a, b in zip(alone, together, strict=True)]
+    rows: list[tuple[object, tuple]] = [*enumerate(pairs, 1), ("median", tuple(map(median, zip(*pairs, strict=True))))]
+    for name, (first, second, faster, *cpu) in rows:
+        found.add(name, f"{first:.1f}", f"{second:.1f}", f"{faster:.2f}", *(f"{seconds:.1f}" for seconds in cpu))
+    return found
 
 
 def main() -> int:
@@ -83,13 +62,8 @@ def main() -> int:
     options = parser.parse_args()
     if min(options.ranks, options.pairs) < 1:
         parser.error("--ranks and --pairs must be at least 1")
-    pairs = []
-    for number in range(1, options.pairs + 1):
-        pairs.append(measure(options.sweep, options.ranks))
-        print(
-            f"pair {number} of {options.pairs}: {pairs[-1].times_faster:.2f} times faster", file=sys.stderr, flush=True
-        )
-    print(*table(pairs, options.ranks), sep="\n")
+    runs = measure(options.sweep, options.ranks, options.pairs, lambda text: print(text, file=sys.stderr, flush=True))
+    print(table(*runs, options.ranks).markdown(), end="")
     return 0
 
 

@@ -2,82 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import tempfile
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
+from typing import cast
 
-from archord.benchmarks.cost.envelope import Pairs, envelope, lasting
+import numpy as np
+
+from archord.benchmarks.case import Case, paper_joint
 from archord.benchmarks.cost.pressure_profile import profile_error
-from archord.benchmarks.cost.work_precision_cases import Case, matches
-from archord.benchmarks.cost.work_precision_codes import CALCULIX, archord_tasks, calculix_tasks, peer_tasks
+from archord.benchmarks.cost.timing import Timing
+from archord.benchmarks.cost.work_precision_cases import edged
+from archord.benchmarks.cost.work_precision_codes import CALCULIX, Task, Values
 from archord.benchmarks.cost.work_precision_reference import Reference, read_reference
-from archord.benchmarks.cost.work_precision_run import LIMIT, Point, Task, run_all
+from archord.geometry.mesh_cache import MESHES
 from archord.postprocess.convergence import Limit, extrapolated
-from archord.scene.errors import InputError
 
-OWN_LIMIT = "own limit"
+Pairs = list[tuple[float, float]]
 _SCATTER = 1e-4
 
 
 @dataclass(frozen=True)
 class Line:
-    """A point and its relative errors by quantity, against the reference of its kinematics."""
+    """A task, timed, and its relative errors by quantity, against the reference of its kinematics."""
 
-    point: Point
+    timing: Timing
     errors: dict[str, float]
     reference: Reference
 
     @property
     def task(self) -> Task:
         """What was run."""
-        return self.point.task
+        return cast(Task, self.timing.process)
+
+    @property
+    def values(self) -> Values | None:
+        """What it found; None if it failed."""
+        return self.timing.runs[-1].result if self.timing.done else None
+
+    @property
+    def force(self) -> float | None:
+        """P/(E* R); None if it failed."""
+        return self.values.quantities.get("P") if self.values else None
 
 
-def tasks(case: Case, folder: Path, *, quick: bool = False, peers: bool = True, limit: float = LIMIT) -> list[Task]:
-    """All points of ``case``; what they need is written below ``folder``."""
-    found = list(archord_tasks(case, folder, limit, quick))
-    if peers:
-        found += [*calculix_tasks(case, folder, limit, quick), *peer_tasks(case, folder, limit, quick)]
-    return found
+def judge(timing: Timing) -> Line:
+    """The errors of what a task found; none if it failed."""
+    line = Line(timing, {}, read_reference(cast(Task, timing.process).case, "current"))
+    values = line.values
+    if values is None:
+        return line
+    reference = read_reference(line.task.case, values.kinematics)
+    known = {name: abs(v / reference.values[name] - 1) for name, v in values.quantities.items() if name in reference}
+    if values.profile is not None and values.side in reference.profile:
+        known["profile"] = profile_error(values.profile, reference.profile[values.side])
+    return Line(timing, known, reference)
 
 
-def chosen(found: list[Task], patterns: Sequence[str]) -> list[Task]:
-    """Those whose code, series or "code, series, mesh" is one of ``patterns`` (with * and ?), or contains it; all
-    without any.
-
-    Raises `InputError` for a pattern that fits none.
-    """
-    names = {t.folder: (t.code, t.series, f"{t.code}, {t.series}, {t.label}") for t in found}
-    for pattern in patterns:
-        if not any(matches(pattern, *names[t.folder]) for t in found):
-            known = ", ".join(dict.fromkeys(name for t in found for name in (t.code, t.series)))
-            raise InputError(f"--only {pattern}: no code or series has such a name; there are {known}.")
-    return [t for t in found if not patterns or any(matches(p, *names[t.folder]) for p in patterns)]
-
-
-def run(
-    found: list[Task], repeats: int, said: Callable[[Task, int, str], None] = lambda task, repeat, sentence: None
-) -> list[Line]:
-    """Time the tasks and judge what they found."""
-    return [judge(point) for point in run_all(found, repeats, said)]
-
-
-def judge(point: Point) -> Line:
-    """The errors of a point; none if it failed."""
-    values = point.values
-    reference = read_reference(point.task.case, values.kinematics if values else "current")
-    errors: dict[str, float] = {}
-    if point.done and values is not None:
-        for name, value in values.quantities.items():
-            error = reference.error(name, value)
-            if error is not None:
-                errors[name] = error
-        if values.profile is not None and values.side in reference.profile:
-            errors["profile"] = profile_error(values.profile, reference.profile[values.side])
-    return Line(point, errors, reference)
-
-
-def series_of(lines: list[Line], case: str) -> dict[tuple[str, str], list[Line]]:
+def series_of(lines: Sequence[Line], case: str) -> dict[tuple[str, str], list[Line]]:
     """The lines of ``case`` by code and series, each from coarse to fine, as given."""
     found: dict[tuple[str, str], list[Line]] = {}
     for line in lines:
@@ -86,42 +70,96 @@ def series_of(lines: list[Line], case: str) -> dict[tuple[str, str], list[Line]]
     return found
 
 
-def own_limit(lines: list[Line], case: str, code: str = CALCULIX) -> dict[str, Limit]:
-    """Per series of ``code``, its P extrapolated from the four finest meshes, or from three if no more were solved;
+def own_limit(lines: Sequence[Line], case: str) -> dict[str, Limit]:
+    """Per series of CalculiX, its P extrapolated from the four finest meshes, or from three if no more were solved;
     absent where one of them moves it by more than 1e-4.
 
     CalculiX's contact is a penalty: its P converges to a value that is a little smaller than that of exact contact.
     """
     found = {}
-    for (name, series), members in series_of(lines, case).items():
-        pairs = [(line.task.size, line.point.values.quantities["P"]) for line in members if _has_force(line)]
-        if name == code and len({size for size, _ in pairs}) >= 3:
-            sizes, values = zip(*sorted(pairs)[:4], strict=True)
-            limit = extrapolated(sizes, values)
+    for (code, series), members in series_of(lines, case).items():
+        pairs = [(line.task.size, line.force) for line in members if line.force is not None]
+        if code == CALCULIX and len({size for size, _ in pairs}) >= 3:
+            limit = extrapolated(*zip(*sorted(pairs)[:4], strict=True))
             if limit.error < _SCATTER * abs(limit.value):
                 found[series] = limit
     return found
 
 
-def envelopes(lines: list[Line], case: str, quantity: str = "P") -> dict[str, Pairs]:
-    """Per code the best of all its series: pairs (seconds, error), where an error counts from the mesh on from which
-    its series stays below it. "CalculiX, own limit" is CalculiX against its own extrapolated P."""
+def envelopes(lines: Sequence[Line], case: str) -> dict[str, Pairs]:
+    """Per code the best of all its series: pairs (seconds, error of P), where an error counts from the mesh on from
+    which its series stays below it. "CalculiX, own limit" is CalculiX against its own extrapolated P."""
     found: dict[str, Pairs] = {}
-    limits = own_limit(lines, case) if quantity == "P" else {}
+    limits = own_limit(lines, case)
+
+    def add(name: str, members: list[Line], errors: list[float | None]) -> None:
+        lasted = zip(members, lasting(errors), strict=True)
+        found[name] = found.get(name, []) + [(line.timing.median, e) for line, e in lasted if e is not None]
+
     for (code, series), members in series_of(lines, case).items():
-        found[code] = found.get(code, []) + _pairs(members, [line.errors.get(quantity) for line in members])
+        add(code, members, [line.errors.get("P") for line in members])
         if code == CALCULIX and series in limits:
-            name, value = f"{CALCULIX}, {OWN_LIMIT}", limits[series].value
-            forces = [line.point.values.quantities["P"] if _has_force(line) else None for line in members]
-            errors = [None if force is None else abs(force / value - 1) for force in forces]
-            found[name] = found.get(name, []) + _pairs(members, errors)
+            limit = limits[series].value
+            add(f"{CALCULIX}, own limit", members, [m.force and abs(m.force / limit - 1) for m in members])
     return {code: envelope(pairs) for code, pairs in found.items() if pairs}
 
 
-def _pairs(members: list[Line], errors: list[float | None]) -> Pairs:
-    lasted = lasting(errors)
-    return [(line.point.median, e) for line, e in zip(members, lasted, strict=True) if e is not None]
+def lasting(errors: Sequence[float | None]) -> list[float | None]:
+    """The errors of a series, coarse to fine, with each as large as any that follows on a finer mesh.
+
+    An error that happens to pass through zero on one mesh proves nothing of the method. Unknown errors stay None.
+    """
+    return [None if error is None else max(e for e in errors[k:] if e is not None) for k, error in enumerate(errors)]
 
 
-def _has_force(line: Line) -> bool:
-    return line.point.done and line.point.values is not None and "P" in line.point.values.quantities
+def envelope(pairs: Iterable[tuple[float, float]]) -> Pairs:
+    """Those of the pairs (seconds, error) that no other beats in both, in the order of their seconds."""
+    kept: Pairs = []
+    for seconds, error in sorted(pairs):
+        if not kept or error < kept[-1][1]:
+            kept.append((seconds, error))
+    return kept
+
+
+def seconds_at(error: float, kept: Pairs) -> float | None:
+    """Seconds to ``error`` along an envelope, straight in log-log; None if it does not get there.
+
+    Nothing is extrapolated: errors above that of the cheapest point cost what it costs.
+    """
+    if not kept or error < kept[-1][1]:
+        return None
+    seconds, errors = np.log([max(s, 1e-300) for s, _ in kept]), np.log([max(e, 1e-300) for _, e in kept])
+    return float(np.exp(np.interp(np.log(error), errors[::-1], seconds[::-1])))
+
+
+def warm_curves() -> list[Case]:
+    """Curves up to 2 dR, on the meshes that are good for 1e-4 (elastic) and 3e-4 (plastic) in P."""
+    elastic, plastic = edged("elastic", 0.16, growth=0.5, degree=3)[0], edged("plastic", 0.1, growth=0.3)[0]
+    return [
+        Case("elastic, 8 steps", paper_joint(steps=8, **elastic)),
+        Case("elasto-plastic, sigY/E* = 0.2 %, 20 steps", paper_joint(steps=20, yield_stress=0.002, **plastic)),
+    ]
+
+
+def warm_seconds(repeats: int, curves: Sequence[Case] = ()) -> dict[str, list[float]]:
+    """Seconds of each of the ``curves``, or of `warm_curves`, within this process, ``repeats`` times in turn, after one
+    solve of each that is not counted: what calibrations and parameter studies pay.
+
+    Meshes are kept, as in a sweep. Raises RuntimeError if one does not get to its end.
+    """
+    curves = curves or warm_curves()
+    found: dict[str, list[float]] = {case.name: [] for case in curves}
+    MESHES.capacity = 4 * len(curves)
+    try:
+        for repeat in range(repeats + 1):
+            for case in curves:
+                with tempfile.TemporaryDirectory() as folder:
+                    start = perf_counter()
+                    case.solve(Path(folder))
+                    seconds = perf_counter() - start
+                if repeat:
+                    found[case.name].append(seconds)
+    finally:
+        MESHES.capacity = 0
+        MESHES.forget()
+    return found

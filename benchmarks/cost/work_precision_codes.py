@@ -1,65 +1,131 @@
-"""The codes of the work-precision benchmark as tasks: archord, CalculiX on exported decks, and installed peers."""
+"""The codes of the work-precision benchmark as processes to be timed: archord, CalculiX on its decks, and peers."""
 
 from __future__ import annotations
 
-import importlib
 import importlib.metadata
-import importlib.util
 import json
 import math
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
+from archord.benchmarks.case import matches, slug
 from archord.benchmarks.cost.pressure_profile import interpolated
-from archord.benchmarks.cost.work_precision_cases import DECKS, SERIES, Case, DeckSeries, Mesh, Series
+from archord.benchmarks.cost.timing import LIMIT, Failure, Process, last_core
+from archord.benchmarks.cost.work_precision_cases import DECKS, SERIES, JointCase, Kinematics, Mesh, Series
 from archord.benchmarks.cost.work_precision_reference import profile_of, values_of
-from archord.benchmarks.cost.work_precision_run import LIMIT, RunFailure, Task, Values
 from archord.benchmarks.peers.calculix import read_opinion
+from archord.benchmarks.peers.installed import Peer, installed
+from archord.geometry.basis import Array
 from archord.output.history import read_history
 from archord.postprocess.deck import PlaneMesh, deck, deck_mesh
+from archord.scene.errors import InputError
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
 
 OURS, CALCULIX = "archord", "CalculiX"
-_PEERS = "archord.benchmarks.peers.installed"
 
 
-def archord_tasks(case: Case, folder: Path, limit: float = LIMIT, quick: bool = False) -> Iterator[Task]:
-    """archord's series of ``case``, with their scenes written below ``folder``."""
+@dataclass(frozen=True)
+class Values:
+    """What a code found at the last step: ``quantities`` (P/(E* R), p0/E*, eps [rad], dissipation/(E* R2)) and the
+    pressure ``profile`` ``(401,)`` over E*, of the ``side`` "pin" or "hole", or "both", their mean; what it does
+    not tell is absent."""
+
+    quantities: dict[str, float]
+    dofs: int
+    kinematics: Kinematics = "current"
+    iterations: int | None = None
+    factorisations: int | None = None
+    profile: Array | None = None
+    side: str = "hole"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task(Process):
+    """``code`` on the mesh ``label`` of a ``series`` of ``case``, to be timed; `read` gives `Values`.
+
+    ``size`` is the element size over R, ``export`` the seconds that writing its input took before.
+    """
+
+    case: str
+    code: str
+    series: str
+    label: str
+    size: float
+    steps: int
+    export: float = 0.0
+    version: str = ""
+
+    @property
+    def name(self) -> str:
+        """The code, its series and the mesh."""
+        return f"{self.code}, {self.series}, {self.label}"
+
+
+def tasks(
+    case: JointCase, folder: Path, *, quick: bool = False, peers: bool = True, limit: float = LIMIT
+) -> Iterator[Task]:
+    """All points of ``case``; what they need is written below ``folder``. CalculiX and peers where they are installed;
+    ``quick``: only one or two of each code's coarsest meshes."""
     for series in SERIES:
         if case.name in series.cases and (series.quick or not quick):
-            for mesh in series.meshes[: _quick_count(case) if quick else None]:
+            for mesh in series.meshes[: (1 if case.yield_stress else 2) if quick else None]:
                 yield _archord_task(case, series, mesh, folder, limit)
+    for series in DECKS if peers and shutil.which("ccx") else ():
+        if case.name in series.cases:
+            for mesh in series.meshes[: 1 if quick else None]:
+                yield _calculix_task(case, series, mesh, folder, limit)
+    for peer in installed() if peers else ():
+        for size, order in peer.series.get(case.name, ())[: 1 if quick else None]:
+            yield peer_task(case, peer, size, order, folder, limit)
 
 
-def _quick_count(case: Case) -> int:
-    return 1 if case.yield_stress else 2
+def chosen(found: Sequence[Task], patterns: Sequence[str]) -> list[Task]:
+    """Those whose code, series or "code, series, mesh" is one of ``patterns`` (with * and ?), or contains it; all
+    without any.
+
+    Raises `InputError` for a pattern that fits none.
+    """
+
+    def fits(task: Task, pattern: str) -> bool:
+        return matches(pattern, task.name, task.code, task.series)
+
+    for pattern in patterns:
+        if not any(fits(task, pattern) for task in found):
+            known = ", ".join(dict.fromkeys(name for t in found for name in (t.code, t.series)))
+            raise InputError(f"--only {pattern}: no code or series has such a name; there are {known}.")
+    return [task for task in found if not patterns or any(fits(task, pattern) for pattern in patterns)]
 
 
-def _archord_task(case: Case, series: Series, mesh: Mesh, folder: Path, limit: float) -> Task:
-    scene = case.scene(mesh)
-    label = f"{scene.joint.h:g} R"
-    place = (folder / slug(case.name, OURS, series.name, label)).resolve()
+def _task(case: JointCase, code: str, series: str, size: float, folder: Path, command: Sequence[str]) -> Task:
+    """The task in a folder of its own, which is made."""
+    label = f"{size:g} R"
+    place = (folder / slug(f"{case.name} {code} {series} {label}")).resolve()
     place.mkdir(parents=True, exist_ok=True)
-    (place / "input.toml").write_text(resolved(scene), encoding="utf-8")
+    named = {"case": case.name, "code": code, "series": series, "label": label, "size": size, "steps": case.steps}
+    return Task(tuple(command), place, core=last_core(), kind=(code, case.name, series), **named)
+
+
+def _archord_task(case: JointCase, series: Series, mesh: Mesh, folder: Path, limit: float) -> Task:
+    scene = case.scene(mesh)
     command = (sys.executable, "-m", "archord", "solve", "input.toml", "-o", "run", "--force", "--quiet")
+    task = _task(case, OURS, series.name, scene.joint.h, folder, command)
+    (task.folder / "input.toml").write_text(resolved(scene), encoding="utf-8")
 
     def read() -> Values:
-        run = place / "run"
+        run = task.folder / "run"
         report = json.loads((run / "run.json").read_text(encoding="utf-8"))
         if report["status"] != "done":
-            raise RunFailure(report["message"])
-        values = {name: value for name, value in values_of(run).items() if name in case.quantities}
+            raise Failure(report["message"])
         return Values(
-            values,
+            {name: value for name, value in values_of(run).items() if name in case.quantities},
             report["mesh"]["dofs"],
             scene.analysis.kinematics,
             round(sum(read_history(run / "history.csv")["iterations"])),
@@ -68,130 +134,80 @@ def _archord_task(case: Case, series: Series, mesh: Mesh, folder: Path, limit: f
             "both",
         )
 
-    return Task(
-        case.name, OURS, series.name, label, scene.joint.h, case.steps, command, place, read, limit,
-        version=importlib.metadata.version("archord"),
-    )  # fmt: skip
+    return replace(task, read=read, limit=limit, version=importlib.metadata.version("archord"))
 
 
-def calculix_tasks(case: Case, folder: Path, limit: float = LIMIT, quick: bool = False) -> Iterator[Task]:
-    """CalculiX on decks written below ``folder``; nothing where it is not installed."""
-    if shutil.which("ccx") is None:
-        return
-    for series in DECKS:
-        if case.name not in series.steps:
-            continue
-        for mesh in series.meshes[: 1 if quick else None]:
-            yield _calculix_task(case, series, mesh, folder, limit)
-
-
-def _calculix_task(case: Case, series: DeckSeries, keys: Mesh, folder: Path, limit: float) -> Task:
-    case = replace(case, steps=series.steps[case.name])
+def _calculix_task(case: JointCase, series: Series, keys: Mesh, folder: Path, limit: float) -> Task:
+    if case.name == "elastic":
+        case = replace(case, steps=series.elastic_steps)
     scene = case.scene(keys)
-    size, label = scene.joint.h, f"{scene.joint.h:g} R"
-    place = (folder / slug(case.name, CALCULIX, series.name, label)).resolve()
-    place.mkdir(parents=True, exist_ok=True)
+    task = _task(case, CALCULIX, series.name, scene.joint.h, folder, ("ccx", "joint"))
     start = perf_counter()
-    mesh = deck_mesh(scene, series.elements)
-    (place / "joint.inp").write_text(deck(scene, mesh), encoding="utf-8")
-    export = perf_counter() - start
-
-    def read() -> Values:
-        return calculix_values(case, scene, mesh, place)
-
-    results = tuple(f"joint.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d"))
-    return Task(
-        case.name, CALCULIX, series.name, label, size, case.steps, ("ccx", "joint"), place, read,
-        limit=limit, export=export, clear=results, version=_calculix_version(),
-    )  # fmt: skip
+    mesh = deck_mesh(scene, series.elements or "quadratic")
+    (task.folder / "joint.inp").write_text(deck(scene, mesh), encoding="utf-8")
+    return replace(
+        task,
+        read=lambda: calculix_values(case, scene, mesh, task.folder),
+        limit=limit,
+        export=perf_counter() - start,
+        clear=tuple(f"joint.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d")),
+        version=_calculix_version(),
+    )
 
 
 @cache
 def _calculix_version() -> str:
-    said = subprocess.run(["ccx", "-v"], capture_output=True, text=True).stdout
-    found = re.search(r"Version (\S+)", said)
+    found = re.search(r"Version (\S+)", subprocess.run(["ccx", "-v"], capture_output=True, text=True).stdout)
     return found[1] if found else ""
 
 
-def calculix_values(case: Case, scene: Scene, mesh: PlaneMesh, place: Path) -> Values:
-    """What CalculiX's result files in ``place`` say. Raises `RunFailure` if it did not reach the last step.
+def calculix_values(case: JointCase, scene: Scene, mesh: PlaneMesh, place: Path) -> Values:
+    """What CalculiX's result files in ``place`` say. Raises `Failure` if it did not reach the last step.
 
     There is no contact angle: pressures at the nodes near the edge scatter too much to find one.
     """
     try:
-        said = (place / "stdout.txt").read_text(errors="replace")
-        opinion = read_opinion(scene, mesh, place, said)
+        opinion = read_opinion(scene, mesh, place, (place / "stdout.txt").read_text(errors="replace"))
+        rows = [line.split() for line in (place / "joint.sta").read_text().splitlines()]
     except (RuntimeError, OSError) as error:
-        raise RunFailure(str(error)) from None
+        raise Failure(str(error)) from None
     values = {"P": opinion.P, "p0": opinion.p0}
     if case.yield_stress:
         # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
         values["dissipation"] = case.yield_stress * opinion.peeq_integral
-    said_iterations = _iterations(place / "joint.sta")
     return Values(
         {name: value for name, value in values.items() if math.isfinite(value)},
         2 * len(mesh.x),
-        iterations=said_iterations,
+        iterations=sum(int(row[3]) for row in rows if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()),
         profile=interpolated(opinion.angle, opinion.pressure),
         side="pin",
     )
 
 
-def _iterations(sta: Path) -> int | None:
-    """Sum of the iterations of all increments in a ``.sta`` file: its fourth column."""
-    if not sta.is_file():
-        return None
-    rows = [line.split() for line in sta.read_text().splitlines()]
-    return sum(int(row[3]) for row in rows if len(row) >= 6 and row[0].isdigit() and row[3].isdigit())
-
-
-def peer_tasks(case: Case, folder: Path, limit: float = LIMIT, quick: bool = False) -> Iterator[Task]:
-    """Every installed code of `archord.benchmarks.peers.installed`, where there is one."""
-    for peer in _installed_peers():
-        for size, order in peer.series.get(case.name, ())[: 1 if quick else None]:
-            yield _peer_task(case, peer, size, order, folder, limit)
-
-
-@cache
-def _installed_peers() -> list[Any]:
-    if importlib.util.find_spec(_PEERS) is None:
-        return []
-    return importlib.import_module(_PEERS).installed()
-
-
-def _peer_task(case: Case, peer: Any, size: float, order: int, folder: Path, limit: float) -> Task:
-    series, label = f"order {order}", f"{size:g} R"
-    place = (folder / slug(case.name, peer.label, series, label)).resolve()
-    output = place / "result.json"
-    command = tuple(map(str, peer.command(case.name, size, order, case.steps, output)))
-
-    def read() -> Values:
-        return peer_values(output)
-
-    return Task(
-        case.name, peer.label, series, label, size, case.steps, command, place, read,
-        limit=min(limit, float(peer.time_limit)), clear=(output.name,), version=peer.version,
-    )  # fmt: skip
+def peer_task(case: JointCase, peer: Peer, size: float, order: int, folder: Path, limit: float = LIMIT) -> Task:
+    """A mesh of ``peer``'s, for its own time limit or, if that is less, ``limit``."""
+    task = _task(case, peer.label, f"order {order}", size, folder, ())
+    output = task.folder / "result.json"
+    return replace(
+        task,
+        command=tuple(peer.command(case.name, size, order, case.steps, output)),
+        read=lambda: peer_values(output),
+        limit=min(limit, peer.time_limit),
+        clear=(output.name,),
+        version=peer.version,
+    )
 
 
 def peer_values(output: Path) -> Values:
     """What a peer's script wrote: {"P", "p0", "eps", "dofs", "iterations", "kinematics", "failed"}; null where it does
-    not know. Raises `RunFailure` with its own sentence, or if that is no such file."""
+    not know. Raises `Failure` with its own sentence, or if that is no such file."""
     try:
         data = json.loads(output.read_text(encoding="utf-8"))
-        failed = data.get("failed")
-        if failed:
-            raise RunFailure(str(failed))
-        values = {name: float(data[name]) for name in ("P", "p0", "eps") if data.get(name) is not None}
-        iterations = data.get("iterations")
-        return Values(values, int(data["dofs"]), data["kinematics"], None if iterations is None else int(iterations))
+        if data["failed"]:
+            raise Failure(data["failed"])
+        values = {name: float(data[name]) for name in ("P", "p0", "eps") if data[name] is not None}
+        return Values(values, data["dofs"], data["kinematics"], data["iterations"])
     except OSError:
-        raise RunFailure(f"wrote no {output.name}") from None
-    except (ValueError, KeyError, AttributeError) as error:
-        raise RunFailure(f"{output.name} is not what a peer's script writes: {error!r}") from None
-
-
-def slug(*names: str) -> str:
-    """A folder's name for a point."""
-    kept = ("".join(c if c.isalnum() or c in ".-+" else "_" for c in name) for name in names)
-    return "__".join(kept)
+        raise Failure(f"wrote no {output.name}") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise Failure(f"{output.name} is not what a peer's script writes: {error!r}") from None

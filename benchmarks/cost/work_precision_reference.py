@@ -19,26 +19,18 @@ from typing import Any
 
 import numpy as np
 
+from archord.benchmarks.case import Case
 from archord.benchmarks.cost.pressure_profile import ANGLES, profile_error, sampled, smoothed
-from archord.benchmarks.cost.work_precision_cases import CASES, Case, Kinematics, Series, families
+from archord.benchmarks.cost.work_precision_cases import CASES, JointCase, Kinematics, Series, families
 from archord.geometry.basis import Array
-from archord.output.folder import claim_folder
 from archord.output.history import read_history
-from archord.output.run import solve_scene
 from archord.postprocess.arc import SIDES, read_arcs
 from archord.postprocess.convergence import extrapolated
 from archord.postprocess.curve import read_run
 from archord.scene.errors import InputError
-from archord.scene.file import resolved
-from archord.scene.scene import Scene
 
 FILE = Path(__file__).with_name("work_precision_reference.json")
-COLUMNS = {
-    "P": "P/(E* R)",
-    "p0": "p0/E*",
-    "eps": "eps",
-    "dissipation": "plastic_dissipation/(E* R2)",
-}  # of history.csv
+COLUMNS = {"P": "P/(E* R)", "p0": "p0/E*", "eps": "eps", "dissipation": "plastic_dissipation/(E* R2)"}  # of history.csv
 _FINEST = 3  # meshes of each family whose profiles are taken
 _TERMS = {"elastic": 6, "plastic": 10}  # of the smoothed profile
 # Fixed pairs can be chosen with either side's normals, which is a difference of the order of (dR/R)^2: another code's
@@ -65,11 +57,9 @@ class Reference:
     errors: dict[str, float]
     profile: dict[str, Array]
 
-    def error(self, quantity: str, value: float | None) -> float | None:
-        """Relative error of ``value``; None if it is unknown, or the quantity has no reference."""
-        if value is None or not self.values.get(quantity):
-            return None
-        return abs(value / self.values[quantity] - 1)
+    def __contains__(self, quantity: str) -> bool:
+        """Whether there is a number to compare with."""
+        return bool(self.values.get(quantity))
 
 
 def read_reference(case: str, kinematics: Kinematics = "current") -> Reference:
@@ -112,8 +102,8 @@ def profile_of(folder: Path) -> dict[str, Array]:
 
 
 def compute(
-    case: Case, kinematics: Kinematics, folder: Path, said: Callable[[str], None] = lambda sentence: None
-) -> dict[str, Any]:
+    case: JointCase, kinematics: Kinematics, folder: Path, said: Callable[[str], None] = lambda sentence: None
+) -> None:
     """Solve both families of ``case`` below ``folder`` (what is done there already is taken) and store the result.
 
     Raises RuntimeError if a run does not get to its end.
@@ -125,9 +115,8 @@ def compute(
         entry["families"].append({"name": series.name, "runs": [r | {"folder": r["folder"].name} for r in found]})
     for quantity in COLUMNS:
         if quantity in case.quantities:
-            entry["quantities"][quantity] = combined(
-                [[(r["element_size"], r[quantity]) for r in found] for found in runs]
-            )
+            pairs = [[(r["element_size"], r[quantity]) for r in found] for found in runs]
+            entry["quantities"][quantity] = combined(pairs)
     samples = [[profile_of(r["folder"]) for r in found[-_FINEST:]] for found in runs]
     profile, apart = smooth_profile(samples, _TERMS[case.name])
     entry["quantities"]["profile"] = {"value": 0.0, "error": apart}
@@ -142,7 +131,6 @@ def compute(
     everything.setdefault(case.name, {})[kinematics] = entry
     ordered = {name: everything[name] for name in CASES if name in everything}
     FILE.write_text(_json({"angles": f"{len(ANGLES)} equal ones from 0 to pi/2", "cases": ordered}), encoding="utf-8")
-    return entry
 
 
 def smooth_profile(families: list[list[dict[str, Array]]], terms: int) -> tuple[dict[str, Array], float]:
@@ -168,39 +156,22 @@ def combined(found: list[list[tuple[float, float]]]) -> dict[str, Any]:
 
 
 def _solve(
-    case: Case, kinematics: Kinematics, series: Series, folder: Path, said: Callable[[str], None]
+    joint: JointCase, kinematics: Kinematics, series: Series, folder: Path, said: Callable[[str], None]
 ) -> list[dict[str, Any]]:
     found = []
     for mesh in series.meshes:
-        scene = case.scene(mesh, kinematics)
-        run = folder / f"{case.name}_{kinematics}_{scene.joint.h:g}_{scene.joint.growth:g}"
-        if not _finished(run, scene):
-            claim_folder(run, force=True)
-            outcome = solve_scene(scene, run)
-            if outcome.status == "interrupted":
-                raise KeyboardInterrupt
-            if outcome.status != "done":
-                raise RuntimeError(f"{run.name}: {outcome.message}")
+        scene = joint.scene(mesh, kinematics)
+        g = scene.joint
+        case = Case(f"{joint.name}_{kinematics}_{g.h:g}_{g.growth:g}", scene)
+        if not case.is_done(folder):
+            case.solve(folder)
+        run = case.folder(folder)
         report = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        values = {name: value for name, value in values_of(run).items() if name in case.quantities}
-        found.append(
-            {
-                "element_size": scene.joint.h,
-                "growth": scene.joint.growth,
-                "dofs": report["mesh"]["dofs"],
-                **values,
-                "folder": run,
-            }
-        )
-        said(f"{run.name}: {report['mesh']['dofs']} dofs, {values}, {report['seconds']['total']:.0f} s")
+        values = {name: value for name, value in values_of(run).items() if name in joint.quantities}
+        dofs = report["mesh"]["dofs"]
+        found.append({"element_size": g.h, "growth": g.growth, "dofs": dofs, **values, "folder": run})
+        said(f"{run.name}: {dofs} dofs, {values}, {report['seconds']['total']:.0f} s")
     return found
-
-
-def _finished(run: Path, scene: Scene) -> bool:
-    if not (run / "run.json").is_file() or not (run / "scene.toml").is_file():
-        return False
-    done = json.loads((run / "run.json").read_text(encoding="utf-8"))["status"] == "done"
-    return done and (run / "scene.toml").read_text(encoding="utf-8") == resolved(scene)
 
 
 def _stored() -> dict[str, dict[str, Any]]:

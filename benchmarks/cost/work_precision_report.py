@@ -1,77 +1,98 @@
-"""The lines of the work-precision benchmark as CSV and as Markdown."""
+"""The lines of the work-precision benchmark as CSV, as Markdown and as log-log diagrams."""
 
 from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from statistics import median
 
-from archord.benchmarks.cost.envelope import Pairs, seconds_at
-from archord.benchmarks.cost.work_precision import Line, envelopes, own_limit
-from archord.benchmarks.cost.work_precision_cases import CASES, QUANTITIES, Case, Kinematics
+from PIL import Image
+
+from archord.benchmarks.cost.work_precision import Line, Pairs, envelopes, own_limit, seconds_at, series_of
+from archord.benchmarks.cost.work_precision_cases import CASES, QUANTITIES, JointCase, Kinematics
 from archord.benchmarks.cost.work_precision_codes import CALCULIX, OURS
 from archord.benchmarks.cost.work_precision_reference import stored
-from archord.benchmarks.report_files import markdown_table, write_rows
+from archord.report import files
+from archord.report.figure import new_figure, save
+from archord.report.table import Table
 
 LEVELS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7)
+NAMES = {"P": "P", "p0": "p0", "eps": "contact angle", "profile": "pressure profile (L2)",
+         "dissipation": "plastic dissipation"}  # fmt: skip
 _HEADINGS = ("code", "series", "mesh", "dofs", "steps", "iterations", "factorisations", "seconds", "from - to", "MB",
              "P/(E* R)")  # fmt: skip
+_MARKERS = "os^Dvphx*"
+_COLOURS = {OURS: "tab:red", CALCULIX: "tab:blue"}
+_OTHERS = ("tab:green", "tab:purple", "tab:brown", "tab:olive", "tab:cyan", "tab:pink")
+_FLOOR = 1e-9  # an error of zero has no place on a logarithmic axis
 
 
-def row(line: Line) -> dict[str, str]:
+def write(lines: Sequence[Line], folder: Path, warm: Mapping[str, Sequence[float]] | None = None) -> list[Path]:
+    """Write work_precision.csv, with a row for every point, failed ones too, work_precision.md and a diagram for each
+    case; returns the files. ``warm`` are seconds of solves within one process."""
+    found = files.write_report(folder, "work_precision", [row(line) for line in lines], markdown(lines, warm))
+    for case in CASES.values():
+        if some := [line for line in lines if line.task.case == case.name]:
+            found.append(folder / f"work_precision_{case.name}.png")
+            draw(case, some, found[-1])
+    return found
+
+
+def row(line: Line) -> dict[str, object]:
     """The entries of a point by heading; what is not known is empty."""
-    task, point, values = line.task, line.point, line.point.values if line.point.done else None
-    timed = bool(point.seconds) and values is not None
+    task, timing, values = line.task, line.timing, line.values
+    seconds = [run.seconds for run in timing.runs] if values else []
     found = values.quantities if values else {}
-    entries = {
+    entries: dict[str, object] = {
         "case": task.case,
         "code": task.code,
         "version": task.version,
         "series": task.series,
         "label": task.label,
-        "status": "done" if point.done else "failed",
-        "dofs": str(values.dofs) if values else "",
-        "steps": str(task.steps),
-        "iterations": _whole(values.iterations if values else None),
-        "factorisations": _whole(values.factorisations if values else None),
-        "seconds median": f"{point.median:.4g}" if timed else "",
-        "seconds min": f"{min(point.seconds):.4g}" if timed else "",
-        "seconds max": f"{max(point.seconds):.4g}" if timed else "",
-        "repeats": str(len(point.seconds)),
+        "status": "done" if timing.done else "failed",
+        "dofs": values.dofs if values else "",
+        "steps": task.steps,
+        "iterations": _known(values and values.iterations),
+        "factorisations": _known(values and values.factorisations),
+        "seconds median": f"{timing.median:.4g}" if seconds else "",
+        "seconds min": f"{min(seconds):.4g}" if seconds else "",
+        "seconds max": f"{max(seconds):.4g}" if seconds else "",
+        "repeats": len(timing.runs),
         "export seconds": f"{task.export:.3g}" if task.export else "",
-        "memory [MB]": f"{point.memory / 1e6:.0f}" if timed else "",
+        "memory [MB]": f"{max(run.memory for run in timing.runs) / 1e6:.0f}" if seconds else "",
         "kinematics": values.kinematics if values else "",
     }
+    known, errors = line.errors, line.reference.errors
+    entries |= {name: f"{found[name]:.10g}" if name in found else "" for name in QUANTITIES if name != "profile"}
+    entries |= {f"error of {name}": f"{known[name]:.3e}" if name in known else "" for name in QUANTITIES}
     for name in QUANTITIES:
-        if name != "profile":
-            entries[name] = f"{found[name]:.10g}" if name in found else ""
-    for name in QUANTITIES:
-        entries[f"error of {name}"] = f"{line.errors[name]:.3e}" if name in line.errors else ""
-    for name in QUANTITIES:
-        known = name in line.errors and name in line.reference.errors
-        entries[f"reference's error of {name}"] = f"{line.reference.errors[name]:.1e}" if known else ""
-    return entries | {"message": point.failure}
+        entries[f"reference's error of {name}"] = f"{errors[name]:.1e}" if name in known and name in errors else ""
+    return entries | {"message": timing.failure}
 
 
-def write_csv(lines: list[Line], path: Path) -> None:
-    """Write a row for every point, failed ones too."""
-    write_rows([row(line) for line in lines], path)
+def _known(value: int | None) -> object:
+    return "" if value is None else value
 
 
-def markdown(lines: list[Line], warm: Mapping[str, Sequence[float]] | None = None) -> str:
-    """Tables of the points and of the ratios, case by case; ``warm`` are seconds of solves within one process."""
-    repeats = max(len(line.point.seconds) for line in lines)
+def markdown(lines: Sequence[Line], warm: Mapping[str, Sequence[float]] | None = None) -> str:
+    """Tables of the points and of the ratios, case by case."""
+    repeats = max(len(line.timing.runs) for line in lines)
     codes = dict.fromkeys(f"{line.task.code} {line.task.version}".strip() for line in lines)
     processes = f"{repeats} whole process{'es' * (repeats != 1)}"
-    out = [f"{processor()}, one core, one thread; median of {processes}; {', '.join(codes)}."]
+    parts = [f"{processor()}, one core, one thread; median of {processes}; {', '.join(codes)}.\n"]
     for case in CASES.values():
-        some = [line for line in lines if line.task.case == case.name]
-        if some:
-            out += ["", f"**{case.title}**", "", *_table(case, some), *_notes(case, some)]
-            out += ["", *ratio_table(envelopes(some, case.name))]
+        if some := [line for line in lines if line.task.case == case.name]:
+            parts += [f"**{case.title}**\n", _table(case, some), *_notes(case, some)]
+            parts += ratio_table(envelopes(some, case.name))
     if warm:
-        out += ["", *_warm_table(warm)]
-    return "\n".join([*out, ""])
+        rows = [
+            (name, f"{median(seconds):.3g}", f"{min(seconds):.3g} - {max(seconds):.3g}", len(seconds))
+            for name, seconds in warm.items()
+        ]
+        table = Table("curve", "seconds, median", "from - to", "solves", rows=rows)
+        parts += ["**within one process, after a first solve**\n", table.markdown()]
+    return "\n".join(parts)
 
 
 def processor() -> str:
@@ -83,30 +104,41 @@ def processor() -> str:
         return platform.processor() or platform.machine()
 
 
-def reference_table(cases: Sequence[Case], kinematics: Sequence[Kinematics] = ("current", "reference")) -> list[str]:
-    """The reference values, what they are known to, and the two extrapolations that they come from."""
-    headings = ("case", "kinematics", "quantity", "value", "relative error", "first family", "second family")
-    rows = []
-    for case in cases:
-        for way in kinematics:
-            entry = stored(case.name, way)
-            sizes = [", ".join(f"{run['element_size']:g}" for run in family["runs"]) for family in entry["families"]]
-            for name, found in entry["quantities"].items():
-                cells = [
-                    case.name,
-                    way,
-                    name,
-                    f"{found['value']:.9g}" if found["value"] else "",
-                    f"{found['error']:.1e}",
-                ]
-                for limit, family, listed in zip(
-                    found.get("extrapolations", (None, None)), entry["families"], sizes, strict=True
-                ):
-                    cells.append(
-                        f"{limit['value']:.9g} (order {limit['order']:.1f})" if limit else f"{family['name']}: {listed}"
-                    )
-                rows.append(cells)
-    return markdown_table(headings, rows)
+def _table(case: JointCase, lines: Sequence[Line]) -> str:
+    table = Table(*_HEADINGS, *(f"error of {name}" for name in case.quantities))
+    for line in lines:
+        e = row(line)
+        cells = [e["code"], e["series"], e["label"]]
+        if line.timing.failure:
+            cells += [f"failed: {line.timing.failure}"] + [""] * (len(table.headings) - 4)
+        else:
+            cells += [e["dofs"], e["steps"], e["iterations"], e["factorisations"], e["seconds median"]]
+            cells += [f"{e['seconds min']} - {e['seconds max']}", e["memory [MB]"]]
+            cells += ["" if line.force is None else f"{line.force:.8f}"]
+            cells += [f"{line.errors[name]:.1e}" if name in line.errors else "" for name in case.quantities]
+        table.add(*cells)
+    return table.markdown()
+
+
+def _notes(case: JointCase, lines: Sequence[Line]) -> list[str]:
+    """What the errors are against, and what CalculiX's own limit and its decks' export are."""
+    out = []
+    for kinematics, r in {line.values.kinematics: line.reference for line in lines if line.values}.items():
+        values = ", ".join(
+            (f"{name} = {r.values[name]:.9g}" if name != "profile" else name) + f" (known to {r.errors[name]:.0e})"
+            for name in case.quantities
+            if name in r.errors
+        )
+        out.append(f"Errors of codes with `{kinematics}` kinematics are against {values}.\n")
+    for series, limit in own_limit(lines, case.name).items():
+        out.append(
+            f"{CALCULIX}'s {series} extrapolates to P = {limit.value:.8f} by itself, with order {limit.order:.1f} "
+            f"(moves by {limit.error:.0e} if a mesh is left out); its penalty is part of that.\n"
+        )
+    exports = [line.task.export for line in lines if line.task.export]
+    if exports:
+        out.append(f"Meshing and writing a deck took {min(exports):.1f} to {max(exports):.1f} s more, not counted.\n")
+    return out
 
 
 def ratio_table(kept: Mapping[str, Pairs]) -> list[str]:
@@ -114,78 +146,83 @@ def ratio_table(kept: Mapping[str, Pairs]) -> list[str]:
     others = [code for code in kept if code != OURS]
     if OURS not in kept or not others:
         return []
-    ours = kept[OURS]
-    rows = []
+
+    def cell(theirs: float | None, ours: float | None) -> str:
+        if theirs is None:
+            return "never"
+        return f"takes {theirs / ours:.2g} times as long" if ours else f"{theirs:.1f} s"
+
+    table = Table("error of P", f"{OURS} [s]", *others)
     for level in LEVELS:
-        mine = seconds_at(level, ours)
-        times = [seconds_at(level, kept[code]) for code in others]
-        if mine is not None or any(time is not None for time in times):
-            cells = [_times(time, mine) for time in times]
-            rows.append([f"{level:g}", f"{mine:.2f}" if mine else "never", *cells])
-    reached = [f"{code} {kept[code][-1][1]:.1e}" for code in (OURS, *others)]
-    table = markdown_table(("error of P", f"{OURS} [s]", *others), rows)
-    return [*table, "", f"Smallest errors of P reached: {', '.join(reached)}."]
+        mine, times = seconds_at(level, kept[OURS]), [seconds_at(level, kept[code]) for code in others]
+        if any(time is not None for time in (mine, *times)):
+            table.add(f"{level:g}", f"{mine:.2f}" if mine else "never", *(cell(time, mine) for time in times))
+    reached = ", ".join(f"{code} {kept[code][-1][1]:.1e}" for code in (OURS, *others))
+    return [table.markdown(), f"Smallest errors of P reached: {reached}.\n"]
 
 
-def _times(theirs: float | None, ours: float | None) -> str:
-    if theirs is None:
-        return "never"
-    return f"takes {theirs / ours:.2g} times as long" if ours else f"{theirs:.1f} s"
+def reference_table(cases: Sequence[JointCase], kinematics: Sequence[Kinematics] = ("current", "reference")) -> Table:
+    """The reference values, what they are known to, and the two extrapolations that they come from."""
+    table = Table("case", "kinematics", "quantity", "value", "relative error", "first family", "second family")
+    for case, way in ((case, way) for case in cases for way in kinematics):
+        entry = stored(case.name, way)
+        for name, found in entry["quantities"].items():
+            if "extrapolations" in found:
+                limits = [f"{limit['value']:.9g} (order {limit['order']:.1f})" for limit in found["extrapolations"]]
+            else:
+                sizes = (", ".join(f"{run['element_size']:g}" for run in f["runs"]) for f in entry["families"])
+                limits = [f"{f['name']}: {listed}" for f, listed in zip(entry["families"], sizes, strict=True)]
+            value = f"{found['value']:.9g}" if found["value"] else ""
+            table.add(case.name, way, name, value, f"{found['error']:.1e}", *limits)
+    return table
 
 
-def _table(case: Case, lines: list[Line]) -> list[str]:
-    shown = case.quantities
-    headings = [*_HEADINGS, *(f"error of {name}" for name in shown)]
-    rows = []
-    for line in lines:
-        e = row(line)
-        cells = [e["code"], e["series"], e["label"]]
-        if line.point.failure:
-            cells += [f"failed: {line.point.failure}"] + [""] * (len(headings) - 4)
-        else:
-            spread = f"{e['seconds min']} - {e['seconds max']}"
-            cells += [e["dofs"], e["steps"], e["iterations"], e["factorisations"], e["seconds median"], spread]
-            cells += [e["memory [MB]"], f"{line.point.values.quantities['P']:.8f}" if line.point.values else ""]
-            cells += [f"{line.errors[name]:.1e}" if name in line.errors else "" for name in shown]
-        rows.append(cells)
-    return markdown_table(headings, rows)
+def draw(case: JointCase, lines: Sequence[Line], path: Path) -> None:
+    """Draw the diagram of ``case``: P above, the other quantities below; grey is what the reference does not know."""
+    others = [name for name in case.quantities if name != "P"]
+    figure = new_figure(4.1 * max(len(others), 3), 11.5)
+    top, bottom = figure.subfigures(2, 1, height_ratios=(1.15, 1.6))
+    above = top.subplots(1, 2)
+    below = bottom.subplots(2, len(others), sharey="col", squeeze=False)
+    styles = _styles(lines, case.name)
+    for k, against in enumerate(("seconds", "dofs")):
+        for ax, name in ((above[k], "P"), *zip(below[k], others, strict=True)):
+            _panel(ax, lines, case, name, against, styles)
+    handles, labels = above[0].get_legend_handles_labels()
+    top.legend(handles, labels, loc="outside upper center", ncols=4, fontsize=8, frameon=False, title=case.title)
+    save(figure, path, dots=80)
+    # a palette makes the file a third as large as matplotlib's own
+    Image.open(path).convert("RGB").quantize(64).save(path, optimize=True)
 
 
-def _notes(case: Case, lines: list[Line]) -> list[str]:
-    """What the errors are against, and what CalculiX's own limit and its decks' export are."""
-    out = []
-    references = {
-        line.point.values.kinematics: line.reference for line in lines if line.point.done and line.point.values
-    }
-    for kinematics, reference in references.items():
-        values = ", ".join(
-            (f"{name} = {reference.values[name]:.9g}" if name != "profile" else name)
-            + f" (known to {reference.errors[name]:.0e})"
-            for name in case.quantities
-            if name in reference.errors
-        )
-        out.append(f"Errors of codes with `{kinematics}` kinematics are against {values}.")
-    for series, limit in own_limit(lines, case.name).items():
-        out.append(
-            f"{CALCULIX}'s {series} extrapolates to P = {limit.value:.8f} by itself, with order {limit.order:.1f} "
-            f"(moves by {limit.error:.0e} if a mesh is left out); its penalty is part of that."
-        )
-    exports = [line.task.export for line in lines if line.task.export]
-    if exports:
-        out.append(f"Meshing and writing a deck took {min(exports):.1f} to {max(exports):.1f} s more, not counted.")
-    return ["", *(part for sentence in out for part in (sentence, ""))][:-1]
+def _styles(lines: Sequence[Line], case: str) -> dict[tuple[str, str], dict]:
+    """A colour for each code, a marker for each of its series."""
+    styles: dict[tuple[str, str], dict] = {}
+    count: dict[str, int] = {}
+    colours, strangers = dict(_COLOURS), iter(_OTHERS * 4)
+    for code, series in series_of(lines, case):
+        if code not in colours:
+            colours[code] = next(strangers)
+        k = count[code] = count.get(code, -1) + 1
+        styles[code, series] = {
+            "color": colours[code], "marker": _MARKERS[k % len(_MARKERS)], "markersize": 5, "linewidth": 1.1,
+            "linestyle": ("-", "--", ":", "-.")[k % 4], "label": f"{code}, {series}",
+        }  # fmt: skip
+    return styles
 
 
-def _warm_table(warm: Mapping[str, Sequence[float]]) -> list[str]:
-    from statistics import median
-
-    rows = [
-        (name, f"{median(seconds):.3g}", f"{min(seconds):.3g} - {max(seconds):.3g}", len(seconds))
-        for name, seconds in warm.items()
-    ]
-    table = markdown_table(("curve", "seconds, median", "from - to", "solves"), rows)
-    return ["**within one process, after a first solve**", "", *table]
-
-
-def _whole(value: int | None) -> str:
-    return "" if value is None else str(value)
+def _panel(ax, lines: Sequence[Line], case: JointCase, quantity: str, against: str, styles: dict) -> None:
+    for key, members in series_of(lines, case.name).items():
+        known = [line for line in members if line.values and quantity in line.errors]
+        if known or quantity == "P":
+            x = [line.timing.median if against == "seconds" else line.values.dofs for line in known if line.values]
+            ax.loglog(x, [max(line.errors[quantity], _FLOOR) for line in known], **styles[key])
+    unknown = max((line.reference.errors.get(quantity, 0.0) for line in lines if line.timing.done), default=0.0)
+    if unknown:
+        bottom = min(ax.get_ylim()[0], unknown / 2)
+        ax.axhspan(bottom, unknown, color="0.9", zorder=0)
+        ax.set_ylim(bottom=bottom)
+    ax.set_xlabel("wall time of the whole process [s]" if against == "seconds" else "degrees of freedom", fontsize=8)
+    ax.set_title(f"relative error of {NAMES[quantity]}", fontsize=9)
+    ax.tick_params(labelsize=7, which="both")
+    ax.grid(True, which="major", linewidth=0.4)

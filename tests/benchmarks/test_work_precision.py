@@ -1,4 +1,4 @@
-"""The work-precision benchmark: extrapolation, errors, envelopes, timed processes, and its command."""
+"""The work-precision benchmark: reference values, errors, envelopes, the codes' results, and its command."""
 
 import csv
 import json
@@ -10,16 +10,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from archord.benchmarks.case import Case
 from archord.benchmarks.cost import work_precision_codes as codes
 from archord.benchmarks.cost import work_precision_reference
-from archord.benchmarks.cost.envelope import envelope, lasting, seconds_at
 from archord.benchmarks.cost.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
-from archord.benchmarks.cost.work_precision import Line, chosen, envelopes, judge, own_limit
+from archord.benchmarks.cost.timing import Failure, Run, Timing, time_all
+from archord.benchmarks.cost.work_precision import (
+    Line,
+    envelope,
+    envelopes,
+    judge,
+    lasting,
+    own_limit,
+    seconds_at,
+    warm_curves,
+    warm_seconds,
+)
 from archord.benchmarks.cost.work_precision_cases import CASES, DECKS, SERIES, Series, chosen_cases, families, scaled
+from archord.benchmarks.cost.work_precision_codes import Task, Values
 from archord.benchmarks.cost.work_precision_reference import combined, read_reference, smooth_profile
 from archord.benchmarks.cost.work_precision_report import markdown, ratio_table, reference_table, row
-from archord.benchmarks.cost.work_precision_run import Point, RunFailure, Task, Values, run_all, run_once
-from archord.benchmarks.cost.work_precision_warm import curves, warm_seconds
 from archord.cli import run
 from archord.scene.errors import InputError
 from tests.postprocess.synthetic import arc
@@ -27,16 +37,16 @@ from tests.postprocess.synthetic import arc
 pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="it starts processes of one rank")
 
 
-def task(folder, *command, limit=30.0, read=lambda: Values({"P": 1.0}, 10), **names):
+def task(folder=".", *command, **names):
     given = {"case": "elastic", "code": "archord", "series": "s", "label": "0.1 R", "size": 0.1, "steps": 2} | names
-    return Task(**given, command=command, folder=Path(folder), read=read, limit=limit)
+    return Task(command or ("true",), Path(folder), **given)
 
 
-def point(code, series, size, seconds, P, **values):
+def line(code, series, size, seconds, P, **values):
     """A point that was run once and found this P."""
     found = Values({"P": P}, round(100 / size), **values)
-    made = task(".", code=code, series=series, size=size, label=f"{size:g} R")
-    return judge(Point(made, [seconds], 10**8, found))
+    made = task(code=code, series=series, size=size, label=f"{size:g} R")
+    return judge(Timing(made, [Run(seconds, seconds, 10**8, found)]))
 
 
 # --- extrapolation
@@ -117,8 +127,8 @@ def test_ratios_of_synthetic_codes():
 def test_errors_and_ratios_of_lines():
     """Errors are against the reference of the code's kinematics; CalculiX is compared with its own limit, too."""
     exact = read_reference("elastic").values["P"]
-    ours = [point("archord", "s", h, 0.1 / h, exact * (1 + h**2)) for h in (0.1, 0.03, 0.01)]
-    theirs = [point("CalculiX", "CPE6", h, 10 / h, exact * (0.999 + h**2)) for h in (0.1, 0.03, 0.01)]
+    ours = [line("archord", "s", h, 0.1 / h, exact * (1 + h**2)) for h in (0.1, 0.03, 0.01)]
+    theirs = [line("CalculiX", "CPE6", h, 10 / h, exact * (0.999 + h**2)) for h in (0.1, 0.03, 0.01)]
     assert ours[0].errors["P"] == pytest.approx(0.01)
     assert own_limit(theirs, "elastic")["CPE6"].value == pytest.approx(0.999 * exact, rel=1e-6)
     kept = envelopes(ours + theirs, "elastic")
@@ -126,9 +136,9 @@ def test_errors_and_ratios_of_lines():
     assert seconds_at(1e-3, kept["CalculiX, own limit"]) == pytest.approx(
         100 * (seconds_at(1e-3, kept["archord"]) or 0), rel=1e-2
     )
-    scattered = [*theirs, point("CalculiX", "CPE6", 0.02, 500.0, 0.99 * exact)]
+    scattered = [*theirs, line("CalculiX", "CPE6", 0.02, 500.0, 0.99 * exact)]
     assert own_limit(scattered, "elastic") == {}
-    other = point("peer", "p", 0.1, 1.0, exact, kinematics="reference")
+    other = line("peer", "p", 0.1, 1.0, exact, kinematics="reference")
     assert other.errors["P"] == pytest.approx(abs(exact / read_reference("elastic", "reference").values["P"] - 1))
     assert "takes 1" in markdown(ours + theirs)
 
@@ -158,7 +168,7 @@ def test_a_reference_is_computed_stored_and_read(tmp_path, monkeypatch):
     work_precision_reference.compute(case, "current", tmp_path, said.append)
     assert len(said) == 6
     found = read_reference("elastic")
-    assert "| elastic | current | P | 0.012" in "\n".join(reference_table([case], ["current"]))
+    assert "| elastic | current | P | 0.012" in reference_table([case], ["current"]).markdown()
     assert found.values["P"] == pytest.approx(0.01278, rel=0.02)
     assert 0 < found.errors["P"] < 0.02
     force = 2 * np.trapezoid(found.profile["pin"] * np.cos(ANGLES), ANGLES)
@@ -167,7 +177,7 @@ def test_a_reference_is_computed_stored_and_read(tmp_path, monkeypatch):
     def solved(*arguments):
         raise AssertionError("solved again")
 
-    monkeypatch.setattr(work_precision_reference, "solve_scene", solved)
+    monkeypatch.setattr(Case, "solve", solved)
     work_precision_reference.compute(case, "current", tmp_path)
     with pytest.raises(AssertionError, match="again"):
         work_precision_reference.compute(case, "reference", tmp_path)
@@ -191,76 +201,19 @@ def test_every_series_makes_scenes():
     assert [c.name for c in chosen_cases("both")] == ["elastic", "plastic"]
 
 
-# --- processes
+# --- codes
 
 
-def test_a_process_is_timed_from_outside(tmp_path):
-    """Its sleep, its memory but not its parent's, one core, one thread."""
-    code = (
-        "import os, json, time; a = bytearray(60_000_000); time.sleep(0.2); "
-        "json.dump([len(os.sched_getaffinity(0)), os.environ['OMP_NUM_THREADS']], open('said.json', 'w'))"
-    )
-    core = max(os.sched_getaffinity(0))
-    seconds, memory, values = run_once(task(tmp_path, sys.executable, "-S", "-c", code), core)
-    assert 0.2 < seconds < 5
-    assert 60e6 < memory < 110e6
-    assert values.dofs == 10
-    assert json.loads((tmp_path / "said.json").read_text()) == [1, "1"]
-
-
-def test_failures_are_recorded_with_their_sentence(tmp_path):
-    """A crash, a process that takes too long, a command that is not there and a result that cannot be read: one point
-    each, not tried again, in the tables."""
-
-    def unread():
-        raise RunFailure("no result")
-
-    said = []
-    ok = task(tmp_path / "a", "true", label="ok")
-    bad = [
-        task(tmp_path / "b", sys.executable, "-S", "-c", "import sys; sys.exit('it broke')", label="crash"),
-        task(tmp_path / "c", "sleep", "60", limit=0.2, label="late"),
-        task(tmp_path / "d", "no-such-program", label="absent"),
-        task(tmp_path / "e", "true", read=unread, label="unread"),
+def test_failures_are_in_the_tables_with_their_sentence():
+    """Beside what was solved, from which CSV and Markdown take their numbers."""
+    lines = [
+        line("archord", "s", 0.1, 2.0, 0.0128),
+        judge(Timing(task(label="crash"), [], "it broke")),
     ]
-    points = run_all([ok, *bad], 2, lambda t, repeat, sentence: said.append((t.label, repeat)))
-    assert [p.done for p in points] == [True] + 4 * [False]
-    assert [p.failure for p in points[1:3]] == ["it broke", "more than the 0.2 s allowed"]
-    assert "no-such-program" in points[3].failure
-    assert points[4].failure == "no result"
-    assert said == [("ok", 0), ("ok", 1), *((t.label, 1) for t in bad), ("ok", 2)]
-    lines = [judge(p) for p in points]
-    assert [row(line)["status"] for line in lines] == ["done"] + 4 * ["failed"]
+    assert [row(found)["status"] for found in lines] == ["done", "failed"]
     assert row(lines[1])["message"] == "it broke"
+    assert row(lines[0])["seconds median"] == "2"
     assert "| crash | failed: it broke |" in markdown(lines)
-    assert len(points[0].seconds) == 2
-
-
-def test_repeats_are_interleaved(tmp_path):
-    """Round robin, after one untimed run of each series."""
-    said = []
-    tasks = [task(tmp_path / n, "true", series=n[0], label=n) for n in ("a1", "a2", "b1")]
-    run_all(tasks, 2, lambda t, repeat, sentence: said.append(f"{t.label}:{repeat}"))
-    assert " ".join(said) == "a1:0 b1:0 a1:1 a2:1 b1:1 a1:2 a2:2 b1:2"
-
-
-def test_what_was_timed_before_an_interruption_is_kept(tmp_path):
-    """Ctrl-C in the second repetition leaves a table; before anything was timed it ends the benchmark."""
-    tasks = [task(tmp_path / n, "true", label=n) for n in ("a", "b", "c")]
-
-    def interrupted(when):
-        def said(t, repeat, sentence):
-            if (t.label, repeat) == when:
-                raise KeyboardInterrupt
-
-        return said
-
-    points = run_all(tasks, 3, interrupted(("b", 1)))
-    assert [len(p.seconds) for p in points] == [1, 1, 0]
-    assert "| c | failed: interrupted before its first run |" in markdown([judge(p) for p in points])
-    assert [len(p.seconds) for p in run_all(tasks, 3, interrupted(("a", 2)))] == [2, 1, 1]
-    with pytest.raises(KeyboardInterrupt):
-        run_all(tasks, 3, interrupted(("a", 0)))
 
 
 def test_the_result_of_a_peer(tmp_path):
@@ -276,10 +229,10 @@ def test_the_result_of_a_peer(tmp_path):
         ("{}", "is not what"),
     ):
         file.write_text(text)
-        with pytest.raises(RunFailure, match=said):
+        with pytest.raises(Failure, match=said):
             codes.peer_values(file)
     file.unlink()
-    with pytest.raises(RunFailure, match=r"wrote no result\.json"):
+    with pytest.raises(Failure, match=r"wrote no result\.json"):
         codes.peer_values(file)
 
 
@@ -292,22 +245,25 @@ def test_peers_are_run_if_there_are_any(tmp_path, monkeypatch):
 
         def command(self, case, size, order, steps, output):
             result = {"P": size * order, "dofs": steps, "kinematics": "reference"}
+            result |= dict.fromkeys(("p0", "eps", "iterations", "failed"))
             text = f"open({str(output)!r}, 'w').write({json.dumps(json.dumps(result))})"
             return [sys.executable, "-S", "-c", text]
 
-    monkeypatch.setattr(codes, "_installed_peers", lambda: [Peer()])
+    monkeypatch.setattr(codes, "installed", lambda: [Peer()])
+    monkeypatch.setattr(codes, "SERIES", ())
+    monkeypatch.setenv("PATH", "")
     elastic, plastic = CASES["elastic"], CASES["plastic"]
-    tasks = list(codes.peer_tasks(elastic, tmp_path, limit=10.0))
+    tasks = list(codes.tasks(elastic, tmp_path, limit=10.0))
     assert [(t.code, t.version, t.series, t.label, t.limit) for t in tasks] == [
         ("other", "1.2", "order 2", "0.2 R", 10.0),
         ("other", "1.2", "order 4", "0.1 R", 10.0),
     ]
-    assert list(codes.peer_tasks(plastic, tmp_path)) == []
-    assert len(list(codes.peer_tasks(elastic, tmp_path, quick=True))) == 1
-    points = run_all(tasks, 1)
-    assert [p.values.quantities["P"] for p in points if p.values] == [0.4, 0.4]
-    monkeypatch.setattr(codes, "_installed_peers", list)
-    assert list(codes.peer_tasks(elastic, tmp_path)) == []
+    assert list(codes.tasks(plastic, tmp_path)) == []
+    assert len(list(codes.tasks(elastic, tmp_path, quick=True))) == 1
+    assert [t.runs[0].result.quantities["P"] for t in time_all(tasks, 1)] == [0.4, 0.4]
+    assert list(codes.tasks(elastic, tmp_path, peers=False)) == []
+    monkeypatch.setattr(codes, "installed", list)
+    assert list(codes.tasks(elastic, tmp_path)) == []
 
 
 # --- the command
@@ -342,19 +298,17 @@ def test_wrong_options(tmp_path, capsys):
 
 
 def test_patterns_choose_codes_series_and_meshes(tmp_path):
-    tasks = [
-        task(tmp_path / c / m, "true", code=c, label=m) for c in ("archord", "CalculiX") for m in ("0.1 R", "0.2 R")
-    ]
-    assert chosen(tasks, []) == tasks
-    assert chosen(tasks, ["calculix"]) == tasks[2:]
-    assert chosen(tasks, ["archord*0.2 R"]) == tasks[1:2]
-    assert chosen(tasks, ["CalculiX, s, 0.1 R", "archord"]) == tasks[:3]
+    tasks = [task(tmp_path / c / m, code=c, label=m) for c in ("archord", "CalculiX") for m in ("0.1 R", "0.2 R")]
+    assert codes.chosen(tasks, []) == tasks
+    assert codes.chosen(tasks, ["calculix"]) == tasks[2:]
+    assert codes.chosen(tasks, ["archord*0.2 R"]) == tasks[1:2]
+    assert codes.chosen(tasks, ["CalculiX, s, 0.1 R", "archord"]) == tasks[:3]
 
 
 def test_warm_solves_are_counted_without_the_first():
     """As many seconds as repeats for each curve; those of the benchmark have 8 and 20 steps."""
-    assert [len(scene.targets) for scene in curves().values()] == [8, 20]
-    found = warm_seconds(2, {"coarse": CASES["elastic"].scene(SERIES[0].meshes[0])})
+    assert [len(scene.targets) for scene in (case.scene for case in warm_curves())] == [8, 20]
+    found = warm_seconds(2, [Case("coarse", CASES["elastic"].scene(SERIES[0].meshes[0]))])
     assert len(found["coarse"]) == 2
     assert min(found["coarse"]) > 0.01
-    assert "| coarse |" in markdown([Line(Point(task(".")), {}, read_reference("elastic"))], found)
+    assert "| coarse |" in markdown([Line(Timing(task()), {}, read_reference("elastic"))], found)
