@@ -20,17 +20,17 @@ class Pair:
     ``share`` of the contact's virtual work is integrated here. Unless the pair ``moves``, points keep the partners of
     the undeformed surfaces. Tractions are in the frame of the ``law``. Raises `ProjectionError`.
 
-    ``projection`` are the partners, ``separation`` ``x - y`` ``(m, 2)``, ``gap`` and ``slip`` ``(m,)`` its components,
-    ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` those of the own material, ``trial``, ``traction``
-    ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active`` ``(m,)`` points touch, and ``changes`` are
-    how many opened or closed.
+    ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)`` normal and tangent
+    and ``opening`` ``(m, 2)`` gap and slip; ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` are those of the
+    own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active``
+    ``(m,)`` points touch, and ``changes`` are how many opened or closed.
     """
 
     def __init__(
         self, surface: Surface, opposite: Surface | RigidSurface, law: ContactLaw, share: float, *, moves: bool
     ) -> None:
         self.surface, self.opposite, self.law, self.share, self.moves = surface, opposite, law, share, moves
-        self._kernels = library(Path(__file__).with_name("contact_points.c"))
+        self._kernels = library(Path(__file__).with_name("contact_forces.c"))
         self._unit_gamma = np.repeat(share * surface.gamma, surface.weight.shape[1])
         x, self._outward = surface.point.reshape(-1, 2), surface.outward.reshape(-1, 2)
         self.projection = opposite.curve.closest_point(x, self._outward, np.zeros_like(opposite.curve.X))
@@ -70,11 +70,12 @@ class Pair:
             opening = displacement - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
             if self.law.slides:
                 opening += self.separation
-        m = len(stress)
-        self.stress_vector, self.trial = np.empty((m, 2)), np.empty((m, 2))
-        self.gap, self.slip = np.empty(m), np.empty(m)
-        given = stress, self._outward, opening, self.projection.normal, self.gamma
-        self._kernels.trial_traction(m, *map(pointer, (*given, self.stress_vector, self.gap, self.slip, self.trial)))
+        N, n = self._outward, self.projection.normal
+        s_x, s_y = stress[:, [0, 3]], stress[:, [3, 1]]
+        self.stress_vector = np.stack([(s_x * N).sum(1), (s_y * N).sum(1)], axis=1)
+        self.frame = np.stack([n[:, 0], n[:, 1], -n[:, 1], n[:, 0]], axis=1).reshape(-1, 2, 2)
+        self.opening = np.einsum("mij,mj->mi", self.frame, opening)
+        self.trial = np.einsum("mij,mj->mi", self.frame, self.stress_vector) - self.gamma[:, None] * self.opening
         self.traction = self._answer(self.trial)
 
     def _pair(self, x: Array, motion: Array) -> None:
@@ -88,7 +89,7 @@ class Pair:
 
     def _answer(self, trial: Array) -> Array:
         """Traction of the law, none at points without a partner; its derivative and the active points are kept."""
-        traction, self.derivative = self.points.update(self.gap, self.slip, trial)
+        traction, self.derivative = self.points.update(*self.opening.T, trial)
         lone = ~self.projection.found
         if lone.any():
             traction = np.where(lone[:, None], 0.0, traction)
@@ -105,14 +106,14 @@ class Pair:
     @property
     def distance(self) -> Array:
         """Distance ``(m,)`` from the partners along their normals, positive when open."""
-        return self.gap if self.law.slides else self.gap + (self.separation * self.projection.normal).sum(1)
+        gap = self.opening[:, 0]
+        return gap if self.law.slides else gap + (self.separation * self.projection.normal).sum(1)
 
     @property
     def forces(self) -> Array:
         """Weighted contact force ``(m, 2)`` of each point on its own body."""
-        w, n = self.share * self.surface.weight.ravel(), self.projection.normal
-        pressure, shear = w * self.traction[:, 0], w * self.traction[:, 1]
-        return pressure[:, None] * n + shear[:, None] * np.stack([-n[:, 1], n[:, 0]], axis=1)
+        w = self.share * self.surface.weight.ravel()
+        return np.einsum("m,mi,mij->mj", w, self.traction, self.frame)
 
     def add_forces(self, own: Array, opposite: Array) -> None:
         """Add the forces on the nodes of the own surface to ``own`` ``(nodes, 2)``, their reactions to ``opposite``."""

@@ -8,7 +8,6 @@ cells it owns. What a facet needs of its own cell stays local.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import basix
 import numpy as np
@@ -44,8 +43,12 @@ class Surface:
         # closure order is vertex, vertex, interior; along the facet the interior nodes come between the vertices
         along = [[c[0], *c[2:], c[1]] for c in closure]
         trace = np.array([along[k] for k in local_facets], dtype=np.int64).reshape(-1, self.degree + 1)
-        flipped = self._runs_clockwise(cells, local_facets)
-        trace[flipped] = trace[flipped, ::-1]
+        corners = basix.geometry(basix.CellType.triangle)
+        ends = corners[np.array(basix.topology(basix.CellType.triangle)[1])[local_facets]]
+        # the second of basix' edges runs clockwise, the others do not, and a mirrored cell turns all of them
+        mirrored = cell_basis(mesh, self.degree, cells, corners.mean(axis=0)[None]).determinant[:, 0] < 0
+        clockwise = (local_facets == 1) != mirrored
+        trace[clockwise], ends[clockwise] = trace[clockwise, ::-1], ends[clockwise, ::-1]
 
         cell_dofs = V.dofmap.list[cells].astype(np.int64)
         global_dofs = index_map.local_to_global(cell_dofs.ravel().astype(np.int32)).reshape(cell_dofs.shape)
@@ -71,8 +74,7 @@ class Surface:
         self.cell_dofs = cell_dofs[sort].astype(np.int32)
         self.cell_global = global_dofs[sort]
         self.trace = trace[sort].astype(np.int32)
-        self._flipped = flipped[sort]
-        self._local_facet = local_facets[sort]
+        self._ends = ends[sort]
         owned = self.curve_dofs - index_map.local_range[0]
         self._owned = np.flatnonzero((owned >= 0) & (owned < index_map.size_local))
         self._owned_local = owned[self._owned]
@@ -93,30 +95,19 @@ class Surface:
         """Arc length ``(n_facets,)`` of every facet, over all ranks."""
         return np.diff(self.curve.arc_length(np.array([0.0, 1.0])))[:, 0]
 
-    def _runs_clockwise(self, cells: np.ndarray, local_facets: np.ndarray) -> np.ndarray:
-        """Facets ``(n,)`` whose reference direction has its cell on the right."""
-        v0, v1 = _facet_ends(local_facets)
-        basis = cell_basis(self.V.mesh, self.degree, cells, ((v0 + v1) / 2)[:, None])
-        tangent = np.einsum("nij,nj->ni", basis.jacobian[:, 0], v1 - v0)
-        centroid = cell_basis(self.V.mesh, self.degree, cells, np.full((1, 2), 1 / 3)).point[:, 0]
-        inward = centroid - basis.point[:, 0]
-        return tangent[:, 0] * inward[:, 1] - tangent[:, 1] * inward[:, 0] < 0
-
     def place_points(self, xi: Array, w: Array) -> None:
         """Put the contact points at ``xi`` ``(n_facets of the curve, q)`` in (0, 1) with weights ``w``; no history."""
         self.curve_xi = xi
-        self.__dict__.pop("_arc_length", None)
-        v0, v1 = _facet_ends(self._local_facet)
-        t = np.where(self._flipped[:, None], 1 - xi[self.facet], xi[self.facet])
-        basis = cell_basis(self.V.mesh, self.degree, self.cells, v0[:, None] + t[..., None] * (v1 - v0)[:, None])
-        tangent = np.einsum("nqij,nj->nqi", basis.jacobian, v1 - v0)
-        tangent[self._flipped] *= -1
+        start, along = self._ends[:, 0], self._ends[:, 1] - self._ends[:, 0]
+        X = start[:, None] + xi[self.facet][..., None] * along[:, None]
+        basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
+        tangent = np.einsum("nqij,nj->nqi", basis.jacobian, along)
         length = np.linalg.norm(tangent, axis=-1)
         self.weight = length * w[self.facet]
         self.outward = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
         self.point, self.gradient, self.shape = basis.point, basis.gradient, np.ascontiguousarray(basis.shape)
-        along = np.broadcast_to(self.trace[:, None, :], (*self.weight.shape, self.trace.shape[1]))
-        self.trace_shape = np.take_along_axis(self.shape, along, axis=2)
+        on_facet = np.broadcast_to(self.trace[:, None, :], (*self.weight.shape, self.trace.shape[1]))
+        self.trace_shape = np.take_along_axis(self.shape, on_facet, axis=2)
         self.points = Points(self.material, self.weight.size)
 
     def _trace_inequality(self) -> Array:
@@ -142,18 +133,10 @@ class Surface:
         return np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ trace @ scaled)[:, -1]
 
     def arc_position(self, origin: Array) -> Array:
-        """Arc length ``(n_facets, q)`` of all the curve's points, measured from its end nearest to ``origin`` ``(2,)``.
-
-        Points are in the curve's order: that of this rank's arrays, but for ``flipped`` facets, which have it reversed.
-        """
-        ends = np.linalg.norm(self.curve.X[[0, -1]] - origin, axis=1)
-        s, total = self._arc_length
-        return total - s if ends[1] < ends[0] else s
-
-    @cached_property
-    def _arc_length(self) -> tuple[Array, float]:
-        total = self.curve.arc_length(np.ones((self.curve.n_facets, 1)))[-1, 0]
-        return self.curve.arc_length(self.curve_xi), float(total)
+        """Arc length ``(n_facets, q)`` of all points, from the end of the curve nearest to ``origin`` ``(2,)``."""
+        s = self.curve.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
+        first, last = np.linalg.norm(self.curve.X[[0, -1]] - origin, axis=1)
+        return s[-1, -1] - s[:, :-1] if last < first else s[:, :-1]
 
     def curve_displacement(self, u: Array) -> Array:
         """Displacement ``(n_nodes, 2)`` of the whole curve, from this rank's nodal displacements ``u`` ``(n, 2)``."""
@@ -198,12 +181,6 @@ class RigidSurface:
     def curve_displacement(self, u: Array) -> Array:
         """The displacement of the disc ``(1, 2)``, whatever that of the bodies."""
         return self.motion
-
-
-def _facet_ends(local_facets: np.ndarray) -> tuple[Array, Array]:
-    """Reference coordinates ``(n, 2)`` of both ends of facets with the given numbers in their cells."""
-    ends = basix.geometry(basix.CellType.triangle)[np.array(basix.topology(basix.CellType.triangle)[1])]
-    return ends[local_facets, 0], ends[local_facets, 1]
 
 
 def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray]:

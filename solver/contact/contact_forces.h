@@ -1,10 +1,5 @@
 #include <stdint.h>
 
-/* stress_vector (m, 2) = stress . outward with stress [xx, yy, zz, xy]; gap and slip (m) are the components of the opening
- * along normal and tangent, trial (m, 2) those of the stress vector minus gamma times gap and slip. */
-void trial_traction(int32_t m, const double *stress, const double *outward, const double *opening,
-    const double *normal, const double *gamma, double *stress_vector, double *gap, double *slip, double *trial);
-
 /* Add the force (n q, 2) on the own body to own (nodes, 2) and its reaction to opposite; k nodes a facet of the own curve
  * with trace (n, q, k), o nodes of the opposite a point with shape (n q, o). */
 void contact_forces(int32_t n, int32_t q, int32_t k, int32_t o, const double *force, const double *trace,
