@@ -16,7 +16,7 @@ from archord.postprocess.laws.calibrated import JSON_BEGINS, CalibratedModel, sh
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.study import (
     CSV_BEGINS,
-    FittedCase,
+    Cases,
     Study,
     TooFewError,
     fit_case,
@@ -24,6 +24,7 @@ from archord.postprocess.laws.study import (
     rounded,
     shipped_rows,
     study,
+    table_of,
     usable,
     write_cases,
 )
@@ -43,7 +44,7 @@ class SweepFit:
     they are from, the runs ``left_out`` with the reason, and the ``study`` of a model over them, None where the cases
     are ``too_few``."""
 
-    cases: list[FittedCase]
+    cases: Cases
     numbers: list[int]
     varied: dict[str, list[str]]
     notes: dict[str, str]
@@ -115,13 +116,13 @@ def fit_sweep(path: Path, load_range: tuple[float, float], confidence: float, he
         raise InputError(f"--held-out {held_out:g}: must be a share from 0 to 0.5.")
     if path.suffix == ".csv":
         cases, notes = read_cases(path)
-        if not cases:
+        if not len(cases):
             raise InputError(f"{path}: holds no case.")
         numbers, varied, left_out = list(range(1, len(cases) + 1)), study_report.numbers_of(cases), []
     else:
         cases, numbers, varied, notes, left_out = _solved(path, load_range, confidence)
     used, unfit = usable(cases)
-    left_out += [(case.run, reason) for case, reason in unfit]
+    left_out += unfit
     try:
         result, too_few = study(used, held_out, provenance=notes), ""
     except TooFewError as error:
@@ -152,7 +153,7 @@ def _solved(folder: Path, load_range: tuple[float, float], confidence: float) ->
     if not fitted:
         said = "; ".join(f"{name}: {reason}" for name, reason in left_out[:1])
         raise InputError(f"{folder}: holds no case that can be fitted{f' ({said})' if said else ''}.")
-    cases = rounded(found for _, found in fitted)
+    cases = rounded(table_of(found for _, found in fitted))
     varied = {heading(key, fitted[0][0].scene): [_shown(entry(case.value(key))) for case, _ in fitted]
               for key in design.keys}  # fmt: skip
     return cases, [case.number for case, _ in fitted], varied, _notes(folder, design.distinct, cases), left_out
@@ -175,13 +176,13 @@ def _run(case: Case, folder: Path) -> RunCurve:
     return read_run(run).loading()
 
 
-def _notes(folder: Path, distinct: list[Case], cases: list[FittedCase]) -> dict[str, str]:
+def _notes(folder: Path, distinct: list[Case], cases: Cases) -> dict[str, str]:
     """Where the fitted cases are from."""
     reports = [report for case in distinct if (report := report_of(of_case(case, folder)))]
     days = sorted({str(report.get("started", ""))[:10] for report in reports} - {""})
     command = [str(word) for word in (reports[0].get("command", []) if reports else [])]
     seconds = sum(report.get("seconds", {}).get("total", 0.0) for report in reports)
-    meshes = sorted({f"{case.mesh:.3g}" for case in cases})
+    meshes = sorted({f"{mesh:.3g}" for mesh in cases.mesh})
     notes = {
         "archord": archord.__version__,
         "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",

@@ -22,6 +22,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -63,14 +64,12 @@ class Points:
     clearance: Array
 
     @classmethod
-    def of(cls, joints: list[Any]) -> Points:
-        """From joints that tell plane, alpha, pin_nu (nan or None: the block's), nu, s and clearance."""
-        columns = {name: np.array([getattr(joint, name) for joint in joints])
-                   for name in ("plane", "alpha", "nu", "s", "clearance")}  # fmt: skip
-        pins = np.array([joint.pin_nu for joint in joints], float)
-        m = equivalent(np.where(np.isnan(pins), columns["nu"], pins), columns["plane"])
-        n = equivalent(columns["nu"], columns["plane"])
-        return cls(columns["alpha"], m, n, columns["s"], columns["clearance"])
+    def of(cls, joints: Mapping[str, Any]) -> Points:
+        """From plane, alpha, pin_nu (nan: the block's), nu, s and clearance of ``joints``, numbers or arrays."""
+        names = ("plane", "alpha", "pin_nu", "nu", "s", "clearance")
+        plane, alpha, pin, nu, s, clearance = np.broadcast_arrays(*(np.atleast_1d(joints[name]) for name in names))
+        m = equivalent(np.where(np.isnan(pin), nu, pin), plane)
+        return cls(alpha, m, equivalent(nu, plane), s, clearance)
 
     def terms(self, names: list[str]) -> Array:
         """The products called ``names`` ``(n, terms)``."""
@@ -236,30 +235,30 @@ def joint_calibrated(joint: LawJoint, model: CalibratedModel | None = None) -> C
     if joint.yield_stress is not None:
         s = joint.yield_stress * joint.radius / (joint.E_star * joint.clearance)
     kind = joint.plane, "none" if math.isinf(s) else "block" if joint.yielding == "block" else "both"
-    pin, alpha, clearance = joint.pin_nu, joint.dundurs_alpha, joint.clearance / joint.radius
-    m, n = (float(equivalent(nu, joint.plane)) for nu in (joint.nu if pin is None else pin, joint.nu))
-    k, c = model.coefficients(kind, Points(*(np.array([value]) for value in (alpha, m, n, s, clearance))))
+    pin_nu = joint.nu if joint.pin_nu is None else joint.pin_nu
+    points = Points.of({"plane": joint.plane, "alpha": joint.dundurs_alpha, "pin_nu": pin_nu, "nu": joint.nu, "s": s,
+                        "clearance": joint.clearance / joint.radius})  # fmt: skip
+    k, c = model.coefficients(kind, points)
     reason = UNFIT.get(joint.yielding, "") if joint.yield_stress is not None else ""
     errors = model.data["errors"].get("cross-validated", {}).get(" ".join(kind), {})
-    return Calibrated(float(k[0]), float(c[0]), reason or _stray(joint, s, m, model.bounds(kind)), errors)
+    return Calibrated(float(k[0]), float(c[0]), reason or _stray(points, pin_nu, joint.nu, model.bounds(kind)), errors)
 
 
-def _stray(joint: LawJoint, s: float, m: float, bounds: dict[str, tuple[float, float]]) -> str:
-    """What of the joint lies outside the range of the cases fitted; later yielding than theirs does not matter."""
+def _stray(points: Points, pin_nu: float, nu: float, bounds: dict[str, tuple[float, float]]) -> str:
+    """What of a joint lies outside the range of the cases fitted; later yielding than theirs does not matter."""
     if not bounds:
         return "no joint of this plane and kind of yielding was fitted"
-    alpha, pin_nu = joint.dundurs_alpha, joint.nu if joint.pin_nu is None else joint.pin_nu
-    checks = [("nu of the block", joint.nu, bounds["nu"])]
+    alpha, m, _, s, clearance = (float(value[0]) for value in vars(points).values())
+    checks = [("nu of the block", nu, bounds["nu"])]
     if alpha < 1:
         checks += [("nu of the pin", pin_nu, bounds["pin_nu"]), (SOFT_WORDS, (1 - alpha) / 2 * m, (0.0, SOFT))]
-    low, high = (stiffness_ratio(value) for value in bounds["alpha"])
-    checks.append((_RATIO, stiffness_ratio(alpha), (low, high)))
-    checks.append(("dR/R", joint.clearance / joint.radius, bounds["clearance"]))
+    softest, stiffest = (stiffness_ratio(value) for value in bounds["alpha"])
+    checks += [(_RATIO, stiffness_ratio(alpha), (softest, stiffest)), ("dR/R", clearance, bounds["clearance"])]
     if math.isfinite(s):
         checks.append(("sigY R/(E* dR)", s, (bounds["s"][0], math.inf)))
     for name, value, (low, high) in checks:
         slack = _LAST_DIGITS * max(abs(low), abs(high) if math.isfinite(high) else 0.0)
-        if value is not None and not low - slack <= value <= high + slack:
+        if not low - slack <= value <= high + slack:
             upper = "and more" if math.isinf(high) else f"to {high:.4g}"
             return f"{name} = {value:.4g} is outside {low:.4g} {upper}"
     return ""

@@ -1,20 +1,21 @@
 """The study behind the calibrated law: fitted joints, a model of their k and c, and how good it is on unseen ones.
 
-A `FittedCase` is a joint with its own k and c and its curve, a row of a CSV file; everything in it is dimensionless, so
-rows of different units and sizes stand side by side. `study` makes a `CalibratedModel` of many.
+The joints are cases, rows of a table that a CSV file keeps. Everything in it is dimensionless, so cases of different
+units and sizes stand side by side. `study` makes a `CalibratedModel` of many, and says how far it is off.
 """
 
 from __future__ import annotations
 
-import csv
 import hashlib
+import io
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.optimize import least_squares
 
 from archord.output.user_file import writing
@@ -27,7 +28,6 @@ from archord.postprocess.laws.calibrated import (
     Kind,
     Points,
     dundurs_alpha,
-    equivalent,
     joint_calibrated,
 )
 from archord.postprocess.laws.chord_laws import plastic_force
@@ -35,16 +35,42 @@ from archord.postprocess.laws.curve_fit import fit_curve, fit_plateau
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.scene.errors import InputError
 
+Cases = pd.DataFrame  # with the columns of `COLUMNS` and of `table_of`
+Form = dict[str, Any]  # name, and the terms of each polynomial, see `CalibratedModel`
+Row = tuple[str, str, str, dict[str, Any]]  # what, plane, which bodies yield, `summary` of errors
+
 PLANES = ("strain", "stress")
 KINDS: tuple[Kind, ...] = tuple((plane, yielding) for plane in PLANES for yielding in ("none", "both", "block"))
 LATE = 0.45  # delta/dR from which errors of P count; the contact is Hertz's before
 FOLDS = 10
 HELD_OUT = 0.15
+CSV_BEGINS = "# archord: "  # by which a file of `write_cases` is known
+COLUMNS = {  # of a case, with the heading in its file
+    "run": "run",
+    "plane": "plane",
+    "yielding": "yielding",  # "none", "both", "block", "pin" or "unlike"
+    "ratio": "E1/E2",  # E of the pin over E of the block; infinite: a rigid pin
+    "pin_nu": "nu1",  # nan: a rigid pin
+    "nu": "nu2",
+    "clearance": "dR/R",
+    "strength": "sigY/E*",  # of the weaker body; infinite: elastic
+    "mesh": "h/R",  # element size on the arcs
+    "k": "k",
+    "k_error": "k s.e.",
+    "k_mesh": "k mesh",  # error of the mesh; nan: there was but one
+    "c": "c",  # nan: too few steps have yielded
+    "c_error": "c s.e.",
+    "c_mesh": "c mesh",
+    "plateau": "plateau",  # median pressure over sigY; nan: none was measured
+    "rms": "rms",  # of law/run - 1 with the joint's own k and c
+    "largest": "largest",
+    "load": "delta/dR",  # of the steps fitted, an array
+    "P": "P/(E* dR)",
+}
+_WORDS, _CURVES = ("run", "plane", "yielding"), ("load", "P")
 _PLENTY = 2  # cases per coefficient without which nothing is fitted
 _TOLD = 0.65  # of the largest load: where the plateau must have begun for c to count
 _SHORT = 0.99  # of the largest load of the sweep, that a case must have reached
-Form = dict[str, Any]  # name, and the terms of each polynomial, see `CalibratedModel`
-Row = tuple[str, str, str, dict[str, Any]]  # what, plane, which bodies yield, summary of errors
 
 
 def form(name: str, elastic: str, late: str, strain: str, stress: str) -> Form:
@@ -62,82 +88,10 @@ SIMPLER = (  # to compare with
 )
 
 
-@dataclass(frozen=True)
-class FittedCase:
-    """One joint: the numbers that decide it, k and c with their standard errors, and its curve.
-
-    ``ratio`` is E of the pin over E of the block (infinite: a rigid pin), ``pin_nu`` nan for a rigid pin, ``clearance``
-    dR/R, ``strength`` sigY/E* of the weaker body (infinite: elastic), ``yielding`` "none", "both", "block", "pin" or
-    "unlike". ``c`` is nan where too few steps have yielded, ``k_mesh`` and ``c_mesh`` the errors of the mesh, nan where
-    there was but one, ``plateau`` the median pressure over sigY (nan: none was measured). ``rms`` and ``largest`` are
-    those of ``law/run - 1`` with the joint's own k and c. ``load`` is delta/dR, ``P`` the force over E* dR, ``(n,)``
-    each; ``mesh`` the element size on the arcs over R.
-    """
-
-    run: str
-    plane: str
-    yielding: str
-    ratio: float
-    pin_nu: float
-    nu: float
-    clearance: float
-    strength: float
-    mesh: float
-    k: float
-    k_error: float
-    k_mesh: float
-    c: float
-    c_error: float
-    c_mesh: float
-    plateau: float
-    rms: float
-    largest: float
-    load: Array
-    P: Array
-
-    @property
-    def s(self) -> float:
-        """Relative yield stress ``sigY R/(E* dR)``; infinite for an elastic joint."""
-        return self.strength / self.clearance
-
-    @property
-    def told_c(self) -> float:
-        """c where the plateau fills the last third of the range or more, else nan.
-
-        A plateau that begins later does hardly show in P: the fit then takes c to mend the shape of the curve.
-        """
-        return self.c if self.c * self.s / self.k <= _TOLD * self.load[-1] else math.nan
-
-    @property
-    def alpha(self) -> float:
-        """Dundurs' alpha, positive for the stiffer pin; 1 for a rigid one."""
-        return dundurs_alpha(self.plane, self.ratio, self.pin_nu, self.nu)
-
-    @property
-    def kind(self) -> Kind:
-        """Plane, and which bodies yield."""
-        return self.plane, self.yielding
-
-    @property
-    def digest(self) -> str:
-        """A number made from those of the joint: the same wherever it stands, and random otherwise."""
-        numbers = (self.ratio, self.pin_nu, self.nu, self.clearance, self.strength)
-        said = f"{self.plane} {self.yielding} {' '.join(f'{value:.5g}' for value in numbers)}"
-        return hashlib.sha256(said.encode()).hexdigest()
-
-    def joint(self, k: float, c: float) -> LawJoint:
-        """The joint in units of R = E* = 1 with these coefficients; elastic where c is nan or infinite."""
-        plastic = math.isfinite(c) and math.isfinite(self.strength)
-        return LawJoint(1.0, self.clearance, 1.0, self.strength if plastic else None, k=k, c=c if plastic else 1.0,
-                        dundurs_alpha=self.alpha, plane=self.plane, nu=self.nu,
-                        pin_nu=None if math.isnan(self.pin_nu) else self.pin_nu,
-                        yielding="both" if self.yielding == "none" else self.yielding)  # fmt: skip
-
-
 def fit_case(
     refined: Refined, load_range: tuple[float, float] = (0.0, np.inf), confidence: float = 0.95, name: str = ""
-) -> FittedCase:
-    """Fit k and c to P(delta) of a joint, over ``load_range`` in clearances, called ``name`` [the run folder's].
+) -> dict[str, Any]:
+    """Fit k and c to P(delta) of a joint, over ``load_range`` in clearances: a case called ``name`` [the run folder's].
 
     Raises `InputError` where the range or the steps do not allow a fit.
     """
@@ -145,143 +99,176 @@ def fit_case(
     force = fit_curve("P", [refined], load_range, confidence)
     plateau = fit_plateau(force, [refined], load_range, confidence)
     pin, block, k, c = run.scene.pin, run.scene.block, force.k, force.c
-    assert k is not None
-
-    def known(value: float | None) -> float:
-        return math.nan if value is None else value
-
-    return FittedCase(
-        run=name or run.name,
-        plane=run.plane,
-        yielding="none" if run.sigY is None else LawJoint.from_scene(run.scene).yielding,
-        ratio=math.inf if pin.E is None else pin.E / block.E,
-        pin_nu=known(pin.nu),
-        nu=block.nu,
-        clearance=run.dR / run.R,
-        strength=math.inf if run.sigY is None else run.sigY / run.E_star,
-        mesh=run.scene.joint.h / run.R,
-        k=k.value,
-        k_error=k.standard_error,
-        k_mesh=known(k.discretisation_error),
-        c=c.value if c else math.nan,
-        c_error=c.standard_error if c else math.nan,
-        c_mesh=known(c.discretisation_error) if c else math.nan,
-        plateau=plateau.c.value if plateau and plateau.c else math.nan,
-        rms=force.rms,
-        largest=force.largest,
-        load=force.residuals[0].load,
-        P=force.residuals[0].data,
-    )
+    case = {
+        "run": name or run.name,
+        "plane": run.plane,
+        "yielding": "none" if run.sigY is None else LawJoint.from_scene(run.scene).yielding,
+        "ratio": math.inf if pin.E is None else pin.E / block.E,
+        "pin_nu": pin.nu,
+        "nu": block.nu,
+        "clearance": run.dR / run.R,
+        "strength": math.inf if run.sigY is None else run.sigY / run.E_star,
+        "mesh": run.scene.joint.h / run.R,
+        "k": k and k.value,
+        "k_error": k and k.standard_error,
+        "k_mesh": k and k.discretisation_error,
+        "c": c and c.value,
+        "c_error": c and c.standard_error,
+        "c_mesh": c and c.discretisation_error,
+        "plateau": plateau and plateau.c and plateau.c.value,
+        "rms": force.rms,
+        "largest": force.largest,
+        "load": force.residuals[0].load,
+        "P": force.residuals[0].data,
+    }
+    return {column: math.nan if value is None else value for column, value in case.items()}
 
 
-CSV_BEGINS = "# archord: "  # by which a file of `write_cases` is known
-_HEADINGS = {field.name: field.name for field in fields(FittedCase)} | {
-    "ratio": "E1/E2",
-    "pin_nu": "nu1",
-    "nu": "nu2",
-    "clearance": "dR/R",
-    "strength": "sigY/E*",
-    "mesh": "h/R",
-    "k_error": "k s.e.",
-    "c_error": "c s.e.",
-    "k_mesh": "k mesh",
-    "c_mesh": "c mesh",
-    "load": "delta/dR",
-    "P": "P/(E* dR)",
-}
+def table_of(cases: Iterable[dict[str, Any]]) -> Cases:
+    """The table of ``cases``, with what follows from their numbers: Dundurs' ``alpha``, ``s = sigY R/(E* dR)``, a
+    ``digest``, the same for a joint wherever it stands and random otherwise, and ``told_c``.
+
+    The last is c where the plateau fills the last third of the range or more, else nan: one that begins later hardly
+    shows in P, and the fit then takes c to mend the shape of the curve.
+    """
+    found = pd.DataFrame(cases, columns=list(COLUMNS))
+    found["alpha"] = [dundurs_alpha(case.plane, case.ratio, case.pin_nu, case.nu) for case in found.itertuples()]
+    found["s"] = found.strength / found.clearance
+    longest = found.load.map(lambda load: load[-1])
+    found["told_c"] = found.c.where(found.c * found.s / found.k <= _TOLD * longest)
+    numbers = found[["ratio", "pin_nu", "nu", "clearance", "strength"]].to_numpy()
+    said = [" ".join(f"{value:.5g}" for value in row) for row in numbers]
+    names = found.plane + " " + found.yielding + " " + pd.Series(said, found.index, dtype=str)
+    found["digest"] = [hashlib.sha256(name.encode()).hexdigest() for name in names]
+    return found
 
 
-def read_cases(file: str | Path) -> tuple[list[FittedCase], dict[str, str]]:
-    """The rows of ``file``, written by `write_cases`, and what it says about where they are from.
+def write_cases(cases: Cases, notes: dict[str, str], file: str | Path) -> None:
+    """Write ``cases`` with seven digits, below ``notes`` on where they are from. Raises `InputError`."""
+    with writing(Path(file)):
+        text = "".join(f"# {name}: {value}\n" for name, value in notes.items())
+        Path(file).write_text(text + _csv(cases), encoding="utf-8", newline="")
+
+
+def _csv(cases: Cases) -> str:
+    shown = cases[list(COLUMNS)].rename(columns=COLUMNS)
+    for name in _CURVES:
+        shown[COLUMNS[name]] = [" ".join(f"{value:.7g}" for value in curve) for curve in cases[name]]
+    return shown.to_csv(index=False, float_format="%.7g", lineterminator="\n")
+
+
+def read_cases(file: str | Path) -> tuple[Cases, dict[str, str]]:
+    """The cases of ``file``, written by `write_cases`, and what it says about where they are from.
 
     Raises `InputError` if it cannot be read.
     """
-    file = Path(file)
     try:
-        lines = file.read_text(encoding="utf-8").splitlines()
+        lines = Path(file).read_text(encoding="utf-8").splitlines(keepends=True)
         notes = dict(line[1:].strip().split(": ", 1) for line in lines if line.startswith("#"))
-        return [_case(row) for row in csv.DictReader(line for line in lines if not line.startswith("#"))], notes
+        return _parsed("".join(line for line in lines if not line.startswith("#"))), notes
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}.") from None
     except (ValueError, KeyError, TypeError, AttributeError):
         raise InputError(f"{file}: cannot be read as the fitted cases of a sweep, fit.csv.") from None
 
 
-def _case(row: dict[str, str]) -> FittedCase:
-    values: dict[str, Any] = {name: row[heading] for name, heading in _HEADINGS.items()}
-    for name, text in values.items():
-        if name in ("load", "P"):
-            values[name] = np.array([float(value) for value in text.split()])
-        elif name not in ("run", "plane", "yielding"):
-            values[name] = float(text or "nan")
-    return FittedCase(**values)
+def _parsed(text: str) -> Cases:
+    rows = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False).rename(
+        columns={heading: name for name, heading in COLUMNS.items()}
+    )
+    for name in COLUMNS:
+        if name in _CURVES:
+            rows[name] = [np.array(curve.split(), float) for curve in rows[name]]
+        elif name not in _WORDS:
+            rows[name] = rows[name].replace("", "nan").astype(float)
+    return table_of(rows.to_dict("records"))
 
 
-def write_cases(cases: Iterable[FittedCase], notes: dict[str, str], file: str | Path) -> None:
-    """Write ``cases`` with seven digits, below ``notes`` on where they are from. Raises `InputError`."""
-    file = Path(file)
-    with writing(file), file.open("w", encoding="utf-8", newline="") as stream:
-        stream.writelines(f"# {name}: {value}\n" for name, value in notes.items())
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(_HEADINGS.values())
-        writer.writerows([_entry(getattr(case, name)) for name in _HEADINGS] for case in cases)
-
-
-def _entry(value: Any) -> str:
-    if isinstance(value, np.ndarray):
-        return " ".join(f"{entry:.7g}" for entry in value)
-    return value if isinstance(value, str) else "" if math.isnan(value) else f"{value:.7g}"
-
-
-def rounded(cases: Iterable[FittedCase]) -> list[FittedCase]:
+def rounded(cases: Cases) -> Cases:
     """``cases`` as `write_cases` and `read_cases` would give them back."""
-    return [_case({heading: _entry(getattr(case, name)) for name, heading in _HEADINGS.items()}) for case in cases]
+    return _parsed(_csv(cases))
 
 
 class TooFewError(ValueError):
     """Cases that do not suffice for a model; the message says which."""
 
 
-def fit_model(cases: list[FittedCase], form: Form = FORM, plenty: int = _PLENTY) -> CalibratedModel:
+def usable(cases: Cases) -> tuple[Cases, list[tuple[str, str]]]:
+    """The cases that a model can be fitted to, and the runs of the others with the reason."""
+    longest = max((load[-1] for load in cases.load), default=0.0)
+    points, out = Points.of(cases), {}
+    for index, case, m in zip(cases.index, cases.itertuples(), points.m, strict=True):
+        softness = (1 - case.alpha) / 2 * m
+        if case.yielding in UNFIT:
+            out[index] = UNFIT[case.yielding]
+        elif softness > SOFT + 1e-3:
+            out[index] = f"{SOFT_WORDS} = {softness:.3g} is more than {SOFT:g}: a soft pin, hardly compressible"
+        elif case.load[-1] < _SHORT * longest:
+            out[index] = f"ends at {case.load[-1]:.3g} dR, others at {longest:.3g}"
+    return cases.drop(index=list(out)), [(cases.run[index], reason) for index, reason in out.items()]
+
+
+def of_kind(cases: Cases, kind: Kind) -> Cases:
+    """The ``cases`` of a plane and kind of yielding."""
+    return cases[(cases.plane == kind[0]) & (cases.yielding == kind[1])]
+
+
+def known(model: CalibratedModel, cases: Cases) -> Cases:
+    """The cases of kinds that the model was fitted to."""
+    kinds = {(part["plane"], part["yielding"]) for part in model.data["plastic"]}
+    return cases[[row.yielding == "none" or (row.plane, row.yielding) in kinds for row in cases.itertuples()]]
+
+
+def split(cases: Cases, share: float = HELD_OUT) -> tuple[Cases, Cases]:
+    """Cases to fit and to choose a form with, and a ``share`` of each kind to judge the result by at the end.
+
+    Chosen by the numbers of the joint themselves: always the same ones, however the cases are ordered.
+    """
+    groups = cases.sort_values("digest").groupby(["plane", "yielding"])
+    held = [index for _, same in groups for index in same.index[: round(share * len(same))]]
+    chosen = cases.index.isin(held)
+    return cases[~chosen], cases[chosen]
+
+
+def fit_model(cases: Cases, form: Form = FORM, plenty: int = _PLENTY) -> CalibratedModel:
     """Least squares of ln k of the elastic cases, then of ln k and ln c of each kind that yields.
 
     Coefficients have six digits. A kind with less than ``plenty`` cases per coefficient is left out. Raises
     `TooFewError` where the elastic ones are too few.
     """
-    elastic = [case for case in cases if case.yielding == "none"]
+    elastic = cases[cases.yielding == "none"]
     _suffice(elastic, plenty * len(form["elastic"]), "elastic cases")
-    terms, k = Points.of(elastic).terms(form["elastic"]), np.array([case.k for case in elastic])
+    terms, k = Points.of(elastic).terms(form["elastic"]), elastic.k.to_numpy()
     start = np.linalg.lstsq(terms, 1 / k, rcond=None)[0]
     values = _solve(lambda v: -np.log(np.maximum(terms @ v, 1e-9)) - np.log(k), start)
     model = CalibratedModel({"form": form, "elastic": values, "plastic": [], "bounds": []})
     for kind in sorted(KINDS, key=lambda kind: kind[1] != "none"):
-        same = [case for case in cases if case.kind == kind]
+        same = of_kind(cases, kind)
         try:
             if kind[1] != "none":
                 model.data["plastic"].append(_plastic(same, kind, model, plenty))
         except TooFewError:
             continue
-        if same:
-            model.data["bounds"].append(_bounds(same))
-    loads = np.concatenate([case.load for case in cases])
-    return CalibratedModel(model.data | {"load_range": _span(loads), "errors": {}, "provenance": {}})
+        if len(same):
+            model.data["bounds"].append(_bounds(same, kind))
+    rest = {"load_range": _span(np.concatenate(list(cases.load))), "errors": {}, "provenance": {}}
+    return CalibratedModel(model.data | rest)
 
 
-def _plastic(cases: list[FittedCase], kind: Kind, model: CalibratedModel, plenty: int) -> dict[str, Any]:
+def _plastic(cases: Cases, kind: Kind, model: CalibratedModel, plenty: int) -> dict[str, Any]:
     late, threshold = model.data["form"]["late"], model.data["form"][kind[0]]
-    yielded = [case for case in cases if math.isfinite(case.told_c)]
-    what = f"cases in plane {kind[0]} of which {kind[1]} yields"
+    yielded, what = cases[cases.told_c.notna()], f"cases in plane {kind[0]} of which {kind[1]} yields"
     _suffice(cases, plenty * (len(late) + bool(late)), what)
     _suffice(yielded, plenty * len(threshold), what)
     rate, rest = 0.0, []
     if late:
         points = Points.of(cases)
         k, terms = model.elastic_k(points), points.terms(late)
-        ratio, onset = np.log(np.array([case.k for case in cases]) / k), points.s / k
+        ratio, onset = np.log(cases.k.to_numpy() / k), points.s / k
         starts = [np.array([b, *np.linalg.lstsq(np.exp(-b * onset)[:, None] * terms, ratio, rcond=None)[0]])
                   for b in (2.0, 4.0)]  # fmt: skip
         rate, *rest = _solve(lambda v: np.exp(-v[0] * onset) * (terms @ v[1:]) - ratio, *starts)
-    terms, c = Points.of(yielded).terms(threshold), np.log([case.c for case in yielded])
+    terms, c = Points.of(yielded).terms(threshold), np.log(yielded.c.to_numpy())
     found = _solve(lambda v: terms @ v - c, np.linalg.lstsq(terms, c, rcond=None)[0])
     return {"plane": kind[0], "yielding": kind[1], "rate": rate, "late": rest, "threshold": found,
             "cases": len(cases), "cases_of_c": len(yielded)}  # fmt: skip
@@ -292,118 +279,90 @@ def _solve(residuals: Callable[[Array], Array], *starts: Array) -> list[float]:
     return [_digits(value) for value in min(found, key=lambda solution: solution.cost).x]
 
 
-def _suffice(cases: list[FittedCase], needed: int, what: str) -> None:
+def _suffice(cases: Cases, needed: int, what: str) -> None:
     if len(cases) < needed:
         raise TooFewError(f"{len(cases)} {what} are too few for a model: it takes {needed}")
 
 
-def _bounds(cases: list[FittedCase]) -> dict[str, Any]:
-    names = {"nu": "nu", "pin_nu": "pin_nu", "modulus_ratio": "ratio", "alpha": "alpha", "clearance": "clearance",
-             "strength": "strength", "s": "s"}  # fmt: skip
-    plane, yielding = cases[0].kind
-    spans = {name: _span([getattr(case, field) for case in cases]) for name, field in names.items()}
-    return {"plane": plane, "yielding": yielding} | spans
+def _bounds(cases: Cases, kind: Kind) -> dict[str, Any]:
+    names = {name: name for name in ("nu", "pin_nu", "modulus_ratio", "alpha", "clearance", "strength", "s")}
+    names["modulus_ratio"] = "ratio"
+    return {"plane": kind[0], "yielding": kind[1]} | {name: _span(cases[column]) for name, column in names.items()}
 
 
 def _span(values: Iterable[float]) -> list[float | None]:
     """The smallest and largest, None for infinity, of those that are numbers; 0, 0 of none."""
-    known = [value for value in values if not math.isnan(value)] or [0.0]
-    return [_digits(end) if math.isfinite(end) else None for end in (min(known), max(known))]
+    numbers = [value for value in values if not math.isnan(value)] or [0.0]
+    return [_digits(end) if math.isfinite(end) else None for end in (min(numbers), max(numbers))]
 
 
 def _digits(value: float) -> float:
     return float(f"{value:.6g}")
 
 
-@dataclass(frozen=True)
-class Errors:
-    """What a law misses ``cases`` by, relative: ``k`` and ``c`` ``(n,)`` (c nan where it has none), and ``P`` at the
-    steps of each case."""
-
-    cases: list[FittedCase]
-    k: Array
-    c: Array
-    P: list[Array]
-
-    def summary(self, kind: Kind | None = None) -> dict[str, Any]:
-        """Of a kind, or of all: number of cases; rms and largest size of each error, the case that has it, and for P,
-        from `LATE` on ("P") and before ("P early"), where."""
-        rows = [i for i, case in enumerate(self.cases) if kind in (None, case.kind)]
-        said: dict[str, Any] = {"cases": len(rows)}
-        for name, off in (("k", self.k), ("c", self.c)):
-            said[name] = _judged([(off[i], {"case": self.cases[i].run}) for i in rows if math.isfinite(off[i])])
-        for name, late in (("P", True), ("P early", False)):
-            steps = ((i, off, load) for i in rows for off, load in zip(self.P[i], self.cases[i].load, strict=True))
-            said[name] = _judged([(off, {"case": self.cases[i].run, "delta/dR": _digits(load)})
-                                  for i, off, load in steps if (load > LATE) == late])  # fmt: skip
-        return {name: found for name, found in said.items() if found is not None}
+def joint_of_case(case: Any, k: float, c: float) -> LawJoint:
+    """The joint of a ``case`` in units of R = E* = 1 with these coefficients; elastic where c is nan or infinite."""
+    plastic = math.isfinite(c) and math.isfinite(case.strength)
+    return LawJoint(1.0, case.clearance, 1.0, case.strength if plastic else None, k=k, c=c if plastic else 1.0,
+                    dundurs_alpha=case.alpha, plane=case.plane, nu=case.nu,
+                    pin_nu=None if math.isnan(case.pin_nu) else case.pin_nu,
+                    yielding="both" if case.yielding == "none" else case.yielding)  # fmt: skip
 
 
-def _judged(entries: list[tuple[float, dict[str, Any]]]) -> dict[str, Any] | None:
-    if not entries:
-        return None
-    largest, where = max(entries, key=lambda entry: abs(entry[0]))
-    rms = math.sqrt(np.mean(np.square([off for off, _ in entries])))
-    return {"rms": round(rms, 5), "largest": round(float(largest), 5), **where}
-
-
-def errors(cases: list[FittedCase], k: Array, c: Array) -> Errors:
-    """Of the law with ``k`` and ``c`` ``(n,)`` from those of ``cases`` and from their curves; elastic where c is not
-    finite."""
-    own_k, own_c = (np.array([getattr(case, name) for case in cases]) for name in ("k", "told_c"))
-    off = [
-        plastic_force(case.joint(*kc), case.load * case.clearance) / case.clearance / case.P - 1
-        for case, *kc in zip(cases, k.tolist(), c.tolist(), strict=True)
-    ]
-    return Errors(cases, k / own_k - 1, c / own_c - 1, off)
-
-
-def own_errors(cases: list[FittedCase]) -> Errors:
-    """With each joint's own k and c: what the shape of the law misses."""
-    return errors(cases, *(np.array([getattr(case, name) for case in cases]) for name in "kc"))
-
-
-def predictions(model: CalibratedModel, cases: list[FittedCase]) -> tuple[Array, Array]:
+def predictions(model: CalibratedModel, cases: Cases) -> tuple[Array, Array]:
     """k and c of ``model`` for ``cases`` ``(n,)``, of whose kinds they must be."""
-    k, c = np.empty(len(cases)), np.empty(len(cases))
-    for kind in {case.kind for case in cases}:
-        rows = [i for i, case in enumerate(cases) if case.kind == kind]
-        k[rows], c[rows] = model.coefficients(kind, Points.of([cases[i] for i in rows]))
-    return k, c
+    found = pd.DataFrame(index=cases.index, columns=["k", "c"], dtype=float)
+    for kind, same in cases.groupby(["plane", "yielding"]):
+        found.loc[same.index] = np.column_stack(model.coefficients(kind, Points.of(same)))
+    return found.k.to_numpy(), found.c.to_numpy()
 
 
-def known(model: CalibratedModel, cases: list[FittedCase]) -> list[FittedCase]:
-    """The cases of kinds that the model was fitted to."""
-    kinds = {(part["plane"], part["yielding"]) for part in model.data["plastic"]}
-    return [case for case in cases if case.yielding == "none" or case.kind in kinds]
+def errors(cases: Cases, k: Array, c: Array) -> pd.DataFrame:
+    """What the law with ``k`` and ``c`` ``(n,)`` misses ``cases`` by, relative; elastic where c is not finite.
 
-
-def split(cases: list[FittedCase], share: float = HELD_OUT) -> tuple[list[FittedCase], list[FittedCase]]:
-    """Cases to fit and to choose a form with, and a ``share`` of each kind to judge the result by at the end.
-
-    Chosen by the numbers of the joint themselves: always the same ones, however the cases are ordered.
+    A row for each error ``off`` with the ``run``, ``plane`` and ``yielding`` of its case, and ``what`` it is one of:
+    "k", "c" (nan where there is none), and at each ``load`` delta/dR "P", from `LATE` on, or "P early", before.
     """
-    held = set()
-    for kind in {case.kind for case in cases}:
-        same = sorted((case for case in cases if case.kind == kind), key=lambda case: case.digest)
-        held |= {id(case) for case in same[: round(share * len(same))]}
-    return [case for case in cases if id(case) not in held], [case for case in cases if id(case) in held]
+    rows = cases[["run", "plane", "yielding"]]
+    forces = [
+        plastic_force(joint_of_case(case, *kc), case.load * case.clearance) / case.clearance / case.P - 1
+        for case, *kc in zip(cases.itertuples(), k.tolist(), c.tolist(), strict=True)
+    ]
+    steps = rows.loc[cases.index.repeat([len(part) for part in forces])]
+    load = np.concatenate(list(cases.load))
+    own = [rows.assign(what="k", off=k / cases.k - 1), rows.assign(what="c", off=c / cases.told_c - 1)]
+    late = np.where(load > LATE, "P", "P early")
+    return pd.concat([*own, steps.assign(what=late, off=np.concatenate(forces), load=load)], ignore_index=True)
 
 
-def cross_validate(cases: list[FittedCase], form: Form = FORM, folds: int = FOLDS) -> Errors:
-    """Every case predicted by a model fitted to the other folds only (Stone 1974); each kind is in all folds.
+def own_errors(cases: Cases) -> pd.DataFrame:
+    """With each joint's own k and c: what the shape of the law misses."""
+    return errors(cases, cases.k.to_numpy(), cases.c.to_numpy())
 
-    Raises `TooFewError`.
-    """
-    cases = known(fit_model(cases, form), cases)
-    order = sorted(range(len(cases)), key=lambda i: (cases[i].kind, cases[i].digest))
-    fold = np.empty(len(cases), dtype=int)
-    fold[order] = np.arange(len(cases)) % folds
+
+def summary(found: pd.DataFrame) -> dict[str, Any]:
+    """Of `errors`: number of cases; rms and largest size of each error, the case that has it, and for P where."""
+    said: dict[str, Any] = {"cases": int((found.what == "k").sum())}
+    for what in ("k", "c", "P", "P early"):
+        part = found[(found.what == what) & found.off.notna()]
+        if len(part):
+            worst = part.loc[part.off.abs().idxmax()]
+            rms = round(math.sqrt((part.off**2).mean()), 5)
+            said[what] = {"rms": rms, "largest": round(float(worst.off), 5), "case": worst.run}
+            if not math.isnan(worst.load):
+                said[what]["delta/dR"] = _digits(worst.load)
+    return said
+
+
+def cross_validate(cases: Cases, form: Form = FORM, folds: int = FOLDS) -> pd.DataFrame:
+    """`errors` of every case, predicted by a model fitted to the other folds only (Stone 1974); each kind is in all
+    folds. Raises `TooFewError`."""
+    cases = known(fit_model(cases, form), cases).sort_values(["plane", "yielding", "digest"])
+    fold = np.arange(len(cases)) % folds
     k, c = np.empty(len(cases)), np.empty(len(cases))
     for f in set(fold.tolist()):
-        out = np.flatnonzero(fold == f)
-        model = fit_model([case for i, case in enumerate(cases) if fold[i] != f], form, plenty=1)
-        k[out], c[out] = predictions(model, [cases[i] for i in out])
+        out = fold == f
+        k[out], c[out] = predictions(fit_model(cases[~out], form, plenty=1), cases[out])
     return errors(cases, k, c)
 
 
@@ -413,73 +372,47 @@ class Study:
     case predicted by the others or held out of all, and of ``simpler`` forms, each case predicted by the others."""
 
     model: CalibratedModel
-    used: list[FittedCase]
-    held: list[FittedCase]
+    used: Cases
+    held: Cases
     rows: list[Row]
     simpler: list[Row]
 
 
-def usable(cases: list[FittedCase]) -> tuple[list[FittedCase], list[tuple[FittedCase, str]]]:
-    """The cases that a model can be fitted to, and the others with the reason."""
-    longest = max((case.load[-1] for case in cases), default=0.0)
-    used, out = [], []
-    for case in cases:
-        # nan, of a rigid pin, is not larger
-        softness = (1 - case.alpha) / 2 * float(equivalent(case.pin_nu, case.plane))
-        reason = UNFIT.get(case.yielding, "")
-        if not reason and softness > SOFT + 1e-3:
-            reason = f"{SOFT_WORDS} = {softness:.3g} is more than {SOFT:g}: a soft pin, hardly compressible"
-        elif not reason and case.load[-1] < _SHORT * longest:
-            reason = f"ends at {case.load[-1]:.3g} dR, others at {longest:.3g}"
-        if reason:
-            out.append((case, reason))
-        else:
-            used.append(case)
-    return used, out
-
-
-def study(
-    cases: list[FittedCase], share: float = HELD_OUT, form: Form = FORM, provenance: dict[str, Any] | None = None
-) -> Study:
+def study(cases: Cases, share: float = HELD_OUT, form: Form = FORM, provenance: dict[str, Any] | None = None) -> Study:
     """Hold a ``share`` of ``cases`` out, fit the model to the others, cross-validate it on them, and judge it by those
     held out; the model tells its errors and ``provenance``. Raises `TooFewError`."""
     used, held = split(cases, share)
     model = fit_model(used, form)
     used, held = known(model, used), known(model, held)
     validated = cross_validate(used, form)
-    rows = _rows("cross-validated", validated)
-    if held:
-        rows += _rows("held out", errors(held, *predictions(model, held)))
+    rows = _rows("cross-validated", validated, used)
+    if len(held):
+        rows += _rows("held out", errors(held, *predictions(model, held)), held)
     said: dict[str, dict[str, Any]] = {}
     for what, plane, yielding, found in rows:
         said.setdefault(what, {})[f"{plane} {yielding}"] = found
-    c = np.array([1.0 if math.isfinite(case.s) else math.inf for case in used])
-    compared = {"k = 0.85, c = 1": errors(used, np.full(len(used), 0.85), c)}
+    paper = errors(used, np.full(len(used), 0.85), np.where(np.isfinite(used.s), 1.0, np.inf))
+    compared = {"k = 0.85, c = 1": paper}
     compared |= {simpler["name"]: cross_validate(used, simpler) for simpler in SIMPLER}
     compared |= {form["name"]: validated, "own k and c": own_errors(used)}
     notes = {**(provenance or {}), "fitted": len(used), "held out": len(held)}
-    return Study(
-        CalibratedModel(model.data | {"errors": said, "provenance": notes}), used, held, rows,
-        [(name, "both", "all", found.summary()) for name, found in compared.items()],
-    )  # fmt: skip
+    model = CalibratedModel(model.data | {"errors": said, "provenance": notes})
+    return Study(model, used, held, rows, [(name, "both", "all", summary(off)) for name, off in compared.items()])
 
 
-def shipped_rows(cases: list[FittedCase]) -> list[Row]:
+def shipped_rows(cases: Cases) -> list[Row]:
     """Errors of the law that comes with archord on ``cases``, by kind, of those that are inside its range."""
-    found = [(case, joint_calibrated(case.joint(1.0, 1.0))) for case in cases]
-    inside = [(case, law) for case, law in found if not law.outside]
-    if not inside:
-        return []
-    k, c = (np.array([getattr(law, name) for _, law in inside]) for name in "kc")
-    return _rows("archord's law", errors([case for case, _ in inside], k, c))
+    found = [joint_calibrated(joint_of_case(case, 1.0, 1.0)) for case in cases.itertuples()]
+    inside = [law for law in found if not law.outside]
+    chosen = cases[[not law.outside for law in found]]
+    k, c = (np.array([getattr(law, name) for law in inside]) for name in "kc")
+    return _rows("archord's law", errors(chosen, k, c), chosen) if inside else []
 
 
-def _rows(what: str, found: Errors) -> list[Row]:
+def _rows(what: str, found: pd.DataFrame, cases: Cases) -> list[Row]:
     """Summaries by kind, and of all, with what the shape of the law misses beside it."""
-    own, rows = own_errors(found.cases), list[Row]()
-    for kind in (*KINDS, None):
-        summary = found.summary(kind)
-        if summary["cases"]:
-            said = {"P own": own.summary(kind).get("P", {})}
-            rows.append((what, *(kind or ("both", "all")), summary | said))
-    return rows
+    own, rows = own_errors(cases), list[Row]()
+    for kind in KINDS:
+        if len(part := of_kind(found, kind)):
+            rows.append((what, *kind, summary(part) | {"P own": summary(of_kind(own, kind)).get("P", {})}))
+    return [*rows, (what, "both", "all", summary(found) | {"P own": summary(own).get("P", {})})]

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from archord.output.user_file import writing
-from archord.postprocess.laws.calibrated import SOFT, CalibratedModel, Points, equivalent
-from archord.postprocess.laws.study import KINDS, PLANES, FittedCase, Row, Study, known, predictions
+from archord.postprocess.laws.calibrated import SOFT, CalibratedModel, Points
+from archord.postprocess.laws.study import COLUMNS, KINDS, PLANES, Cases, Row, Study, known, of_kind, predictions
 from archord.report.figure import new_figure, save
 from archord.report.table import Table
 
@@ -29,39 +29,33 @@ _STYLES = {"strain": ("o", "-"), "stress": ("s", "--")}  # of points and lines
 _ALIKE = 0.01
 
 
-def case_table(numbers: list[int], cases: list[FittedCase], varied: dict[str, list[str]]) -> Table:
+def case_table(numbers: list[int], cases: Cases, varied: dict[str, list[str]]) -> Table:
     """One row per case: number, what is ``varied`` (a column by heading), k and c with their errors, the plateau's
     median pressure over sigY, and rms and largest of ``law/run - 1``."""
-    errors = {"_error": "s.e."}
-    if any(math.isfinite(case.k_mesh) for case in cases):
-        errors["_mesh"] = "mesh"
-    table = Table("case", *varied, "k", *errors.values(), "c", *errors.values(), "plateau", "rms", "largest")
-    forms = (
-        {"k": ".4f"} | {f"k{kind}": ".1e" for kind in errors} | {"c": ".4f"} | {f"c{kind}": ".1e" for kind in errors}
-    )
-    for i, (number, case) in enumerate(zip(numbers, cases, strict=True)):
-        values = [(getattr(case, name), form) for name, form in (forms | {"plateau": ".3f"}).items()]
-        fitted = [format(value, form) if math.isfinite(value) else "-" for value, form in values]
-        joint = [column[i] for column in varied.values()]
-        table.add(number, *joint, *fitted, f"{case.rms:.1%}", f"{case.largest:+.1%}")
-    return table
+    errors = {"_error": "s.e."} | ({"_mesh": "mesh"} if cases.k_mesh.notna().any() else {})
+    columns: dict[str, str] = {}
+    for name in "kc":
+        columns |= {name: ".4f"} | {name + error: ".1e" for error in errors}
+    columns["plateau"] = ".3f"
+    fitted = [["-" if math.isnan(value) else format(value, form) for value in cases[name]]
+              for name, form in columns.items()]  # fmt: skip
+    quality = [f"{value:.1%}" for value in cases.rms], [f"{value:+.1%}" for value in cases.largest]
+    headings = (*varied, "k", *errors.values(), "c", *errors.values(), "plateau", "rms", "largest")
+    return Table("case", *headings, rows=zip(numbers, *varied.values(), *fitted, *quality, strict=True))
 
 
-def numbers_of(cases: list[FittedCase]) -> dict[str, list[str]]:
+def numbers_of(cases: Cases) -> dict[str, list[str]]:
     """What decides each case, as columns of `case_table` where nothing else is known to vary."""
-    names = {"E1/E2": "ratio", "nu1": "pin_nu", "nu2": "nu", "dR/R": "clearance", "sigY/E*": "strength"}
-
-    def said(name: str, value: float) -> str:
-        return "-" if math.isnan(value) or (math.isinf(value) and name != "ratio") else f"{value:.4g}"
-
-    columns = {heading: [said(name, getattr(case, name)) for case in cases] for heading, name in names.items()}
-    return {"plane": [case.plane for case in cases], "yields": [case.yielding for case in cases]} | columns
+    shown = {"plane": list(cases.plane), "yields": list(cases.yielding), "E1/E2": [f"{x:.4g}" for x in cases.ratio]}
+    for name in ("pin_nu", "nu", "clearance", "strength"):
+        shown[COLUMNS[name]] = [f"{value:.4g}" if math.isfinite(value) else "-" for value in cases[name]]
+    return shown
 
 
 def model_text(study: Study, total: int) -> str:
     """The model with its numbers, ready to be typed, of ``total`` cases; its errors, beside those of simpler forms; and
     where they are largest."""
-    cases = {case.run: case for case in study.used + study.held}
+    cases = pd.concat([study.used, study.held]).set_index("run")
     worst = (_worst(*row, cases) for row in study.rows)
     used, held = len(study.used), len(study.held)
     return "\n".join([
@@ -110,36 +104,30 @@ def _of(found: dict[str, Any], name: str, what: str) -> str:
     return f"{found[name][what]:.1%}" if what == "rms" else f"{found[name][what]:+.1%}"
 
 
-def _worst(what: str, plane: str, yielding: str, found: dict[str, Any], cases: dict[str, FittedCase]) -> str:
+def _worst(what: str, plane: str, yielding: str, found: dict[str, Any], cases: Cases) -> str:
     kind, said = "" if yielding == "all" else f", plane {plane}, {yielding}", []
     for name in ("k", "c", "P"):
         if name in found:
             load = f" at {found[name]['delta/dR']:g} dR" if name == "P" else ""
-            said.append(f"{name} {found[name]['largest']:+.1%}{load} ({_words(cases[found[name]['case']])})")
+            said.append(f"{name} {found[name]['largest']:+.1%}{load} ({_words(cases.loc[found[name]['case']])})")
     return f"largest {what}{kind}: {'; '.join(said)}"
 
 
-def _words(case: FittedCase) -> str:
+def _words(case: pd.Series) -> str:
     pin = "rigid pin" if math.isnan(case.pin_nu) else f"E1/E2 = {case.ratio:.3g}, nu1 = {case.pin_nu:.3g}"
     s = "" if math.isinf(case.s) else f", sigY/E* = {case.strength:.3g}, s = {case.s:.3g}, {case.yielding}"
-    return f"{case.run}: plane {case.plane}, {pin}, nu2 = {case.nu:.3g}, dR/R = {case.clearance:.3g}{s}"
+    return f"{case.name}: plane {case.plane}, {pin}, nu2 = {case.nu:.3g}, dR/R = {case.clearance:.3g}{s}"
 
 
 JSON_BEGINS = '{\n "from": {\n  "archord": '  # by which a file of `as_json` is known
 
 
-def as_json(
-    cases: list[FittedCase],
-    notes: dict[str, str],
-    left_out: list[tuple[str, str]],
-    model: CalibratedModel | None,
-) -> str:
+def as_json(cases: Cases, notes: dict[str, str], left_out: list[tuple[str, str]], model: CalibratedModel | None) -> str:
     """Everything as JSON; what is not a finite number is null."""
     data = {
         "from": notes,
-        "cases": [
-            {name: _plain(value) for name, value in (asdict(case) | {"s": case.s}).items()} for case in cases
-        ],
+        "cases": [{name: _plain(value) for name, value in case.items()}
+                  for case in cases[[*COLUMNS, "s"]].to_dict("records")],
         "left_out": [{"run": name, "reason": reason} for name, reason in left_out],
         "model": model and model.data,
     }  # fmt: skip
@@ -152,19 +140,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-@dataclass(frozen=True)
-class _Joint:
-    """What a line of the model is drawn for; both bodies have one Poisson's ratio."""
-
-    plane: str
-    alpha: float = 0.0
-    nu: float = 0.3
-    s: float = math.inf
-    clearance: float = 0.005
-    pin_nu: float | None = None
-
-
-def draw_study(cases: list[FittedCase], model: CalibratedModel | None, target: str | Path) -> Path:
+def draw_study(cases: Cases, model: CalibratedModel | None, target: str | Path) -> Path:
     """Draw k against Poisson's ratio, moduli and the onset of yielding, c against sigY/E* and dR/R, and the model
     against the cases, as ``target``; returns the file.
 
@@ -173,14 +149,14 @@ def draw_study(cases: list[FittedCase], model: CalibratedModel | None, target: s
     """
     target, figure = Path(target), new_figure(14.5, 8.4)
     axes = figure.subplots(2, 3)
-    _elastic_k(axes[0, 0], axes[0, 1], cases, model)
-    c_of = [c for c in cases if c.yielding == "both" and abs(c.alpha) < _ALIKE and abs(c.nu - 0.3) < _ALIKE
-            and abs(c.pin_nu - 0.3) < _ALIKE and math.isfinite(c.told_c)]  # fmt: skip
+    _elastic_k(axes[0, 0], axes[0, 1], cases[cases.yielding == "none"], model)
+    alike = (abs(cases.alpha) < _ALIKE) & (abs(cases.nu - 0.3) < _ALIKE) & (abs(cases.pin_nu - 0.3) < _ALIKE)
+    c_of = cases[alike & (cases.yielding == "both") & cases.told_c.notna()]
     _threshold(axes[1, 0], c_of, model, "strength", "sigY / E*", "clearance", "ΔR/R", (0.001, 0.005, 0.02))
     _threshold(axes[1, 1], c_of, model, "clearance", "ΔR / R", "strength", "sigY/E*", (0.0005, 0.001, 0.002, 0.004))
     if model is not None:
         _onset(axes[0, 2], cases, model)
-        _parity(axes[1, 2], known(model, [case for case in cases if case.kind in KINDS]), model)
+        _parity(axes[1, 2], known(model, cases), model)
     for axis in axes.flat:
         if not axis.lines:  # a sweep need not have what belongs here
             axis.text(0.5, 0.5, "no such case", transform=axis.transAxes, ha="center", color="0.4")
@@ -191,40 +167,36 @@ def draw_study(cases: list[FittedCase], model: CalibratedModel | None, target: s
         return save(figure, target)
 
 
-def _points(
-    axis: Axes, cases: list[FittedCase], value: Callable[[FittedCase], tuple[float, float]], color: str
-) -> None:
+def _points(axis: Axes, cases: Cases, x: str, y: str, color: str) -> None:
     for plane, (marker, _) in _STYLES.items():
-        rows = [value(case) for case in cases if case.plane == plane]
-        if rows:
-            axis.plot(*zip(*rows, strict=True), marker, ms=4, mfc="none", color=color)
+        same = cases[cases.plane == plane]
+        if len(same):
+            axis.plot(same[x], same[y], marker, ms=4, mfc="none", color=color)
 
 
-def _line(
-    axis: Axes, x: Array, joints: list[_Joint], model: CalibratedModel, which: int, color: str, said: str
-) -> None:
-    """k (``which`` 0) or c (1) of the model for ``joints`` of one plane, where it holds; named in plane strain."""
-    plane = joints[0].plane
-    values = model.coefficients((plane, ("none", "both")[which]), Points.of(joints))[which]
-    soft = [(1 - joint.alpha) / 2 * float(equivalent(joint.nu, plane)) > SOFT for joint in joints]
-    label = said if plane == "strain" else None
-    axis.plot(x, np.where(soft, np.nan, values), ls=_STYLES[plane][1], lw=1, color=color, label=label)
+def _line(axis: Axes, x: Array, model: CalibratedModel, plane: str, color: str, said: str, **numbers: Any) -> None:
+    """c of the model where both bodies yield, k without ``s``, for joints of these ``numbers`` and one Poisson's ratio,
+    where the model holds; named in plane strain."""
+    joints = {"plane": plane, "alpha": 0.0, "nu": 0.3, "s": math.inf, "clearance": 0.005, "pin_nu": math.nan} | numbers
+    points = Points.of(joints)
+    k, c = model.coefficients((plane, "both" if "s" in numbers else "none"), points)
+    values = np.where((1 - points.alpha) / 2 * points.m > SOFT, np.nan, c if "s" in numbers else k)
+    axis.plot(x, values, ls=_STYLES[plane][1], lw=1, color=color, label=said if plane == "strain" else None)
 
 
-def _elastic_k(by_nu: Axes, by_moduli: Axes, cases: list[FittedCase], model: CalibratedModel | None) -> None:
-    nus, alphas = np.linspace(0, 0.49, 60), np.linspace(-0.5, 0.98, 80)
-    elastic = [c for c in cases if c.yielding == "none" and (math.isnan(c.pin_nu) or abs(c.pin_nu - c.nu) < 1e-6)]
+def _elastic_k(by_nu: Axes, by_moduli: Axes, cases: Cases, model: CalibratedModel | None) -> None:
+    nu, alpha = np.linspace(0, 0.49, 60), np.linspace(-0.5, 0.98, 80)
+    alike = cases[cases.pin_nu.isna() | (abs(cases.pin_nu - cases.nu) < 1e-6)]
     pins = {-0.5: "pin 3 times softer", 0.0: "like bodies", 0.5: "pin 3 times stiffer", 1.0: "rigid pin"}
-    for i, (alpha, words) in enumerate(pins.items()):
-        _points(by_nu, [c for c in elastic if abs(c.alpha - alpha) < _ALIKE], lambda c: (c.nu, c.k), f"C{i}")
+    for i, (ratio, words) in enumerate(pins.items()):
+        _points(by_nu, alike[abs(alike.alpha - ratio) < _ALIKE], "nu", "k", f"C{i}")
         for plane in PLANES if model else ():
-            _line(by_nu, nus, [_Joint(plane, alpha, nu) for nu in nus], model, 0, f"C{i}", words)
-    for i, nu in enumerate((0.0, 0.3, 0.49)):
-        same = [c for c in elastic if abs(c.nu - nu) < 1e-3 and c.alpha < 1]
-        _points(by_moduli, same, lambda c: (c.ratio, c.k), f"C{i}")
+            _line(by_nu, nu, model, plane, f"C{i}", words, alpha=ratio, nu=nu)
+    for i, value in enumerate((0.0, 0.3, 0.49)):
+        _points(by_moduli, alike[(abs(alike.nu - value) < 1e-3) & (alike.alpha < 1)], "ratio", "k", f"C{i}")
         for plane in PLANES if model else ():
-            joints = [_Joint(plane, alpha, nu) for alpha in alphas]
-            _line(by_moduli, (1 + alphas) / (1 - alphas), joints, model, 0, f"C{i}", f"ν = {nu:g}")
+            x = (1 + alpha) / (1 - alpha)
+            _line(by_moduli, x, model, plane, f"C{i}", f"ν = {value:g}", alpha=alpha, nu=value)
     for axis in (by_nu, by_moduli):
         axis.axhline(PAPER_K, color="black", lw=0.8, label="k = 0.85")
         axis.set(ylabel="k, elastic", ylim=(0.4, 1.3))
@@ -232,46 +204,43 @@ def _elastic_k(by_nu: Axes, by_moduli: Axes, cases: list[FittedCase], model: Cal
     by_moduli.set(xlabel="E of the pin / E of the block", xscale="log")
 
 
-def _onset(axis: Axes, cases: list[FittedCase], model: CalibratedModel) -> None:
+def _onset(axis: Axes, cases: Cases, model: CalibratedModel) -> None:
     for (plane, yielding), color in _COLORS.items():
-        same = [c for c in cases if c.kind == (plane, yielding)]
-        if same:
-            k = model.elastic_k(Points.of(same))
-            s, own = np.array([(c.s, c.k) for c in same]).T / k
-            axis.plot(s, own, _STYLES[plane][0], ms=4, mfc="none", color=color, label=f"plane {plane}, {yielding}")
+        same = of_kind(cases, (plane, yielding))
+        if len(same):
+            k, label = model.elastic_k(Points.of(same)), f"plane {plane}, {yielding}"
+            axis.plot(same.s / k, same.k / k, _STYLES[plane][0], ms=4, mfc="none", color=color, label=label)
     label = "s / k of the elastic joint,  s = sigY R/(E* ΔR)"
     axis.set(xlabel=label, ylabel="k / k of the elastic joint", xscale="log")
 
 
 def _threshold(
-    axis: Axes, cases: list[FittedCase], model: CalibratedModel | None, over: str, label: str, by: str, name: str,
+    axis: Axes, cases: Cases, model: CalibratedModel | None, over: str, label: str, by: str, name: str,
     values: tuple[float, ...],
 ) -> None:  # fmt: skip
     """c of like bodies, nu = 0.3, over one of dR/R and sigY/E*, in the colour of the other."""
-    _points(axis, cases, lambda c: (getattr(c, over), c.c), "0.4")
+    _points(axis, cases, over, "c", "0.4")
     bounds = {plane: model.bounds((plane, "both")) for plane in PLANES} if model else {}
     for i, value in enumerate(values):
-        same = [c for c in cases if math.isclose(getattr(c, by), value, rel_tol=0.02)]
-        _points(axis, same, lambda c: (getattr(c, over), c.c), f"C{i}")
+        _points(axis, cases[np.isclose(cases[by], value, rtol=0.02)], over, "c", f"C{i}")
         for plane, found in bounds.items():
             if found:
                 s = np.geomspace(max(0.1, found["s"][0]), 1.2, 50)
-                x = s * value if over == "strength" else value / s
-                s, x = (part[(over == "strength") | ((x >= 0.001) & (x <= 0.02))] for part in (s, x))
-                if len(s):
-                    joints = [_Joint(plane, s=one, clearance=value) for one in s]
-                    _line(axis, x, joints, model, 1, f"C{i}", f"{name} = {value:.2%}")
+                if over == "clearance":
+                    s = s[(value / s >= 0.001) & (value / s <= 0.02)]
+                x, said = s * value if over == "strength" else value / s, f"{name} = {value:.2%}"
+                _line(axis, x, model, plane, f"C{i}", said, s=s, clearance=value)
     if axis.lines:
         axis.axhline(1, color="black", lw=0.8, label="c = 1")
     axis.set(xlabel=label, ylabel="c, like bodies, ν = 0.3", xscale="log")
 
 
-def _parity(axis: Axes, cases: list[FittedCase], model: CalibratedModel) -> None:
+def _parity(axis: Axes, cases: Cases, model: CalibratedModel) -> None:
     from matplotlib.ticker import FixedLocator, NullFormatter
 
     k, c = predictions(model, cases)
-    axis.plot([case.k for case in cases], k, ".", ms=4, color="C0", label="k")
-    axis.plot([case.told_c for case in cases], np.where(np.isfinite(c), c, np.nan), ".", ms=4, color="C3", label="c")
+    axis.plot(cases.k, k, ".", ms=4, color="C0", label="k")
+    axis.plot(cases.told_c, np.where(np.isfinite(c), c, np.nan), ".", ms=4, color="C3", label="c")
     ends = np.array([0.3, 2.6])
     axis.plot(ends, ends, color="black", lw=0.8)
     axis.fill_between(ends, 0.95 * ends, 1.05 * ends, color="0.85", label="5 %")

@@ -14,7 +14,7 @@ from archord.postprocess.laws.calibrated import ROWS, calibrated, joint_calibrat
 from archord.postprocess.laws.chord_laws import plastic_force
 from archord.postprocess.laws.joint import LawJoint, LawRangeError, LawRangeWarning
 from archord.postprocess.laws.laws import LAWS
-from archord.postprocess.laws.study import KINDS, read_cases, shipped_rows, study, usable
+from archord.postprocess.laws.study import KINDS, joint_of_case, of_kind, read_cases, shipped_rows, study, usable
 from archord.scene.file import load_scene
 from archord.studies.calibration_design import as_sweep, joints
 
@@ -33,9 +33,9 @@ def test_the_rows_are_the_design():
     assert (SCENES / "calibration.sweep.toml").read_text() == as_sweep()
     design = joints()
     assert len(CASES) == len(design) >= 200
-    assert {case.kind for case in CASES} == {(p, y) for p in ("strain", "stress") for y in ("none", "both", "block")}
-    for case, joint in zip(CASES, design, strict=True):
-        assert case.kind == (joint.plane, joint.yielding)
+    assert set(zip(CASES.plane, CASES.yielding, strict=True)) == set(KINDS)
+    for case, joint in zip(CASES.itertuples(), design, strict=True):
+        assert (case.plane, case.yielding) == (joint.plane, joint.yielding)
         pin_nu = math.nan if joint.alpha == 1 else joint.pin_nu
         found, meant = (case.alpha, case.nu, case.pin_nu, case.s), (joint.alpha, joint.nu, pin_nu, joint.s)
         assert found == pytest.approx(meant, rel=1e-4, abs=1e-5, nan_ok=True)
@@ -83,12 +83,12 @@ def test_the_law_in_words_is_the_model():
         assert stated in law.remarks
 
 
-@pytest.mark.parametrize("case", CASES[::15], ids=lambda case: case.run)
+@pytest.mark.parametrize("case", CASES[::15].itertuples(), ids=lambda case: case.run)
 def test_k_and_c_of_a_row_are_those_of_its_curve(case):
     """An independent least squares fit to the stored forces."""
 
     def law(x, k, c=math.nan):
-        return plastic_force(case.joint(k, c), x * case.clearance) / case.clearance
+        return plastic_force(joint_of_case(case, k, c), x * case.clearance) / case.clearance
 
     start = [0.9 * case.k] if math.isnan(case.c) else [0.98 * case.k, 1.02 * case.c]
     found, _ = curve_fit(law, case.load, case.P, p0=start, bounds=(0, np.inf), ftol=1e-14, xtol=1e-14)
@@ -99,9 +99,9 @@ def test_held_out_cases_are_met_as_well_as_foretold():
     """Through the law as users ask it; the model is better than one k, and hardly worse than each joint's own k, c."""
     held = fresh().held
     off = []
-    for case in held:
+    for case in held.itertuples():
         delta = case.load * case.clearance
-        force = LAWS["calibrated"].force(case.joint(0.85, case.strength), delta, "raise")
+        force = LAWS["calibrated"].force(joint_of_case(case, 0.85, case.strength), delta, "raise")
         off.append((force / case.clearance / case.P - 1)[case.load > 0.45])
     rms = np.sqrt((np.array(off) ** 2).mean())
     stated = shipped_model().data["errors"]
@@ -167,9 +167,8 @@ def test_a_strong_joint_is_elastic():
 def test_everywhere_in_the_range_k_and_c_are_sensible(plane, yielding):
     """Between those of the cases fitted, give or take a tenth: polynomials do not run away between them."""
     random = np.random.default_rng(5)
-    same = [case for case in CASES if case.kind == (plane, yielding)]
-    k, c = [case.k for case in same], [case.c for case in same if math.isfinite(case.told_c)]
-    least, most = min(case.s for case in same), 1.0
+    same = of_kind(CASES, (plane, yielding))
+    k, c, least, most = same.k, same.told_c.dropna(), same.s.min(), 1.0
     checked = 0
     for nu, pin_nu, ratio, s in random.uniform([0, 0, 0.5, least], [0.49, 0.49, 9, most], (200, 4)):
         try:
