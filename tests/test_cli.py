@@ -1,4 +1,4 @@
-"""The command as a user runs it: exit codes, sentences, what is written and what is imported."""
+"""The command as a user runs it: exit codes, sentences and what is written."""
 
 import json
 import os
@@ -217,25 +217,3 @@ def test_scene_prints_schema_and_example(tmp_path):
     result = archord("solve", "example.toml", *COARSE, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert archord("scene", cwd=tmp_path).returncode == 2
-
-
-def test_a_scene_loads_only_what_it_needs(tmp_path):
-    """No plotting library; an elastic scene leaves the return map alone; --help imports no solver."""
-    code = (
-        "import sys; from archord.cli import run\n"
-        "code = run(sys.argv[1:]); print(code, *sorted(m for m in sys.modules), file=sys.stderr)"
-    )
-
-    def modules(*arguments: str) -> set[str]:
-        command = [sys.executable, "-c", code, *arguments]
-        result = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
-        loaded = result.stderr.split()
-        assert loaded[0] == "0", result.stderr
-        return set(loaded)
-
-    elastic = ["--set", "pin.yield_stress=", "--set", "block.yield_stress="]
-    solving = modules("solve", SCENE, *COARSE, *elastic, "-q")
-    assert "dolfinx" in solving
-    assert solving.isdisjoint({"matplotlib", "pyvista", "vtk", "archord.materials.j2"})
-    helping = modules("--help")
-    assert helping.isdisjoint({"numpy", "dolfinx", "pydantic", "mpi4py", "gmsh"})

@@ -1,7 +1,6 @@
 """The commands ``archord laws`` and ``archord law``: tables, pictures, sentences."""
 
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -146,15 +145,6 @@ def test_a_law_is_not_drawn_over_its_scene(tmp_path, capsys):
         assert file.read_text() == text
     assert run(["law", "paper", "--scene", str(scene), "--plot", str(picture)]) == 0
     assert picture.read_bytes()[1:4] == b"PNG"
-
-
-def test_a_table_needs_no_plotting():
-    """Nor dolfinx."""
-    import subprocess
-
-    code = f"import sys; from archord.cli import run; run(['law', 'paper', *{JOINT}]); print(*sys.modules)"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert {"matplotlib", "dolfinx", "petsc4py"}.isdisjoint(result.stdout.split())
 
 
 def test_calibrated_law_beside_the_paper_s(capsys):

@@ -2,15 +2,13 @@
 
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from archord import ranks
 from archord.cli import run
-from tests.test_cli import ENVIRONMENT, archord
+from tests.test_cli import archord
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")
 COARSE = ["--set", "joint.relative_element_size=0.3"]
@@ -105,14 +103,6 @@ def test_a_command_of_one_rank_forgets_the_launcher(launched, rank):
         5 if rank == "0" else 0
     )
     assert seen == ([False] if rank == "0" else [])
-
-
-def test_laws_load_no_mpi_even_under_a_launcher(tmp_path):
-    """Nor dolfinx: a law is there in half a second."""
-    code = "import sys; from archord.cli import run; run(['laws']); print({'mpi4py', 'dolfinx'} & {*sys.modules})"
-    environment = ENVIRONMENT | {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "2", "PMIX_RANK": "0"}
-    result = subprocess.run([sys.executable, "-c", code], env=environment, cwd=tmp_path, capture_output=True, text=True)
-    assert result.stdout.splitlines()[-1] == "set()"
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,6 @@
 
 import json
 import shutil
-import subprocess
-import sys
 
 import matplotlib.image
 import pytest
@@ -111,14 +109,3 @@ def test_a_broken_run_is_one_sentence(copy, capsys, name, length, said):
     assert err.startswith(said.format(copy))
     assert err.count("\n") == 1
     assert not list(copy.glob("*.png"))
-
-
-def test_tables_load_no_plotting_and_no_solver(runs):
-    """Nor pandas."""
-    code = (
-        "import sys; from archord.cli import run; code = run(sys.argv[1:]); "
-        "print(code, {'matplotlib', 'pandas', 'dolfinx', 'basix', 'cffi', 'scipy', 'pyvista'} & {*sys.modules})"
-    )
-    command = [sys.executable, "-c", code, "show", str(runs["coarse"]), "--no-pictures"]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert result.stdout.splitlines()[-1] == "0 set()", result.stderr

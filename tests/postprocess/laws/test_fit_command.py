@@ -1,8 +1,6 @@
 """``archord fit`` as a user runs it."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -128,13 +126,6 @@ def test_bad_input_is_one_sentence(runs, tmp_path, capsys, arguments, said):
     assert err.startswith(said.format(**folders))
     assert err.count("\n") == 1
     assert not list((tmp_path / "empty").iterdir())
-
-
-def test_no_picture_loads_no_plotting_library(runs, tmp_path):
-    """matplotlib only for --picture."""
-    code = f"import sys; from archord.cli import run; run(['fit', {str(runs['elastic'])!r}]); print('matplotlib' in sys.modules)"  # noqa: E501
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.splitlines()[-1] == "False"
 
 
 def _through(delta, P):
