@@ -76,12 +76,11 @@ class FieldWriter:
     def _contact_on_cells(self) -> tuple[Array, Array]:
         """Share of each cell's contact facet in contact, and the mean pressure on it; zero elsewhere."""
         share, pressure = np.zeros(self.order.n_cells), np.zeros(self.order.n_cells)
-        for side in self.joint.sides.values():
-            state = self.joint.contact.state(side)
-            if state is not None and len(side.cells):
-                w = side.weight / side.weight.sum(axis=1, keepdims=True)
-                share[side.cells] = (w * (state.pressure > 0)).sum(axis=1)
-                pressure[side.cells] = (w * state.pressure).sum(axis=1)
+        for pair in self.joint.contact.pairs:
+            side = pair.surface
+            w = side.weight / side.weight.sum(axis=1, keepdims=True)
+            share[side.cells] = (w * (pair.pressure > 0)).sum(axis=1)
+            pressure[side.cells] = (w * pair.pressure).sum(axis=1)
         return share, pressure
 
     def _write_xdmf(self, file: StepFile) -> None:

@@ -67,22 +67,18 @@ def arc_profile(contact: Contact, side: Surface, radius: float, axis_point: Arra
 
     ``axis_point`` is the end of the arc on the contact axis. Collective.
     """
-    state = contact.state(side)
-    if state is None:
+    pair = contact.pair_of(side)
+    if pair is None:
         return None
     n, q = side.n_facets, side.weight.shape[1]
     local = np.zeros((n, q, 5))
     displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
-    values = np.concatenate(
-        [side.weight[..., None], displaced, state.pressure[..., None], state.gap[..., None]], axis=-1
-    )
-    local[side.facet] = values
+    at_points = (side.weight, displaced[..., 0], displaced[..., 1], pair.pressure, pair.distance)
+    local[side.facet] = np.stack(at_points, axis=-1)
     whole = side.sum_over_ranks(local)
     s = side.arc_position(axis_point)
-    if s[0, 0] > s[-1, 0]:
-        whole, s = whole[::-1], s[::-1]
-    if s[0, 0] > s[0, -1]:
-        whole, s = whole[:, ::-1], s[:, ::-1]
+    order, along = np.argsort(s[:, 0]), slice(None, None, -1 if s[0, 0] > s[0, -1] else 1)
+    whole, s = whole[order, along], s[order, along]
     weight, raw = whole[..., 0], whole[..., 3]
     return ArcProfile(radius, s, weight, whole[..., 1:3], project(raw, s, weight), raw, whole[..., 4])
 

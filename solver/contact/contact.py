@@ -13,7 +13,6 @@ their rows of the matrix travel with PETSc's assembly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,20 +20,10 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.materials.points import Points
 from archord.solver.contact.interaction import Interaction, raise_together
-from archord.solver.contact.sparsity import Reach, distinct
+from archord.solver.contact.pair import Pair
+from archord.solver.contact.sparsity import Reach
 from archord.solver.contact.surface import Surface
 from archord.solver.contact.tangent import ContactTangent, trial_rate
-
-
-@dataclass(frozen=True)
-class PointState:
-    """What a surface's points carry: arrays ``(n_facets_of_this_rank, q)`` and the facets' numbers on the surface."""
-
-    facet: np.ndarray
-    gap: Array  # positive when open
-    pressure: Array
-    normal: Array  # (n, q, 2) outward normal of the opposite surface
-    found: np.ndarray
 
 
 class Contact:
@@ -141,8 +130,12 @@ class Contact:
         return self._tangent
 
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
-        """Block ``(rows, columns)`` in global dofs that the contact may fill, the same on every rank."""
-        return distinct(np.concatenate([reach.entries() for reach in self._reaches], axis=1))
+        """Block ``(rows, columns)`` in global dofs that the contact may fill, those of all ranks, each once.
+        Collective."""
+        size = self.surfaces[0].V.dofmap.index_map.size_global
+        rows, columns = self.tangent.rows, self.tangent.columns
+        slots = (rows * size + columns)[(rows < size) & (columns < size)]
+        return np.divmod(np.unique(np.concatenate(self.comm.allgather(slots))), size)
 
     def resultant(self, name: str = "") -> Array:
         """Contact force ``(2,)`` on the second surface of the interaction ``name``, the first without, over all
@@ -175,11 +168,6 @@ class Contact:
         """Number of points under pressure, over all ranks."""
         return self.comm.allreduce(sum(int((pair.traction[:, 0] > 0).sum()) for pair in self.pairs))
 
-    def state(self, surface: Surface) -> PointState | None:
-        """Gap and pressure at the points of ``surface``; None if it is not integrated."""
-        for pair in self.pairs:
-            if pair.surface is surface:
-                shape, P = surface.weight.shape, pair.projection
-                pressure, normal = pair.traction[:, 0].reshape(shape), P.normal.reshape(*shape, 2)
-                return PointState(surface.facet, pair.distance.reshape(shape), pressure, normal, P.found.reshape(shape))
-        return None
+    def pair_of(self, surface: Surface) -> Pair | None:
+        """The points of ``surface`` against its opposite; None if it is not integrated."""
+        return next((pair for pair in self.pairs if pair.surface is surface), None)

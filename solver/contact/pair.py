@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.kernels.compiled import library, pointer
 from archord.materials.points import Points
 from archord.solver.contact.law import ContactLaw
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -30,7 +28,6 @@ class Pair:
         self, surface: Surface, opposite: Surface | RigidSurface, law: ContactLaw, share: float, *, moves: bool
     ) -> None:
         self.surface, self.opposite, self.law, self.share, self.moves = surface, opposite, law, share, moves
-        self._kernels = library(Path(__file__).with_name("contact_forces.c"))
         self._unit_gamma = np.repeat(share * surface.gamma, surface.weight.shape[1])
         x, self._outward = surface.point.reshape(-1, 2), surface.outward.reshape(-1, 2)
         self.projection = opposite.curve.closest_point(x, self._outward, np.zeros_like(opposite.curve.X))
@@ -105,9 +102,14 @@ class Pair:
 
     @property
     def distance(self) -> Array:
-        """Distance ``(m,)`` from the partners along their normals, positive when open."""
-        gap = self.opening[:, 0]
-        return gap if self.law.slides else gap + (self.separation * self.projection.normal).sum(1)
+        """Distance ``(n, q)`` of the points of this rank's facets from their partners, positive when open."""
+        closed = 0.0 if self.law.slides else (self.separation * self.projection.normal).sum(1)
+        return (self.opening[:, 0] + closed).reshape(self.surface.weight.shape)
+
+    @property
+    def pressure(self) -> Array:
+        """Pressure ``(n, q)`` at the points of this rank's facets."""
+        return self.traction[:, 0].reshape(self.surface.weight.shape)
 
     @property
     def forces(self) -> Array:
@@ -117,8 +119,9 @@ class Pair:
 
     def add_forces(self, own: Array, opposite: Array) -> None:
         """Add the forces on the nodes of the own surface to ``own`` ``(nodes, 2)``, their reactions to ``opposite``."""
-        surface, P = self.surface, self.projection
-        on_own = self.forces, surface.trace_shape, surface.curve.connectivity[surface.facet]
-        arrays = *on_own, P.shape, P.nodes, own, opposite
-        sizes = *surface.trace_shape.shape, P.shape.shape[1]
-        self._kernels.contact_forces(*sizes, *map(pointer, arrays))
+        surface, P, forces = self.surface, self.projection, self.forces
+        on_facets = np.einsum("nqk,nqi->nki", surface.trace_shape, forces.reshape(*surface.weight.shape, 2))
+        nodes = surface.curve.connectivity[surface.facet]
+        for i in range(2):
+            own[:, i] += np.bincount(nodes.ravel(), on_facets[..., i].ravel(), len(own))
+            opposite[:, i] -= np.bincount(P.nodes.ravel(), (P.shape * forces[:, i, None]).ravel(), len(opposite))

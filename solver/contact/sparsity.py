@@ -1,4 +1,4 @@
-"""Which matrix entries a contact may fill, kept ahead of the sliding pairs and the same on every rank."""
+"""Which facets may meet, and so which matrix entries a contact may fill: kept ahead of the sliding pairs."""
 
 from __future__ import annotations
 
@@ -51,25 +51,3 @@ class Reach:
     def facets(self) -> tuple[np.ndarray, np.ndarray]:
         """The facets ``(n,)`` that may meet: own and opposite."""
         return np.divmod(self.keys, self._n)
-
-    def entries(self) -> np.ndarray:
-        """Block rows and columns ``(2, n)`` in global dofs, over all ranks; a rigid opposite has none."""
-        own, opposite = self.pair.surface, self.pair.opposite
-        facet, met = self.facets()
-        cells, trace = own.curve_cell_dofs, own.curve_dofs[own.curve.connectivity]
-        found = [_all_pairs(trace, cells)]
-        if not opposite.rigid:
-            there = opposite.curve_dofs[opposite.curve.connectivity[met]]
-            found += [_all_pairs(trace[facet], there), _all_pairs(there, cells[facet]), _all_pairs(there, there)]
-        return np.concatenate(found, axis=1)
-
-
-def _all_pairs(rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Each of ``rows`` ``(n, r)`` with each of ``columns`` ``(n, c)``: ``(2, n r c)``."""
-    return np.stack([np.repeat(rows, columns.shape[1], axis=1).ravel(), np.tile(columns, (1, rows.shape[1])).ravel()])
-
-
-def distinct(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of the ``entries`` ``(2, n)``, each pair once and sorted."""
-    size = 1 + entries.max(initial=0)
-    return np.divmod(np.unique(entries[0] * size + entries[1]), size)

@@ -26,8 +26,8 @@ class Surface:
     Arrays of this rank's ``n`` facets with ``q`` points each, in the order in which the curve runs: ``weight`` ``(n,
     q)`` (measure of the curved edge), ``point`` and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own
     cell's basis, ``shape`` ``(n, q, a)`` and of it ``trace_shape`` ``(n, q, k)`` of the nodes on the facet, ``gamma``
-    ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve, ``trace`` their nodes within the cell;
-    ``curve_cell_dofs`` holds the global cell dofs of every facet of the curve, on every rank.
+    ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve, ``trace`` their nodes within the cell. The
+    ``curve`` and ``curve_dofs``, the global dofs of its nodes, are those of all ranks.
     """
 
     rigid = False
@@ -55,14 +55,13 @@ class Surface:
         x = V.tabulate_dof_coordinates()[:, :2]
         trace_dofs = np.take_along_axis(cell_dofs, trace, axis=1)
         trace_global = np.take_along_axis(global_dofs, trace, axis=1)
-        gathered = self.comm.allgather((trace_global, x[trace_dofs], global_dofs))
+        gathered = self.comm.allgather((trace_global, x[trace_dofs]))
         chain_dofs = np.concatenate([g[0] for g in gathered])
         chain_x = np.concatenate([g[1] for g in gathered])
         order = _chain(chain_dofs[:, 0], chain_dofs[:, -1])
         chain_dofs, chain_x = chain_dofs[order], chain_x[order]
         self.curve = Curve(_join(chain_x), self.degree)
         self.curve_dofs = _join(chain_dofs[..., None])[:, 0]
-        self.curve_cell_dofs = np.concatenate([g[2] for g in gathered])[order]
         position = np.empty(len(order), dtype=np.int64)
         position[order] = np.arange(len(order))
         start = sum(len(g[0]) for g in gathered[: self.comm.rank])

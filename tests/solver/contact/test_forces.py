@@ -53,12 +53,11 @@ def test_the_resultant_is_the_integrated_pressure(integrated, kinematics):
     contact.evaluate(parts.pressed(1.5 * DR, noise=3e-4))
     total, active = np.zeros(2), 0
     for pair in contact.pairs:
-        state = contact.state(pair.surface)
-        assert state.pressure.min() == 0
-        assert not state.pressure[~state.found].any()
+        assert pair.pressure.min() == 0
+        assert not pair.traction[~pair.projection.found].any()
         sign = 1 if pair.surface is parts.sides[-1] else -1
-        total += sign * pair.share * np.einsum("nq,nq,nqi->i", pair.surface.weight, state.pressure, state.normal)
-        active += int((state.pressure > 0).sum())
+        total += sign * pair.share * (pair.surface.weight * pair.pressure).ravel() @ pair.projection.normal
+        active += int((pair.pressure > 0).sum())
     assert sum(pair.share for pair in contact.pairs) == pytest.approx(1, rel=1e-15)
     np.testing.assert_allclose(contact.resultant(), total, rtol=0, atol=1e-15 * np.abs(total).max() * 100)
     assert contact.n_active() == active > 0
@@ -104,11 +103,11 @@ def test_the_gap_at_rest_is_the_clearance(kinematics):
     parts = joint_parts(size=0.1, kinematics=kinematics)
     parts.contact.evaluate(parts.pressed(0.0))
     for side in parts.sides:
-        state = parts.contact.state(side)
+        pair = parts.contact.pair_of(side)
         phi = np.arctan2(side.point[..., 0], -side.point[..., 1])
         expected = DR * (1 - np.cos(phi))
         geometry = 0.1**4 / 384  # sagitta error of a parabola through three points of an arc, 3 % of it
-        assert np.abs(state.gap - expected)[state.found].max() < 1.5 * DR**2 + geometry
+        assert np.abs(pair.distance - expected).ravel()[pair.projection.found].max() < 1.5 * DR**2 + geometry
 
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])

@@ -51,12 +51,12 @@ def test_only_points_beyond_the_ends_have_no_partner():
         u = parts.pressed(0.0)
         u[nodes_of(parts.V, parts.cells, Cells.PIN), 1] -= depth
         contact.evaluate(u)
-        pin, hole = (contact.state(side) for side in parts.sides)
+        pin, hole = (contact.pair_of(side).projection.found.reshape(side.weight.shape) for side in parts.sides)
         below = parts.sides[0].point[..., 1] - depth < 0
         assert below.any()
-        assert pin.found[below].all()
+        assert pin[below].all()
         covered = parts.sides[1].point[..., 1] < -DR - depth
-        assert hole.found[covered].all()
+        assert hole[covered].all()
 
 
 @pytest.mark.mpi

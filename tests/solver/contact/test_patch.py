@@ -37,7 +37,7 @@ class Blocks:
     def pressures(self) -> np.ndarray:
         """Pressure at all points of the integrated sides."""
         contact = self.system.contact
-        return np.concatenate([contact.state(pair.surface).pressure.ravel() for pair in contact.pairs])
+        return np.concatenate([pair.pressure.ravel() for pair in contact.pairs])
 
 
 def uniform(V):

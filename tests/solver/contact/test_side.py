@@ -111,9 +111,9 @@ def test_arc_position(number, radius, centre, comm):
 @pytest.mark.mpi
 @both_sides
 def test_every_rank_holds_the_same_curve(number, radius, centre, comm):
-    """Nodes, their dofs and cells; each facet belongs to one rank, and its points lie where the curve has it."""
+    """Nodes and their dofs; each facet belongs to one rank, and its points lie where the curve has it."""
     side = joint_parts(comm).sides[number]
-    for item in (side.curve.X, side.curve_cell_dofs, side.curve_dofs):
+    for item in (side.curve.X, side.curve_dofs):
         for other in comm.allgather(item):
             np.testing.assert_array_equal(other, item)
     facets = np.sort(np.concatenate(comm.allgather(side.facet)))
