@@ -22,6 +22,7 @@ from archord.output.run_state import Standing, halt, resume
 from archord.output.stale_jit import without_stale_forms
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
+from archord.presets.joint_report import UNSEEN, step_warnings
 from archord.presets.measures import Measures, Work, arc_profiles, measure
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
@@ -34,11 +35,6 @@ from archord.solver.timer import Timer
 
 if TYPE_CHECKING:
     from archord.output.fields import FieldWriter
-
-_UNSEEN = (
-    "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
-    "reduce joint.element_size or increase the load"
-)
 
 
 @dataclass
@@ -103,7 +99,7 @@ def solve_scene(
                     joint.load_path(position, coarse),
                     scene.targets,
                     rules=StepRules(**scene.stepping.model_dump()),
-                    substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
+                    substep_done=lambda load: work.add(joint.delta(), joint.driving_force()),
                     target_done=target_done,
                     attempted=on_attempt,
                     gave_up=output.debug if debug else lambda load: None,
@@ -115,9 +111,11 @@ def solve_scene(
         except Interrupted as interrupted:
             status, message = "interrupted", f"{interrupted} after step {len(output.steps)}"
             received = interrupted.number
-        unseen = status == "done" and output.unseen()
+        # pressed together, but no contact point ever noticed
+        pressed, noticed = any(m.delta > 0 for m in output.steps), any(m.contact_area for m in output.steps)
+        unseen = status == "done" and pressed and not noticed
         if unseen:
-            status, message = "stopped", _UNSEEN
+            status, message = "stopped", UNSEEN
         try:
             warnings = output.finish(status, message, failed)
         except WriteError as error:
@@ -195,13 +193,13 @@ class _Output:
 
     def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
         """Make ``m`` the last step of all files but the checkpoint. Collective."""
-        core_peeq = self.joint.core_peeq()
+        warnings = step_warnings(self.joint, profiles, m, step.residual)
 
         def add() -> None:
             assert self._report is not None
             self._contact.write(m.step, m.delta, profiles)
             self._history.add(m)
-            self._report.add(m, step, profiles, core_peeq)
+            self._report.add(m, step, warnings)
 
         with self.joint.timer("output"):
             if self._fields is not None:
@@ -220,10 +218,6 @@ class _Output:
         from archord.output.fields import FieldWriter
 
         FieldWriter(self.folder, self._order, debug=True).write(load)
-
-    def unseen(self) -> bool:
-        """Whether the pin was pressed into the hole but no contact point ever noticed."""
-        return max(m.delta for m in self.steps) > 0 and not any(m.contact_area for m in self.steps)
 
     def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
         """Note how the run ended; returns the warnings on rank 0. Collective."""

@@ -18,20 +18,14 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.output.disk import replace_file
-from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
-from archord.presets.measures import Measures
+from archord.presets.joint_report import APART, mesh_facts, model_facts, rough_arcs
+from archord.presets.measures import Measures, energy_balance
 from archord.solver.stepping import Step
 from archord.solver.timer import BEFORE_SOLVING
 
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")
 _KILOBYTES = 1 if sys.platform == "darwin" else 1024  # unit of ru_maxrss in bytes
-_FEW_FACETS = 5
-_ROUGH = 0.01  # of the clearance
-_APART = (
-    "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; give a "
-    "displacement or a force above 0 if it should"
-)
 
 
 class Report:
@@ -59,15 +53,15 @@ class Report:
             "command": sys.argv,
             "versions": _versions(),
             "ranks": joint.comm.size,
-            "mesh": _mesh(joint),
-            "model": _model(joint),
+            "mesh": mesh_facts(joint),
+            "model": model_facts(joint),
             "tolerances": {
                 "newton": joint.solver.tolerance,
                 "gamma_factor": joint.scene.analysis.gamma_factor,
             },
             "linear_solver": {},
             "restarts": [],
-            "warnings": _rough_arcs(joint),
+            "warnings": rough_arcs(joint),
             "steps": [],
         }
         self._before: dict[str, Any] = before or {}
@@ -83,16 +77,16 @@ class Report:
             "started": before["started"],
             "command": before["command"],
             "restarts": [*before.get("restarts", []), restart],
-            "warnings": [w for w in before["warnings"] if _step_of(w) <= done and w != _APART],
+            "warnings": [w for w in before["warnings"] if _step_of(w) <= done and w != APART],
             "steps": steps,
         }
 
-    def add(self, m: Measures, step: Step, profiles: dict[str, ArcProfile], core_peeq: float = 0.0) -> None:
-        """Note an accepted output step, at which the core has a PEEQ of up to ``core_peeq`` (`Joint.core_peeq`)."""
+    def add(self, m: Measures, step: Step, warnings: Sequence[str]) -> None:
+        """Note an accepted output step, and what to warn of at it."""
         self.measures.append(m)
         if m.contact_area:
             self._residual = max(self._residual, step.residual)
-        self.content["warnings"] += _warnings(self.joint, profiles, m, step.residual, core_peeq)
+        self.content["warnings"] += [f"step {m.step}: {text}" for text in warnings]
         self.content["steps"].append(
             asdict(m)
             | {"substeps": step.substeps, "coarse_iterations": step.coarse_iterations}
@@ -106,7 +100,7 @@ class Report:
         """Note how the run ended, and the output step that ``failed``."""
         self.content |= {"status": status, "message": message}
         if status == "done" and not any(m.contact_area for m in self.measures):
-            self.content["warnings"].append(_APART)
+            self.content["warnings"].append(APART)
         if failed is not None:
             self.content["failed_step"] = asdict(failed)
         self.write()
@@ -162,19 +156,6 @@ def peak_memory() -> int:
         return _KILOBYTES * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
-def energy_balance(steps: Sequence[Measures], *, press_fit: bool = False) -> float | None:
-    """How far work and stored and dissipated energy of the last of the ``steps`` are apart, over the largest work.
-
-    The pin of a ``press_fit``, too large for its hole, stores energy before there is a load, by work that nobody
-    counted: there both count from the first step on, and the result is None where that is the only one.
-    """
-    if press_fit and len(steps) == 1:
-        return None
-    missing = [m.work - m.elastic_energy - m.plastic_dissipation for m in (steps[0], steps[-1])]
-    work = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
-    return abs(missing[1] - (missing[0] if press_fit else 0.0)) / work if work else 0.0
-
-
 def _step_of(warning: str) -> int:
     """The step that a warning is about; 0 if it is about the joint."""
     return int(warning.removeprefix("step ").partition(":")[0]) if warning.startswith("step ") else 0
@@ -203,69 +184,3 @@ def _versions() -> dict[str, str]:
         "numpy": np.__version__,
         "python": platform.python_version(),
     }
-
-
-def _mesh(joint: Joint) -> dict[str, Any]:
-    lengths = {name: s.facet_lengths() for name, s in joint.sides.items()}
-    return {
-        "cells": joint.n_cells,
-        "dofs": joint.n_dofs,
-        "contact_facets": {name: len(length) for name, length in lengths.items()},
-        "element_size_on_arc": {name: [float(length.min()), float(length.max())] for name, length in lengths.items()},
-        "growth": joint.scene.joint.growth,
-        "block_size": joint.scene.joint.W,
-    }
-
-
-def _model(joint: Joint) -> dict[str, Any]:
-    scene = joint.scene
-    return {
-        "E_star": scene.E_star,
-        "clearance": scene.joint.dR,
-        "target": scene.target,
-        "plastic": joint.bulk.plastic,
-        "pin": "rigid" if scene.pin.rigid else "deformable",
-        "contact_shares": [pair.share for pair in joint.contact.pairs],
-    }
-
-
-def _rough_arcs(joint: Joint) -> list[str]:
-    """A warning if the parabolic facets depart too much from their circles for the clearance.
-
-    A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``. Equal facets that
-    face each other are off alike, which leaves the gap as it is.
-    """
-    geometry = joint.scene.joint
-    if not joint.scene.pin.rigid and geometry.size_ratio == 1:
-        return []
-    lengths = [side.facet_lengths().max() for side in joint.sides.values()]
-    off = (1 - np.cos(max(lengths) / geometry.radius / 2)) ** 2 / 8 * geometry.radius / abs(geometry.dR)
-    if off <= _ROUGH:
-        return []
-    return [f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"]
-
-
-def _warnings(
-    joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float, core_peeq: float
-) -> list[str]:
-    said = []
-    if joint.scene.joint.model == "block" and any(p.in_contact[-1] > 0 for p in profiles.values()):
-        said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
-    touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
-    if m.contact_area and touching < _FEW_FACETS:
-        said.append(
-            f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
-        )
-    if core_peeq > 0:
-        said.append(
-            f"the pin yields where the force is applied, with PEEQ up to {core_peeq:.1e} in its core, and delta, the "
-            "mean displacement of the core, contains by how much it is squashed there; a larger load.core_radius would "
-            "spread the force"
-        )
-    if abs(m.delta) > 0.1 * joint.scene.joint.radius:
-        said.append("delta exceeds 0.1 R, too much for small-strain theory")
-    if residual > 1e-8 and m.contact_area:
-        said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
-    if m.force_balance > 1e-8:
-        said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")
-    return [f"step {m.step}: {text}" for text in said]

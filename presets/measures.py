@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,3 +97,16 @@ def measure(
         cutbacks=step.cutbacks,
         seconds=seconds,
     )
+
+
+def energy_balance(steps: Sequence[Measures], *, press_fit: bool = False) -> float | None:
+    """How far work and stored and dissipated energy of the last of the ``steps`` are apart, over the largest work.
+
+    The pin of a ``press_fit``, too large for its hole, stores energy before there is a load, by work that nobody
+    counted: there both count from the first step on, and the result is None where that is the only one.
+    """
+    if press_fit and len(steps) == 1:
+        return None
+    missing = [m.work - m.elastic_energy - m.plastic_dissipation for m in (steps[0], steps[-1])]
+    work = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
+    return abs(missing[1] - (missing[0] if press_fit else 0.0)) / work if work else 0.0

@@ -6,9 +6,9 @@ from mpi4py import MPI
 
 from archord.benchmarks.persson import DR, UNLIKE, persson_joint, theory, unlike
 from archord.output.run import solve_scene
-from archord.output.run_json import energy_balance
 from archord.postprocess.laws.elastic_laws import persson_pressure
 from archord.postprocess.laws.joint import LawJoint
+from archord.presets.measures import energy_balance
 from archord.scene.sections import Load
 from tests.solver.solving import solve
 

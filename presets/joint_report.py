@@ -1,0 +1,89 @@
+"""What run.json says of a joint: its mesh and model, and what its user should be warned of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from archord.presets.arc import ArcProfile
+from archord.presets.joint import Joint
+from archord.presets.measures import Measures
+
+_FEW_FACETS = 5
+_ROUGH = 0.01  # of the clearance
+APART = (
+    "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; give a "
+    "displacement or a force above 0 if it should"
+)
+UNSEEN = (
+    "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
+    "reduce joint.element_size or increase the load"
+)
+
+
+def mesh_facts(joint: Joint) -> dict[str, Any]:
+    """Sizes of the mesh."""
+    lengths = {name: s.facet_lengths() for name, s in joint.sides.items()}
+    return {
+        "cells": joint.n_cells,
+        "dofs": joint.n_dofs,
+        "contact_facets": {name: len(length) for name, length in lengths.items()},
+        "element_size_on_arc": {name: [float(length.min()), float(length.max())] for name, length in lengths.items()},
+        "growth": joint.scene.joint.growth,
+        "block_size": joint.scene.joint.W,
+    }
+
+
+def model_facts(joint: Joint) -> dict[str, Any]:
+    """What was made of the scene."""
+    scene = joint.scene
+    return {
+        "E_star": scene.E_star,
+        "clearance": scene.joint.dR,
+        "target": scene.target,
+        "plastic": joint.bulk.plastic,
+        "pin": "rigid" if scene.pin.rigid else "deformable",
+        "contact_shares": [pair.share for pair in joint.contact.pairs],
+    }
+
+
+def rough_arcs(joint: Joint) -> list[str]:
+    """A warning if the parabolic facets depart too much from their circles for the clearance.
+
+    A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``. Equal facets that
+    face each other are off alike, which leaves the gap as it is.
+    """
+    geometry = joint.scene.joint
+    if not joint.scene.pin.rigid and geometry.size_ratio == 1:
+        return []
+    lengths = [side.facet_lengths().max() for side in joint.sides.values()]
+    off = (1 - np.cos(max(lengths) / geometry.radius / 2)) ** 2 / 8 * geometry.radius / abs(geometry.dR)
+    if off <= _ROUGH:
+        return []
+    return [f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"]
+
+
+def step_warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
+    """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
+    said, core_peeq = [], joint.core_peeq()
+    if joint.scene.joint.model == "block" and any(p.in_contact[-1] > 0 for p in profiles.values()):
+        said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
+    touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
+    if m.contact_area and touching < _FEW_FACETS:
+        said.append(
+            f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
+        )
+    if core_peeq > 0:
+        said.append(
+            f"the pin yields where the force is applied, with PEEQ up to {core_peeq:.1e} in its core, and delta, the "
+            "mean displacement of the core, contains by how much it is squashed there; a larger load.core_radius would "
+            "spread the force"
+        )
+    if abs(m.delta) > 0.1 * joint.scene.joint.radius:
+        said.append("delta exceeds 0.1 R, too much for small-strain theory")
+    if residual > 1e-8 and m.contact_area:
+        said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
+    if m.force_balance > 1e-8:
+        said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")
+    return said
