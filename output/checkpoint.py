@@ -11,17 +11,23 @@ import hashlib
 import io
 import json
 import re
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 
 import archord
 from archord.geometry.basis import Array
 from archord.output.disk import replace_file
+from archord.presets.measures import Measures, Work
 from archord.scene.errors import InputError
+from archord.scene.file import resolved
+from archord.solver.load_path import Position
 from archord.solver.mesh_order import Arrays, MeshOrder
+from archord.solver.newton import Newton
+from archord.solver.stepping import Step
 
 FORMAT = 1
 _HEADER = 512  # HDF5 looks for its own beginning at powers of two from here
@@ -43,6 +49,17 @@ class Checkpoint:
     history: dict[str, Arrays]
     scalars: dict[str, Any] = field(default_factory=dict)
     version: str = archord.__version__
+
+
+@dataclass
+class RunState:
+    """Where a run is after an output step: the step, in numbers and in how it was reached, and what the next one starts
+    from."""
+
+    measures: Measures
+    step: Step
+    position: Position
+    work: Work
 
 
 def collect(order: MeshOrder, step: int, scene: str, fields: dict[str, Array], scalars: dict[str, Any]) -> Checkpoint:
@@ -70,6 +87,56 @@ def restore(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tupl
     names, scalars = comm.bcast(None if checkpoint is None else (list(checkpoint.fields), checkpoint.scalars))
     fields = {name: order.spread(None if checkpoint is None else checkpoint.fields[name]) for name in names}
     return fields, scalars
+
+
+def halt(order: MeshOrder, at: RunState) -> Checkpoint:
+    """The checkpoint (on rank 0) from which `resume` goes on. Collective."""
+    joint, position = order.system, at.position
+    state = joint.equilibrium.state()
+    fields = {"displacement": _nodal(state)}
+    scalars = {
+        "measures": asdict(at.measures),
+        "step": asdict(at.step),
+        "work": vars(at.work),
+        "position": {name: value for name, value in vars(position).items() if name != "increment"},
+        "largest_reaction": joint.equilibrium.largest_reaction,
+        "gamma_by_and_by": joint.solver.continues_gamma,
+        "level": float(state[-1]),
+    }
+    if position.increment is not None:
+        fields["increment"] = _nodal(position.increment)
+        scalars["level_increment"] = float(position.increment[-1])
+    return collect(order, at.measures.step, resolved(joint.scene), fields, scalars)
+
+
+def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> RunState:
+    """Give the joint the state of ``checkpoint`` (needed on rank 0 only, read from ``path``). Collective.
+
+    Raises `InputError` if it is of another mesh.
+    """
+    fields, scalars = restore(order, path, checkpoint)
+    position = Position(**scalars["position"])
+    if "increment" in fields:
+        position.increment = np.append(fields["increment"], scalars["level_increment"])
+    work = Work()
+    vars(work).update(scalars["work"])
+    step = Step(**scalars["step"])
+    step.attempts = [_newton(attempt) for attempt in scalars["step"]["attempts"]]
+    state = np.append(fields["displacement"], scalars["level"])
+    order.system.solver.continues_gamma = scalars.get("gamma_by_and_by", False)
+    order.system.equilibrium.resume(position.load, state, scalars["largest_reaction"])
+    return RunState(Measures(**scalars["measures"]), step, position, work)
+
+
+def _newton(attempt: dict[str, Any]) -> Newton:
+    """A solve as a checkpoint holds it; version 0.1 called active-set changes flips."""
+    changes = {"active_set_changes": attempt.pop("flips")} if "flips" in attempt else {}
+    return Newton(**attempt, **changes)
+
+
+def _nodal(state: Array) -> Array:
+    """The displacements ``(n_local, 2)`` in a state of the equilibrium."""
+    return state[:-1].reshape(-1, 2)
 
 
 def write(path: Path, checkpoint: Checkpoint) -> None:

@@ -8,17 +8,9 @@ composed in memory, and what goes wrong on disk is an `OSError` that names the f
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
-
-from archord.scene.errors import InputError
-
-if TYPE_CHECKING:
-    from mpi4py import MPI
-
-T = TypeVar("T")
 
 
 class WriteError(Exception):
@@ -57,22 +49,3 @@ def naming(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from None
-
-
-def on_root(comm: MPI.Comm, write: Callable[[], T]) -> T | None:
-    """What ``write()`` returns on rank 0, None elsewhere. Collective.
-
-    Raises on every rank what ``write`` raises: `InputError`, and for an `OSError` `WriteError`.
-    """
-    result, fault, kind = None, "", WriteError
-    if comm.rank == 0:
-        try:
-            result = write()
-        except InputError as error:
-            fault, kind = str(error), InputError
-        except OSError as error:
-            fault = f"{error.filename} cannot be written: {error.strerror or error}"
-    fault, kind = comm.bcast((fault, kind))
-    if fault:
-        raise kind(fault)
-    return result

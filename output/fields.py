@@ -15,7 +15,8 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.geometry.curve import lagrange
 from archord.geometry.plane_mesh import distinct_edges
-from archord.output.disk import on_root, replace_file
+from archord.output.disk import replace_file
+from archord.output.ranks import agreed
 from archord.output.step_file import StepFile
 from archord.solver.mesh_order import MeshOrder
 
@@ -40,18 +41,17 @@ class FieldWriter:
         if joint.bulk.plastic:
             self.names[1:1] = ["peeq", "peeq_increment"] if debug else ["peeq"]
 
-        def make() -> StepFile:
+        def make() -> None:
             self._nodes = SecondOrder(order.nodes_of_cell, joint.problem.degree)
             cells, points = self._nodes.cells[:, _VTK_ORDER], self._nodes(order.coordinates)
             self._n_nodes, self._n_cells = len(points), len(cells)
             fixed = {"mesh/coordinates": points, "mesh/cells": cells, "mesh/body": body_of}
             names = [*self.names, *self.nodal]
-            file = StepFile(self.path.with_suffix(".h5"), fixed, names, after=after, apart=not debug)
+            self._file = StepFile(self.path.with_suffix(".h5"), fixed, names, after=after, apart=not debug)
             if not after:
-                self._write_xdmf(file)
-            return file
+                self._write_xdmf()
 
-        self._file = on_root(joint.comm, make)
+        agreed(joint.comm, make, asleep=False)
 
     def write(self, load: float) -> None:
         """Add the last accepted state as a step, reached at ``load``. Collective. Raises `WriteError`."""
@@ -66,12 +66,11 @@ class FieldWriter:
         nodal = {name: self.order.collect(on_nodes[name]) for name in self.nodal}
 
         def write() -> None:
-            assert self._file is not None
             vectors = {k: np.pad(self._nodes(v), ((0, 0), (0, 1))) for k, v in nodal.items()}
             self._file.write(load, arrays | vectors)
-            self._write_xdmf(self._file)
+            self._write_xdmf()
 
-        on_root(joint.comm, write)
+        agreed(joint.comm, write, asleep=False)
 
     def _contact_on_cells(self) -> tuple[Array, Array]:
         """Share of each cell's contact facet in contact, and the mean pressure on it; zero elsewhere."""
@@ -83,10 +82,10 @@ class FieldWriter:
             pressure[side.cells] = (w * pair.pressure).sum(axis=1)
         return share, pressure
 
-    def _write_xdmf(self, file: StepFile) -> None:
-        scene = self.joint.scene
+    def _write_xdmf(self) -> None:
+        scene, file = self.joint.scene, self._file
         times = file.loads if scene.monotonic and not scene.force_controlled else range(1, len(file.loads) + 1)
-        grids = [self._grid(file, k, float(time)) for k, time in enumerate(times, start=1)]
+        grids = [self._grid(k, float(time)) for k, time in enumerate(times, start=1)]
         text = (
             '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
             '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
@@ -95,8 +94,8 @@ class FieldWriter:
         )
         replace_file(self.path, text)
 
-    def _grid(self, file: StepFile, step: int, time: float) -> str:
-        nodes, cells = f"{self._n_nodes} 3", f"{self._n_cells}"
+    def _grid(self, step: int, time: float) -> str:
+        file, nodes, cells = self._file, f"{self._n_nodes} 3", f"{self._n_cells}"
         nodal = "".join(_attribute(n, "Vector", "Node", _data(nodes, file.place(n, step))) for n in self.nodal)
         cell = "".join(_attribute(n, "Scalar", "Cell", _data(cells, file.place(n, step))) for n in self.names)
         return (

@@ -8,30 +8,33 @@ from typing import TypeVar
 
 from mpi4py import MPI
 
+from archord.output.disk import WriteError
 from archord.scene.errors import InputError
 
 Result = TypeVar("Result")
 _PAUSE = 0.01  # seconds between two looks
 
 
-def agreed(comm: MPI.Comm, function: Callable[[], Result]) -> Result:
-    """Call ``function`` on rank 0 alone; its result, or the `InputError` that it raised, is that of all ranks.
+def agreed(comm: MPI.Comm, function: Callable[[], Result], *, asleep: bool = True) -> Result:
+    """Call ``function`` on rank 0 alone; its result is that of all ranks. Collective.
 
-    The other ranks sleep meanwhile, which leaves their cores to rank 0. ``function`` must not call or import anything
-    collective; importing petsc4py is. Collective.
+    Raises on every rank the `InputError` that it raises, and `WriteError` for an `OSError`. The other ranks sleep
+    meanwhile, which leaves their cores to rank 0, unless that is soon done. ``function`` must not call or import
+    anything collective; importing petsc4py is.
     """
     answer: list = [None, None]
     if comm.rank == 0:
         try:
             answer[0] = function()
         except InputError as error:
-            answer[1] = str(error)
-    if comm.size > 1:
+            answer[1] = error
+        except OSError as error:
+            answer[1] = WriteError(f"{error.filename} cannot be written: {error.strerror or error}")
+    if asleep and comm.size > 1:
         arrived_before(comm)
-        answer = comm.bcast(answer)
-    result, fault = answer
+    result, fault = comm.bcast(answer)
     if fault is not None:
-        raise InputError(fault)
+        raise fault
     return result
 
 

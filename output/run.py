@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
+from archord.output.checkpoint import RunState, halt, resume
 from archord.output.checkpoint import write as write_checkpoint
 from archord.output.contact import ContactWriter
-from archord.output.disk import WriteError, naming, on_root, replace_file
+from archord.output.disk import WriteError, naming, replace_file
 from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import History
+from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
-from archord.output.run_state import Standing, halt, resume
 from archord.output.stale_jit import without_stale_forms
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
@@ -69,19 +71,19 @@ def solve_scene(
     on_step: Callable[[Measures], None] = lambda measures: None,
     on_attempt: Callable[[float, int], None] = lambda load, iterations: None,
 ) -> Outcome:
-    """Solve ``scene`` and write everything to the existing ``folder`` (see `run_folder.claim_folder`). Collective.
+    """Solve ``scene`` and write everything to the existing ``folder`` (see `folder.claim_folder`). Collective.
 
     ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``, ``on_step`` and
     ``on_attempt(load, Newton iterations)`` report progress on every rank. ``begun`` is the ``perf_counter`` from which
     the seconds count. ``debug`` writes the fields of a step that cannot be solved to debug.xdmf. A step that cannot be
-    solved, or a file that cannot be written, ends the run with status
-    "stopped", Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was accepted before stays. ``interrupt``, if given,
-    is one that the caller heeds, too. Raises `InputError` if another process solves into ``folder``, what is there
-    cannot be continued, or the scene leaves the mesh to `accuracy.solve_to_accuracy`.
+    solved, or a file that cannot be written, ends the run with status "stopped", Ctrl-C, SIGTERM and SIGHUP with
+    "interrupted"; what was accepted before stays. ``interrupt``, if given, is one that the caller heeds, too. Raises
+    `InputError` if another process solves into ``folder``, what is there cannot be continued, or the scene leaves the
+    mesh to `studies.accuracy.solve_to_accuracy`.
     """
     begun = perf_counter() if begun is None else begun
     with ExitStack() as stack:
-        on_root(comm, lambda: stack.enter_context(occupied(folder)) or True)
+        agreed(comm, lambda: bool(stack.enter_context(occupied(folder))), asleep=False)
         joint = without_stale_forms(lambda: Joint(scene, comm, timer=timer))
         on_start(joint)
         output = _Output(folder, joint, begun)
@@ -133,7 +135,8 @@ class _Output:
         self.folder, self.joint = folder, joint
         self.steps: list[Measures] = []
         self._begun = self._last = begun
-        self._report: Report | None = None
+        self._report: Report | None = None  # of rank 0
+        self._on_root = partial(agreed, joint.comm, asleep=False)
 
     def begin(self, start: Start | None) -> tuple[Position | None, Work]:
         """Make the files, or open those of the run that goes on from ``start`` (known on rank 0) and give its state to
@@ -142,16 +145,16 @@ class _Output:
         with joint.timer("output"):
             self._order = MeshOrder(joint)
             self.steps = comm.bcast(start.done if start else [])
-            on_root(comm, lambda: self._prepare(start))
+            self._on_root(lambda: self._prepare(start))
             self._fields: FieldWriter | None = None
             if joint.scene.output.fields:
                 from archord.output.fields import FieldWriter
 
                 self._fields = FieldWriter(self.folder, self._order, after=len(self.steps))
-            on_root(comm, self._write_scene)
+            self._on_root(self._write_scene)
         self._last = perf_counter()
         if not comm.bcast(start is not None):
-            on_root(comm, self._write_tables)
+            self._on_root(lambda: (self._history.write(), self._report.write()))
             return None, Work()
         with joint.timer("checkpoint"):
             at = resume(self._order, self.folder / CHECKPOINT, start.checkpoint if start else None)
@@ -159,23 +162,17 @@ class _Output:
         return at.position, at.work
 
     def _prepare(self, start: Start | None) -> None:
-        scene = self.joint.scene
         if start is None:
             with naming(self.folder):
                 clear(self.folder)
             self._write_scene()
         before = start.report if start else None
-        self._history = History(self.folder / "history.csv", scene, self.steps)
+        self._history = History(self.folder / "history.csv", self.joint.scene, self.steps)
         self._report = Report(self.folder / "run.json", self.joint, self._begun, self.steps, before)
         self._contact = ContactWriter(self.folder)
 
     def _write_scene(self) -> None:
         replace_file(self.folder / "scene.toml", resolved(self.joint.scene))
-
-    def _write_tables(self) -> None:
-        assert self._report is not None
-        self._history.write()
-        self._report.write()
 
     def add(self, step: Step, position: Position, work: Work) -> Measures:
         """Write an accepted output step, and return its measures. Collective."""
@@ -186,8 +183,8 @@ class _Output:
             largest = max((abs(m.P) for m in self.steps), default=0.0)
             m = measure(joint, len(self.steps) + 1, step, profiles, work, seconds, largest)
         with joint.timer("checkpoint"):
-            checkpoint = halt(self._order, Standing(m, step, position, work))
-            on_root(joint.comm, lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
+            checkpoint = halt(self._order, RunState(m, step, position, work))
+            self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
         self._write(m, step, profiles)
         return m
 
@@ -196,7 +193,6 @@ class _Output:
         warnings = step_warnings(self.joint, profiles, m, step.residual)
 
         def add() -> None:
-            assert self._report is not None
             self._contact.write(m.step, m.delta, profiles)
             self._history.add(m)
             self._report.add(m, step, warnings)
@@ -205,7 +201,7 @@ class _Output:
             if self._fields is not None:
                 self._fields.write(m.delta)
             self._note_memory()
-            on_root(self.joint.comm, add)
+            self._on_root(add)
         self.steps.append(m)
 
     def _note_memory(self) -> None:
@@ -221,13 +217,6 @@ class _Output:
 
     def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
         """Note how the run ended; returns the warnings on rank 0. Collective."""
-
         self._note_memory()
-
-        def note() -> list[str]:
-            if self._report is None:
-                return []
-            self._report.finish(status, message, failed)
-            return self._report.content["warnings"]
-
-        return on_root(self.joint.comm, note) or []
+        found = self._on_root(lambda: self._report.finish(status, message, failed) if self._report else [])
+        return found if self.joint.comm.rank == 0 else []

@@ -96,14 +96,15 @@ class Report:
         )
         self.write()
 
-    def finish(self, status: str, message: str, failed: Step | None = None) -> None:
-        """Note how the run ended, and the output step that ``failed``."""
+    def finish(self, status: str, message: str, failed: Step | None = None) -> list[str]:
+        """Note how the run ended, and the output step that ``failed``; returns all warnings."""
         self.content |= {"status": status, "message": message}
         if status == "done" and not any(m.contact_area for m in self.measures):
             self.content["warnings"].append(APART)
         if failed is not None:
             self.content["failed_step"] = asdict(failed)
         self.write()
+        return self.content["warnings"]
 
     def write(self) -> None:
         """Replace run.json in one move, so that a reader never sees half of it. Raises `OSError`."""

@@ -17,7 +17,8 @@ from typing import Any
 
 from mpi4py import MPI
 
-from archord.output.disk import WriteError, naming, on_root, replace_file
+from archord.output.disk import WriteError, naming, replace_file
+from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
@@ -235,7 +236,7 @@ class _Search:
             warnings.append(self._shortfall(accuracy))
         outcome = replace(outcome, warnings=warnings, accuracy=accuracy)
         try:
-            on_root(self.comm, lambda: self._note(outcome))
+            agreed(self.comm, lambda: self._note(outcome))
         except WriteError as error:
             if outcome.status == "done":
                 outcome = replace(outcome, status="stopped", message=str(error))

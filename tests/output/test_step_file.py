@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.output.disk import WriteError, on_root, replace_file
+from archord.output.disk import WriteError, replace_file
 from archord.output.history import read_history
+from archord.output.ranks import agreed
 from archord.output.run import solve_scene
 from archord.output.step_file import StepFile
 from archord.scene.errors import InputError
@@ -188,5 +189,5 @@ def test_an_error_of_rank_0_is_raised_on_every_rank(comm):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "run/fields.h5")
 
     with pytest.raises(WriteError, match=r"^run/fields\.h5 cannot be written: No space left on device$"):
-        on_root(comm, fails)
-    assert on_root(comm, lambda: 7) == (7 if comm.rank == 0 else None)
+        agreed(comm, fails, asleep=False)
+    assert agreed(comm, lambda: 7, asleep=False) == 7
