@@ -19,13 +19,13 @@ class TaggedMesh:
     cell_sets: Mapping[str, int]
     facet_sets: Mapping[str, int]
 
-    def cells_of(self, name: str) -> np.ndarray:
-        """Cells ``(n,)`` of this rank, ghosts included, of the set ``name``. Raises ValueError."""
-        return self.cells.find(_tag("cell", self.cell_sets, name))
+    def cell_tag(self, name: str) -> int:
+        """Tag of the cell set ``name``. Raises ValueError."""
+        return _tag("cell", self.cell_sets, name)
 
-    def facets_of(self, name: str) -> np.ndarray:
-        """Facets ``(n,)`` of this rank, ghosts included, of the set ``name``. Raises ValueError."""
-        return self.facets.find(_tag("facet", self.facet_sets, name))
+    def facet_tag(self, name: str) -> int:
+        """Tag of the facet set ``name``. Raises ValueError."""
+        return _tag("facet", self.facet_sets, name)
 
     def tags_behind(self, name: str) -> set[int]:
         """Tags of the cells at the facets of the set ``name``, over all ranks. Collective."""
@@ -34,7 +34,7 @@ class TaggedMesh:
         n_cells = self.mesh.topology.index_map(2).size_local + self.mesh.topology.index_map(2).num_ghosts
         tag = np.zeros(n_cells, dtype=np.int64)
         tag[self.cells.indices] = self.cells.values
-        here = {int(tag[cell]) for facet in self.facets_of(name) for cell in to_cell.links(facet)}
+        here = {int(tag[cell]) for facet in self.facets.find(self.facet_tag(name)) for cell in to_cell.links(facet)}
         return set().union(*self.mesh.comm.allgather(here))
 
 

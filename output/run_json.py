@@ -56,7 +56,7 @@ class Report:
             "mesh": mesh_facts(joint),
             "model": model_facts(joint),
             "tolerances": {
-                "newton": joint.solver.tolerance,
+                "newton": joint.problem.tolerance,
                 "gamma_factor": joint.scene.analysis.gamma_factor,
             },
             "linear_solver": {},

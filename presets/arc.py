@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solve
     from archord.solver.contact.contact import Contact
     from archord.solver.contact.surface import Surface
 
+SYMMETRY = 2.0  # the half that is modelled makes up a joint so many times
 _PEAK_FRACTION = 0.25  # part of the contact angle over which the parabola of the peak is fitted
 _EDGE_FACETS = 4  # facets whose forces give the edge of the contact
 
@@ -53,8 +54,8 @@ class ArcProfile:
 
     @property
     def resultant(self) -> float:
-        """Vertical force of the whole joint, ``2 sum(weight pressure cos(angle))``, on the undeformed arc."""
-        return 2 * float((self.weight * self.pressure * np.cos(self.angle)).sum())
+        """Vertical force of both halves, the sum of ``weight pressure cos(angle)`` on the undeformed arc."""
+        return SYMMETRY * float((self.weight * self.pressure * np.cos(self.angle)).sum())
 
     def facet_means(self) -> tuple[Array, Array]:
         """Angle ``(n,)`` and pressure ``(n,)`` of the facets: their means, which do not scatter where it yields."""

@@ -16,6 +16,7 @@ from archord.geometry.half_ring import half_ring
 from archord.geometry.joint_mesh import refinements
 from archord.geometry.quarter_joint import quarter_joint
 from archord.geometry.tagged_mesh import TaggedMesh
+from archord.presets.arc import SYMMETRY
 from archord.scene.scene import Scene
 from archord.solver.problem import Body, Guess, Interaction, Load, Problem, Rigid, Support
 from archord.solver.system import System
@@ -66,7 +67,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         [Load("pin", (0.0, -1.0), core)] if ring else [],
         control="force" if by_force and not ring else "factor",
         degree=analysis.degree,
-        symmetry=2.0,
+        symmetry=SYMMETRY,
         load_name="P" if by_force else "delta",
         travel=travel,
         tolerance=analysis.tolerance,
@@ -130,7 +131,7 @@ class Joint(System):
         """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a block. Collective."""
         if not self.problem.loads or self.scene.pin.yield_stress is None:
             return 0.0
-        cells, points = self.bulk.histories()[self.problem.mesh.cell_sets["pin"]]
+        cells, points = self.bulk.histories()[self.problem.mesh.cell_tag("pin")]
         x = cell_basis(self.V.mesh, self.bulk.degree, cells, bulk_quadrature(self.bulk.degree)[0]).point
         core = np.linalg.norm(x, axis=-1).ravel() < self.scene.load.core_radius * self.scene.joint.radius
         return self.comm.allreduce(float(points.peeq[core].max(initial=0.0)), op=MPI.MAX)

@@ -59,7 +59,7 @@ class Equilibrium:
         self._supported: list[tuple[str, int, np.ndarray]] = []  # name, axis and nodes of every support
         x = V.tabulate_dof_coordinates()[:, :2]
         for s in problem.supports:
-            nodes = fem.locate_dofs_topological(V, 1, problem.mesh.facets_of(s.facets))
+            nodes = fem.locate_dofs_topological(V, 1, problem.mesh.facets.find(problem.mesh.facet_tag(s.facets)))
             self.fixed[nodes, s.axis] = True
             self.rate[nodes, s.axis] = s.rate(x[nodes]) if callable(s.rate) else s.rate
             self._supported.append((s.name, s.axis, nodes[nodes < self.n_owned]))
@@ -105,7 +105,7 @@ class Equilibrium:
     def _nodal_forces(self, load: Load) -> Array:
         """Forces ``(n_owned, 2)`` on the modelled part per unit of the load factor."""
         V, mesh, problem = self.V, self.V.mesh, self.problem
-        tag = problem.mesh.cell_sets[load.cells]
+        tag = problem.mesh.cell_tag(load.cells)
         measure = ufl.Measure(
             "dx", mesh, subdomain_data=problem.mesh.cells, metadata={"quadrature_degree": _LOAD_DEGREE}
         )

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.solver.newton import Newton, NewtonSolver
+from archord.solver.newton import Newton
+from archord.solver.recovery import Recovery
 
 if TYPE_CHECKING:
     from archord.solver.coarse_start import CoarseStart
@@ -44,7 +45,7 @@ class LoadPath:
 
     def __init__(
         self,
-        solver: NewtonSolver,
+        solver: Recovery,
         first_guess: Callable[[float], Array],
         *,
         from_rest: bool = True,

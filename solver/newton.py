@@ -1,8 +1,7 @@
-"""The ways to solve for equilibrium: PETSc's SNES with MUMPS, and what is tried where it does not converge."""
+"""Newton's method for equilibrium: PETSc's SNES, with a linear strategy, and tests of its own for when to stop."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -12,16 +11,13 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
-from archord.solver.contact.interaction import GAMMA_FACTOR
 from archord.solver.equilibrium import Equilibrium
 from archord.solver.linear.lagged import Lagged
 from archord.solver.timer import BEFORE_SOLVING
 
-_STIFF_CONTACT = 5.0  # gamma factor above which it is raised in stages where a solve fails
-_GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
 _PATIENCE = 12  # Newton iterations in which the residual must halve
-_CIRCLING = 4  # the same where the active set stands still
-_ROUGH = 1e-3  # residual over reaction at which a solution is good enough for a guess
+CIRCLING = 4  # the same where the active set stands still
+_FAST = 1e-3  # ratio of residuals by which Newton's method converges at once
 
 
 @dataclass
@@ -67,18 +63,12 @@ class NewtonSolver:
         self.equilibrium, self.tolerance, self.max_iterations = equilibrium, tolerance, max_iterations
         self.comm = equilibrium.comm
         self._goal = tolerance
-        self.continues_gamma = False  # a large gamma has to be raised in stages
         self._raised: BaseException | None = None
         self._failure = ""
         self._renewed = True  # the last factorisation is of another matrix
         self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
         with equilibrium.timer(BEFORE_SOLVING):
             self._snes = self._make_snes()
-
-    @property
-    def elastic(self) -> bool:
-        """Whether no body can yield, so that nothing but the contact is nonlinear."""
-        return not self.equilibrium.bulk.plastic
 
     def _make_snes(self) -> PETSc.SNES:
         snes = PETSc.SNES().create(self.comm)
@@ -142,7 +132,7 @@ class NewtonSolver:
         if len(self._residuals) < 2 or self._changes[-1] or self._renewed:
             return False
         before, now = self._residuals[-2:]
-        return now < _ROUGH * before and now * now / before < 0.1 * self._goal
+        return now < _FAST * before and now * now / before < 0.1 * self._goal
 
     def _test(self, snes, iteration, norms):
         norm = norms[2]
@@ -151,7 +141,7 @@ class NewtonSolver:
         scale = max(reaction, at.noise / self._goal)
         self._changes.append(at.changes)
         self._residuals.append(float(norm / reaction if reaction > 0 else norm))
-        if self._singular():
+        if self.equilibrium.control.singular:
             return PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE
         if not np.isfinite(norm):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
@@ -165,96 +155,20 @@ class NewtonSolver:
         return PETSc.SNES.ConvergedReason.ITERATING
 
     def _stagnates(self) -> bool:
-        patience = _PATIENCE if any(self._changes[-_CIRCLING:]) else _CIRCLING
+        patience = _PATIENCE if any(self._changes[-CIRCLING:]) else CIRCLING
         recent, before = self._residuals[-patience:], self._residuals[:-patience]
         return bool(before) and min(recent) > 0.5 * min(before)
 
-    def solve(self, load: float, guess: Array, *, afar: bool = False) -> Newton:
-        """Solve at ``load`` as `solve_at_once`; where a large gamma makes that fail, by continuation in gamma.
+    def solve(self, guess: Array, *, line_search: str = "bt", goal: float = 0.0, search: bool = True) -> Newton:
+        """Newton's method at the equilibrium's load, to a residual of ``goal``, the own tolerance without.
 
-        The solution hardly depends on gamma, but points open and close for many iterations where it is large.
+        ``guess`` is shaped like the equilibrium's `state`; its prescribed values are replaced. ``line_search`` is
+        PETSc's name of one, "basic" takes full steps. Contact points search their partners first, or start from those
+        they have.
         """
-        contact, result = self.equilibrium.contact, None
-        wanted = 0.0 if contact is None else contact.gamma_factor
-        if contact is None or wanted <= _STIFF_CONTACT:
-            return self.solve_at_once(load, guess, afar=afar)
-        if not self.continues_gamma:
-            result = self.solve_at_once(load, guess, afar=afar)
-            if result.converged:
-                return result
-        stages = math.ceil(math.log(wanted / GAMMA_FACTOR, _GAMMA_RATIO))
-        for factor in np.geomspace(GAMMA_FACTOR, wanted, stages + 1):
-            contact.use_gamma_factor(float(factor))
-            result = self.solve_at_once(load, guess, afar=afar).after(result)
-            guess, afar = self.equilibrium.state(), False
-            if not result.converged:
-                break
-        contact.use_gamma_factor(wanted)
-        assert result is not None
-        self.continues_gamma |= result.converged
-        return result
-
-    def solve_at_once(self, load: float, guess: Array, *, afar: bool = False) -> Newton:
-        """Solve at ``load`` from ``guess``, shaped like `state`, whose prescribed values are replaced.
-
-        A guess from ``afar`` is too stiff for a line search, which creeps there, and may yield far too much: full steps
-        come first, and a rough equilibrium of points that cannot yield (further) comes before the one asked for; if
-        that fails, the solve starts from the guess.
-        """
-        self.equilibrium.load = load
-        points = self.equilibrium.plastic_points()
-        if not self.comm.allreduce(len(points)):
-            return self._run_either_way(guess, full_steps=afar)
-        before = None
-        if afar:
-            for p in points:
-                p.elastic_only = True
-            self._goal = max(_ROUGH, self.tolerance)
-            before = self._run_either_way(guess, full_steps=True)
-            self._goal = self.tolerance
-            for p in points:
-                p.elastic_only = False
-            if before.converged:
-                guess = self.equilibrium.state()
-        return self._run_either_way(guess).after(before)
-
-    def _run_either_way(self, guess: Array, *, full_steps: bool = False) -> Newton:
-        """With a line search, then without, or the other way round with ``full_steps``.
-
-        The problem is nearly linear by pieces, where it is smooth, and full steps find the right ones where the line
-        search, which wants a smaller residual in every step, creeps: first touch, large gamma, nearly incompressible
-        bodies.
-        """
-        result = None
-        for kind in ("basic", "bt") if full_steps else ("bt", "basic"):
-            self._line_search(kind)
-            result = self._run(guess).after(result)
-            if result.converged or self._singular():
-                break
-        assert result is not None
-        return result
-
-    def _line_search(self, kind: str) -> None:
-        PETSc.Options("archord_")["snes_linesearch_type"] = kind
+        PETSc.Options("archord_")["snes_linesearch_type"] = line_search
         self._snes.setFromOptions()
-
-    def _run(self, guess: Array) -> Newton:
-        """Newton's method from ``guess``.
-
-        Where it circles though no point opens or closes, points jump between two facets that meet at an angle; they
-        stay on theirs then, each facet continued beyond its ends.
-        """
-        result = self._newton(guess)
-        contact = self.equilibrium.contact
-        changes = result.active_set_changes
-        circles = len(changes) > _CIRCLING and not any(changes[-_CIRCLING:])
-        if result.converged or contact is None or not contact.pairs_move or not circles:
-            return result
-        self.equilibrium.unpack(self._x)
-        contact.hold()
-        return replace(self._newton(self.equilibrium.state(), search=False).after(result), held=True)
-
-    def _newton(self, guess: Array, *, search: bool = True) -> Newton:
+        self._goal = goal or self.tolerance
         self._residuals: list[float] = []
         self._changes: list[int] = []
         self._failure = ""
@@ -286,6 +200,11 @@ class NewtonSolver:
         )
         return result if result.converged else self._explained(result, code)
 
+    def last_iterate(self) -> Array:
+        """The state that the last solve left. Collective."""
+        self.equilibrium.unpack(self._x)
+        return self.equilibrium.state()
+
     def _forget_factorisation(self) -> None:
         """Start with a new linear solver: after a singular matrix PETSc's interface to MUMPS may skip the factorisation
         of the next one, and fail."""
@@ -300,16 +219,13 @@ class NewtonSolver:
         """A ``result`` without success, with the reason and the place of the largest residual."""
         at = self.equilibrium
         reason = self._failure or _REASONS.get(code, f"SNES reason {code}")
-        if self._singular():
+        if self.equilibrium.control.singular:
             pressed = at.load > 0 and at.contact is not None and at.contact.n_active() > 0
             cause = "no stiffness is left" if pressed else "nothing resists the force"
             reason = f"{cause} (singular mode)"
         increment = max((float(np.max(p.increment, initial=0.0)) for p in at.plastic_points()), default=0.0)
         increment = self.comm.allreduce(increment, op=MPI.MAX)
         return replace(result, reason=reason, worst=at.worst_place(), plastic_increment=increment)
-
-    def _singular(self) -> bool:
-        return self.equilibrium.control.singular
 
 
 _R = PETSc.SNES.ConvergedReason

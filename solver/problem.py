@@ -132,7 +132,7 @@ class Problem:
 
     def tag(self, body: Body) -> int:
         """Tag of the body's cells."""
-        return self.mesh.cell_sets[body.cells or body.name]
+        return self.mesh.cell_tag(body.cells or body.name)
 
     def body_of(self, facets: str) -> Body:
         """The body that a facet set belongs to. Collective; raises ValueError if it is not one."""

@@ -20,6 +20,7 @@ from archord.solver.equilibrium import Equilibrium
 from archord.solver.load_path import LoadPath, Position
 from archord.solver.newton import NewtonSolver
 from archord.solver.problem import Interaction, Problem, Rigid
+from archord.solver.recovery import Recovery
 from archord.solver.stepping import StepRules, march
 from archord.solver.timer import Timer
 
@@ -47,9 +48,8 @@ class System:
             self.sides: dict[str, Surface] = {}
             self.contact = self._contact(problem.interactions)
             self.equilibrium = Equilibrium(problem, self.V, self.bulk, self.contact, timer=self.timer)
-            self.solver = NewtonSolver(
-                self.equilibrium, tolerance=problem.tolerance, max_iterations=problem.max_iterations
-            )
+            tolerance, most = problem.tolerance, problem.max_iterations
+            self.solver = Recovery(NewtonSolver(self.equilibrium, tolerance=tolerance, max_iterations=most))
 
     def _contact(self, interactions: Sequence[Interaction]) -> Contact | None:
         return Contact([self._interaction(i) for i in interactions]) if interactions else None
@@ -71,7 +71,7 @@ class System:
             return RigidSurface(given.circle, given.rate)
         name = given if given not in self.sides else f"{given} ({interaction})"
         mesh, material = self.problem.mesh, self.problem.body_of(given).material
-        self.sides[name] = Surface(self.V, mesh.facets, mesh.facet_sets[given], material, name)
+        self.sides[name] = Surface(self.V, mesh.facets, mesh.facet_tag(given), material, name)
         return self.sides[name]
 
     def nodes_of(self, tag: int) -> np.ndarray:

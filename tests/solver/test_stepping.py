@@ -26,7 +26,7 @@ def test_a_failed_step_leaves_no_trace():
     before = [s.peeq.copy() for s in states]
     load, u = equilibrium.load, equilibrium.displacement()
     forces = joint.forces()
-    joint.solver.max_iterations = 1
+    joint.solver.newton.max_iterations = 1
     result = joint.solver.solve(1.2 * load, equilibrium.state())
     assert not result.converged
     equilibrium.restore(load, np.append(u, load))

@@ -1,0 +1,120 @@
+"""Problems stated by hand: symmetry, controls, distributed loads, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.geometry.fenicsx import gmsh_to_mesh
+from archord.materials.elasticity import Elastic
+from archord.solver.problem import Body, Guess, Interaction, Load, Problem, Support
+from archord.solver.system import System
+from tests.solver.parts import ELASTIC, HARDENING, NU, E, blocks, coordinates, solve
+
+DEPTH = 0.02
+ON_EACH_OTHER = Interaction("joint", ("upper bottom", "lower top"))
+
+
+def columns(width: float, supports, **options) -> Problem:
+    """Two hardening blocks of a ``width`` on top of each other."""
+
+    def build(gmsh) -> None:
+        for y, name in enumerate(("lower", "upper")):
+            face = gmsh.model.occ.addRectangle(0, y, 0, width, 1)
+            gmsh.model.occ.synchronize()
+            gmsh.model.addPhysicalGroup(2, [face], name=name)
+            sides = gmsh.model.getBoundary([(2, face)], oriented=False)
+            for side, (_, line) in zip(("bottom", "right", "top", "left"), sides, strict=True):
+                gmsh.model.mesh.setTransfiniteCurve(line, 4 + y)
+                gmsh.model.addPhysicalGroup(1, [line], name=f"{name} {side}")
+
+    bodies = [Body(name, HARDENING) for name in ("lower", "upper")]
+    return Problem(gmsh_to_mesh(MPI.COMM_SELF, build), bodies, [ON_EACH_OTHER], supports, **options)
+
+
+UPRIGHT = [Support("base", "lower bottom", 1), Support("lid", "upper top", 1, -1.0)]
+BETWEEN_WALLS = [
+    *UPRIGHT,
+    *(Support("walls", f"{name} {side}", 0) for name in ("lower", "upper") for side in ("left", "right")),
+]
+
+
+@pytest.mark.parametrize("control", ["factor", "force"])
+def test_half_a_problem_with_symmetry_two_is_the_whole(control):
+    """Forces, energies and PEEQ under both controls: the load of the half is that of the whole."""
+    halves = [columns(width, BETWEEN_WALLS, symmetry=2 / width, control=control) for width in (1.0, 2.0)]
+    systems = [solve(halves[0], [DEPTH if control == "factor" else 0.06])]
+    systems.append(solve(halves[1], [systems[0].equilibrium.load]))
+    found = [
+        [s.driven(), s.driving_force(), *s.reaction("base"), *s.contact_force(), *s.energies(), *s.peeq()]
+        for s in systems
+    ]
+    assert found[0] == pytest.approx(found[1], rel=1e-8, abs=1e-14)
+    assert systems[0].peeq()[1] > 0
+
+
+def test_force_control_finds_the_load_factor_of_its_force():
+    """The force that a displacement takes, prescribed, takes that displacement back."""
+    moved = solve(columns(1.0, BETWEEN_WALLS), [DEPTH])
+    pushed = solve(columns(1.0, BETWEEN_WALLS, control="force"), [moved.driving_force()])
+    assert pushed.equilibrium.factor == pytest.approx(DEPTH, rel=1e-8)
+    assert pushed.energies() == pytest.approx(moved.energies(), rel=1e-8)
+
+
+@pytest.mark.parametrize("symmetry", [1.0, 2.0])
+def test_a_column_under_its_weight_follows_the_closed_form(symmetry):
+    """Between walls, with stress that grows linearly downward; the weight works on its mean displacement."""
+    mesh = blocks(MPI.COMM_SELF, 3, 3)
+    bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
+    supports = [Support(s, s, axis) for s, axis in (("base", 1), ("left", 0), ("right", 0), ("upper bottom", 1))]
+    problem = Problem(mesh, bodies, (), supports, [Load("lower", (0.0, -1.0))], symmetry=symmetry)
+    system, weight = solve(problem, [0.01]), 0.01
+    modulus, y = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU)), coordinates(system.V)[:, 1]
+    u = system.equilibrium.displacement()
+    lower = system.nodes_of(problem.tag(bodies[0]))
+    exact = -weight / symmetry / modulus * (1 - y[lower] ** 2) / 2
+    np.testing.assert_allclose(u[lower, 1], exact, rtol=0, atol=1e-9 * weight)
+    assert system.reaction("base")[1] == pytest.approx(weight, rel=1e-9)
+    assert system.driving_force() == weight
+    assert system.driven() == pytest.approx(weight / symmetry / modulus / 3, rel=1e-9)
+    assert system.energies()[0] == pytest.approx(system.driving_force() * system.driven() / 2, rel=1e-9)
+
+
+def test_a_load_is_spread_as_its_density_says():
+    """Its first moment is that of the density, its sum the force."""
+    mesh, load = blocks(MPI.COMM_SELF, 3, 3), Load("upper", (3.0, 4.0), lambda x: x[0] * x[1])
+    bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
+    equilibrium = System(Problem(mesh, bodies, (), [Support("base", "base", 1)], [load])).equilibrium
+    assert equilibrium.applied.sum(axis=0) == pytest.approx([3.0, 4.0], rel=1e-12)
+    x = coordinates(equilibrium.V)
+    assert equilibrium.applied.T @ x == pytest.approx(np.outer([3, 4], [2 / 3, 2 / 3]), rel=1e-12)
+
+
+def test_a_guess_moves_bodies_rigidly():
+    mesh, bodies = blocks(MPI.COMM_SELF, 2, 3), [Body("lower", ELASTIC), Body("upper", ELASTIC)]
+    problem = Problem(mesh, bodies, guess=lambda load: Guess(2 * load, {"upper": (load, -load)}))
+    system = System(replace(problem, supports=[Support("base", "base", 1)]))
+    state, y = system.first_guess(0.5), coordinates(system.V)[:, 1]
+    assert state[-1] == 1.0
+    np.testing.assert_array_equal(state[:-1].reshape(-1, 2)[y > 0.01], 0.5 * np.array([[1, -1]] * (y > 0.01).sum()))
+    assert not state[:-1].reshape(-1, 2)[y < -0.01].any()
+
+
+REFUSED = {
+    "different names": {"bodies": [Body("lower", ELASTIC), Body("lower", ELASTIC, "upper")]},
+    "no facet set 'top'": {"supports": [Support("base", "top", 1)]},
+    "no cell set 'middle'": {"bodies": [Body("middle", ELASTIC)]},
+    "'left' belongs to 2 cell sets": {"interactions": [Interaction("joint", ("left", "lower top"))]},
+    'use "factor"': {"control": "force", "loads": [Load("lower", (0.0, -1.0))]},
+}
+
+
+@pytest.mark.parametrize("said", REFUSED)
+def test_a_problem_that_contradicts_itself_is_refused(said):
+    bodies = [Body("lower", ELASTIC), Body("upper", Elastic(E, NU, "strain"))]
+    parts = {"bodies": bodies, "supports": [Support("base", "base", 1)]} | REFUSED[said]
+    with pytest.raises(ValueError, match=said):
+        System(Problem(blocks(MPI.COMM_SELF, 2, 3), **parts))
