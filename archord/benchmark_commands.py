@@ -120,7 +120,7 @@ def scaling(output: Path, largest: float, ranks: str, repeats: int, quiet: bool)
     number of ranks.
     """
     from archord.benchmarks.cost import scaling as table
-    from archord.benchmarks.cost.scaling_report import markdown, write_report
+    from archord.benchmarks.cost.scaling_report import markdown, write
 
     if not all(part.strip().isdecimal() for part in ranks.split(",")):
         raise InputError(f"--ranks {ranks}: must be whole numbers with commas between them, like 1,2.")
@@ -128,10 +128,10 @@ def scaling(output: Path, largest: float, ranks: str, repeats: int, quiet: bool)
 
     def said(cost) -> None:
         what = cost.fault or f"{cost.dofs} dofs, {cost.total:.1f} s, {cost.peak / 1e6:.0f} MB"
-        say(f"{cost.case.name}: {what}")
+        say(f"{cost.setting.name}: {what}")
 
     costs = table.Costs(table.run(largest, [int(part) for part in ranks.split(",")], output / "runs", repeats, said))
-    return _conclude(markdown(costs), write_report(costs, output), costs.faults(), quiet)
+    return _conclude(markdown(costs), write(costs, output), costs.faults(), quiet)
 
 
 @benchmark.command()

@@ -1,162 +1,267 @@
 """How time and memory grow with the mesh and fall with the ranks: ``archord benchmark scaling``.
 
-Everything that is concluded here is concluded from measured costs; `extrapolated` says what it assumes.
+The paper's joint, refined everywhere alike, on one rank and on several. Everything that is concluded is concluded from
+measured costs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+import json
+import shutil
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
 
-import numpy as np
+from scipy.optimize import brentq
 
-from archord.benchmarks.cost.scaling_cases import Case, cases
-from archord.benchmarks.cost.scaling_run import PARTS, REST, Cost, launcher, middle, solve
+from archord.benchmarks.case import paper_joint
+from archord.benchmarks.cost.timing import Process, Timing, time_all
+from archord.output.folder import claim_folder
+from archord.scene.errors import InputError
+from archord.scene.file import resolved
+from archord.scene.scene import JointGeometry, Scene
 
-SPEED_UP, SPEED_UP_AT = 1.6, 1_000_000  # on 2 ranks at so many dofs
-ROUNDS = 3  # of all numbers of ranks at that size
-CONTACT_SHARE = 0.1  # on 2 ranks
-AROUND_FACTORS = 0.25  # of the solve, at every size
-TIME_EXPONENT, MEMORY_EXPONENT = 1.3, 1.1
+ELASTIC = (5_000, 30_000, 100_000, 300_000, 1_000_000)  # dofs
+PLASTIC = (5_000, 30_000, 100_000)
+UNGUIDED = {False: (30_000, 100_000), True: (30_000,)}  # dofs by whether plastic
+WEAK = (30_000, 100_000, 300_000)  # dofs per rank
+ELASTIC_STEPS, PLASTIC_STEPS = 2, 5
+YIELD_STRESS = 0.002  # over E*
+_COARSEST = {"element_size": 0.04, "growth": 0.25}  # both are scaled, so that the meshes are alike
+_SCALES = 0.045, 2.0  # of those; growth then stays within its limits
+_DOFS_PER_CELL = 4.15  # expected, of fine meshes: two nodes a triangle, and gmsh makes a few more of them
+_A_DAY = 86400.0  # seconds that a run may take
+
+SPEED_UP_AT, ROUNDS = 1_000_000, 3  # dofs at which a speed-up is asked for, and how often they are solved
 SAME_FORCE = 1e-8  # relative difference of P between numbers of ranks
-SERIAL = ("start-up", "mesh", "output", REST)  # done by rank 0 alone, or by every rank in full
-TOLD = (2, 4, 8, 16, 32, 64)  # ranks of the extrapolation
+# the parts of a run, and the timers that they sum up
+PARTS = {
+    "start-up": ("start-up",),
+    "mesh": ("mesh",),
+    "setup": ("setup",),
+    "coarse start": ("coarse start",),
+    "bulk": ("return mapping", "assemble force", "assemble bulk", "assemble border"),
+    "contact": ("contact", "assemble contact"),
+    "linear solve": ("linear solve",),
+    "output": ("output", "checkpoint"),
+}
+REST = "rest"  # what no timer covers
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The joint with about ``dofs`` unknowns, elastic or ``plastic``, on ``ranks`` ranks.
+
+    ``weak``: only to compare with a mesh smaller by the number of ranks; not ``guided``: to show what a coarse start
+    saves.
+    """
+
+    dofs: int
+    ranks: int
+    plastic: bool = False
+    weak: bool = False
+    guided: bool = True
+
+    @property
+    def material(self) -> str:
+        """Elastic or plastic."""
+        return "plastic" if self.plastic else "elastic"
+
+    @property
+    def name(self) -> str:
+        """Material, size and ranks, and whether there is no coarse start."""
+        return f"{self.material}_{self.dofs}_on_{self.ranks}{'' if self.guided else '_unguided'}"
+
+    def scene(self) -> Scene:
+        """The joint to solve."""
+        size, growth = refined(self.dofs)
+        steps, strength = (PLASTIC_STEPS, YIELD_STRESS) if self.plastic else (ELASTIC_STEPS, None)
+        return paper_joint(size, steps, strength, joint={"growth": growth}, analysis={"coarse_start": self.guided})
+
+
+def refined(dofs: float) -> tuple[float, float]:
+    """Element size on the arcs, over R, and growth of a mesh with about ``dofs`` unknowns."""
+
+    def excess(scale: float) -> float:
+        sizes = {name: scale * value for name, value in _COARSEST.items()}
+        # without its checks, which refuse meshes beyond the wanted one
+        cells = JointGeometry.model_construct(radius=1.0, clearance=0.005, **sizes).expected_cells
+        return _DOFS_PER_CELL * cells - dofs
+
+    scale = brentq(excess, *_SCALES, rtol=1e-6)
+    return scale * _COARSEST["element_size"], scale * _COARSEST["growth"]
+
+
+def settings(largest: float, ranks: Sequence[int]) -> list[Setting]:
+    """All runs up to ``largest`` dofs, the smallest first: every size on every number of ``ranks``, the weak series on
+    several, the plastic series and runs without a coarse start on one.
+
+    Raises `InputError` if no size is left, or ``ranks`` do not begin with 1.
+    """
+    if largest < ELASTIC[0]:
+        raise InputError(f"--largest {largest:g}: must be at least {ELASTIC[0]}, the dofs of the smallest mesh.")
+    if not ranks or ranks[0] != 1 or sorted(set(ranks)) != list(ranks):
+        raise InputError(
+            f"--ranks {','.join(map(str, ranks))}: must be numbers of ranks that rise from 1, like 1,2, as everything "
+            "is compared with one rank."
+        )
+    found = [Setting(n, r) for n in ELASTIC for r in ranks]
+    found += [Setting(n * r, r, weak=True) for n in WEAK for r in ranks[1:] if n * r not in ELASTIC and n in ELASTIC]
+    found += [Setting(n, 1, plastic=True) for n in PLASTIC]
+    found += [Setting(n, 1, plastic, guided=False) for plastic, sizes in UNGUIDED.items() for n in sizes]
+    small = [setting for setting in found if setting.dofs <= largest]
+    return sorted(small, key=lambda setting: setting.dofs * (PLASTIC_STEPS if setting.plastic else 1))
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a run cost. ``seconds`` by part, as rank 0 spent them, sum up to ``total``, the process's from outside;
+    ``memory`` is the peak of each rank in bytes, ``force`` the last P/(E* R).
+
+    A run that did not finish has a ``fault``, and nothing else.
+    """
+
+    setting: Setting
+    fault: str = ""
+    dofs: int = 0
+    total: float = 0.0
+    seconds: dict[str, float] = field(default_factory=dict)
+    memory: list[int] = field(default_factory=list)
+    iterations: int = 0
+    coarse_iterations: int = 0
+    factorisations: int = 0
+    evaluations: int = 0
+    force: float = 0.0
+
+    @property
+    def contact_share(self) -> float:
+        """Part of the time that the contact takes, evaluation and assembly."""
+        return self.seconds["contact"] / self.total
+
+    @property
+    def share_around_factors(self) -> float:
+        """Part of the solve that is not the linear solver's: contact search, assembly, return map."""
+        around = self.seconds["contact"] + self.seconds["bulk"]
+        return around / (around + self.seconds["linear solve"])
+
+    @property
+    def each_factor(self) -> float:
+        """Seconds of a factorisation and its solves."""
+        return self.seconds["linear solve"] / self.factorisations
+
+    @property
+    def peak(self) -> int:
+        """Memory of the rank that needs most, in bytes."""
+        return max(self.memory)
+
+
+def launcher(ranks: int) -> list[str]:
+    """The words before a command that start it on ``ranks`` ranks. Raises `InputError` if there is no mpirun."""
+    if ranks == 1:
+        return []
+    if shutil.which("mpirun") is None:
+        raise InputError(f"--ranks {ranks}: mpirun is not installed; only 1 is possible here.")
+    return ["mpirun", "-n", str(ranks)]
+
+
+def process(setting: Setting, folder: Path) -> Process:
+    """The run of ``setting`` as a user would start it, in the existing ``folder``, whose result is its run.json."""
+    run, scene = folder.resolve() / setting.name, folder.resolve() / f"{setting.name}.toml"
+    claim_folder(run, force=True)
+    scene.write_text(resolved(setting.scene()), encoding="utf-8")
+    archord = (sys.executable, "-m", "archord", "solve", str(scene), "-o", str(run), "--force", "--quiet")
+    command = (*launcher(setting.ranks), *archord)
+    return Process(command, folder, lambda: json.loads((run / "run.json").read_text(encoding="utf-8")), _A_DAY)
+
+
+def cost_of(setting: Setting, timing: Timing) -> Cost:
+    """The cost of the run with the median time, as its run.json tells it."""
+    if timing.failure:
+        return Cost(setting, timing.failure)
+    report, total = timing.middle.result, timing.middle.seconds
+    spent, totals = report["seconds"], report["totals"]
+    seconds = {part: sum(spent.get(name, 0.0) for name in names) for part, names in PARTS.items()}
+    return Cost(
+        setting,
+        dofs=report["mesh"]["dofs"],
+        total=total,
+        seconds=seconds | {REST: total - sum(seconds.values())},
+        memory=report["peak_memory"],
+        iterations=totals["newton_iterations"],
+        coarse_iterations=sum(step["coarse_iterations"] for step in report["steps"]),
+        factorisations=totals["factorisations"],
+        evaluations=totals["residual_evaluations"],
+        force=report["steps"][-1]["P"] / report["model"]["E_star"],
+    )
 
 
 def run(
     largest: float, ranks: Sequence[int], folder: Path, repeats: int, said: Callable[[Cost], None] = lambda cost: None
 ) -> list[Cost]:
-    """Solve all cases up to ``largest`` dofs below ``folder``, each ``repeats`` times, of which the run with the median
-    time counts; ``said`` follows each. Raises `InputError`.
+    """Solve all settings up to ``largest`` dofs below ``folder``, each ``repeats`` times, of which the run with the
+    median time counts; ``said`` follows each. Raises `InputError`.
 
     Numbers of ranks take turns, and the size at which a speed-up is asked for is solved `ROUNDS` times at least: the
     time of such a run can differ by a third. Both materials are solved once before, on a small mesh, so that no run
     pays for compiling forms.
     """
-    chosen = cases(largest, ranks)
+    found = settings(largest, ranks)
     launcher(max(ranks))
     folder.mkdir(parents=True, exist_ok=True)
-    for plastic in (False, True):
-        solve(Case(3000, 1, plastic), folder)
+    time_all([process(Setting(3000, 1, plastic), folder) for plastic in (False, True)], 1)
     costs = []
-    for size, of_size in groupby(chosen, key=lambda case: (case.dofs, case.plastic, case.guided)):
-        side_by_side = list(of_size)
-        rounds = max(repeats, ROUNDS if size[0] == SPEED_UP_AT and len(side_by_side) > 1 else 1)
-        runs = [[solve(case, folder) for case in side_by_side] for _ in range(rounds)]
-        for of_case in zip(*runs, strict=True):
-            costs.append(middle(of_case))
+    for (dofs, _, _), same in groupby(found, key=lambda setting: (setting.dofs, setting.plastic, setting.guided)):
+        of_size = list(same)
+        rounds = max(repeats, ROUNDS if dofs == SPEED_UP_AT and len(of_size) > 1 else 1)
+        timings = time_all([process(setting, folder) for setting in of_size], rounds)
+        for setting, timing in zip(of_size, timings, strict=True):
+            costs.append(cost_of(setting, timing))
             said(costs[-1])
     return costs
 
 
 @dataclass(frozen=True)
 class Costs:
-    """The costs of all runs that finished, found by what was solved."""
+    """The costs of all runs, and the finished ones in series and pairs."""
 
     all: list[Cost]
 
-    @property
-    def finished(self) -> list[Cost]:
-        """Runs without a fault, and with a coarse start."""
-        return [cost for cost in self.all if not cost.fault and cost.case.guided]
-
-    def unguided(self) -> list[tuple[Cost, Cost]]:
-        """Pairs of runs of one case: with a coarse start, and without."""
-        alone = [c for c in self.all if not c.fault and not c.case.guided]
-        return [(c, a) for a in alone for c in self.finished if replace(a.case, guided=True) == c.case]
-
     def series(self, ranks: int, *, plastic: bool = False) -> list[Cost]:
         """Finished runs on ``ranks`` ranks by size, without those of the weak series alone."""
-        found = [c for c in self.finished if c.case.ranks == ranks and c.case.plastic == plastic and not c.case.weak]
+        wanted = [c for c in self.all if not c.fault and c.setting.guided and not c.setting.weak]
+        found = [c for c in wanted if (c.setting.ranks, c.setting.plastic) == (ranks, plastic)]
         return sorted(found, key=lambda cost: cost.dofs)
-
-    def of(self, dofs: int, ranks: int) -> Cost | None:
-        """The elastic run of this size, if it finished."""
-        found = [c for c in self.finished if (c.case.dofs, c.case.ranks, c.case.plastic) == (dofs, ranks, False)]
-        return found[0] if found else None
 
     @property
     def ranks(self) -> list[int]:
         """Numbers of ranks, 1 first."""
-        return sorted({c.case.ranks for c in self.all})
+        return sorted({c.setting.ranks for c in self.all})
+
+    def _beside(self, costs: list[Cost], others: Callable[[Setting], Iterable[Setting]]) -> list[tuple[Cost, Cost]]:
+        """Pairs of each of ``costs`` and the finished run of each of its ``others``."""
+        done = {replace(c.setting, weak=False): c for c in self.all if not c.fault}
+        return [(cost, done[setting]) for cost in costs for setting in others(cost.setting) if setting in done]
 
     def strong(self) -> list[tuple[Cost, Cost]]:
         """Pairs of one size: on one rank, and on several."""
-        pairs = [(one, self.of(one.case.dofs, r)) for one in self.series(1) for r in self.ranks[1:]]
-        return [(one, several) for one, several in pairs if several is not None]
+        return self._beside(self.series(1), lambda setting: (replace(setting, ranks=r) for r in self.ranks[1:]))
 
     def weak(self) -> list[tuple[Cost, Cost]]:
         """Pairs of about one size per rank: on one rank, and on several."""
-        pairs = [(one, self.of(one.case.dofs * r, r)) for one in self.series(1) for r in self.ranks[1:]]
-        return [(one, several) for one, several in pairs if several is not None]
+        return self._beside(self.series(1), lambda s: (replace(s, ranks=r, dofs=r * s.dofs) for r in self.ranks[1:]))
+
+    def unguided(self) -> list[tuple[Cost, Cost]]:
+        """Pairs of runs of one setting: with a coarse start, and without."""
+        guided = [*self.series(1), *self.series(1, plastic=True)]
+        return self._beside(guided, lambda setting: [replace(setting, guided=False)])
 
     def faults(self) -> list[str]:
         """A sentence for every run that did not finish, and every force that depends on the number of ranks."""
-        said = [f"{cost.case.name}: {cost.fault}" for cost in self.all if cost.fault]
+        said = [f"{cost.setting.name}: {cost.fault}" for cost in self.all if cost.fault]
         for one, several in self.strong():
             difference = abs(several.force / one.force - 1)
             if not difference <= SAME_FORCE:
-                said.append(f"{several.case.name}: P differs by {difference:.1e} from that on 1 rank")
+                said.append(f"{several.setting.name}: P differs by {difference:.1e} from that on 1 rank")
         return said
-
-
-def exponent(dofs: Sequence[float], values: Sequence[float]) -> float:
-    """The power of ``dofs`` with which ``values`` grow: slope of a least-squares line through their logarithms; nan for
-    fewer than two."""
-    if len(dofs) < 2:
-        return float("nan")
-    return float(np.polynomial.Polynomial.fit(np.log(dofs), np.log(values), 1).convert().coef[1])
-
-
-def serial_fraction(one: float, several: float, ranks: int) -> float:
-    """The share of Amdahl's law, ``T(r) = T(1) (s + (1 - s)/r)``, that explains the seconds on 1 and on ``ranks``
-    ranks; between 0 and 1."""
-    return float(np.clip((ranks * several / one - 1) / (ranks - 1), 0.0, 1.0)) if one > 0 else 1.0
-
-
-def extrapolated(one: Cost, several: Cost, ranks: int) -> dict[str, float]:
-    """Seconds by part on ``ranks`` ranks, if each part goes on as it was measured from 1 to several ranks.
-
-    `SERIAL` parts stay what they were on several ranks; every other one follows Amdahl's law with its own measured
-    serial fraction. Nothing here knows of networks, of memory that ranks share, or of the fronts of an elimination
-    tree that are too few for many ranks: the law is kind to large numbers.
-    """
-    measured = several.case.ranks
-    out = {name: several.seconds[name] for name in SERIAL}
-    for name in (name for name in PARTS if name not in SERIAL):
-        s = serial_fraction(one.seconds[name], several.seconds[name], measured)
-        out[name] = one.seconds[name] * (s + (1 - s) / ranks)
-    return out
-
-
-def goals(costs: Costs) -> list[tuple[str, str, bool]]:
-    """What is asked for, what was measured, and whether that meets it; without what was not measured."""
-    said = []
-    serial = costs.series(1)
-    if len(serial) > 1:
-        dofs = [c.dofs for c in serial]
-        for name, values, limit in (
-            ("time", [c.total for c in serial], TIME_EXPONENT),
-            ("memory", [c.peak for c in serial], MEMORY_EXPONENT),
-        ):
-            power = exponent(dofs, values)
-            said.append((f"{name} grows at most like N^{limit:g}", f"N^{power:.2f}", power <= limit))
-    for one, two in costs.strong():
-        if two.case.ranks == 2 and one.case.dofs == SPEED_UP_AT:
-            factor = one.total / two.total
-            said.append(
-                (f"{SPEED_UP:g} times faster on 2 ranks at {one.dofs} dofs", f"{factor:.2f}", factor >= SPEED_UP)
-            )
-    shares = [c.contact_share for c in costs.series(2)]
-    if shares:
-        text = f"contact below {CONTACT_SHARE:.0%} of the time on 2 ranks"
-        said.append((text, f"at most {max(shares):.1%}", max(shares) < CONTACT_SHARE))
-    parts = [c.share_around_factors for plastic in (False, True) for c in costs.series(1, plastic=plastic)]
-    if parts:
-        text = f"contact search, assembly and return map at most {AROUND_FACTORS:.0%} of the solve at every size"
-        said.append((text, f"at most {max(parts):.0%}", max(parts) <= AROUND_FACTORS))
-    unfinished = [c for c in costs.all if c.fault]
-    done = f"{len(costs.all) - len(unfinished)} of {len(costs.all)} runs"
-    return [*said, ("every mesh finishes, plastic ones included", done, not unfinished)]

@@ -14,7 +14,7 @@ from pathlib import Path
 from shutil import rmtree
 from statistics import median
 
-from archord.benchmarks.cost.scaling_run import launcher
+from archord.benchmarks.cost.scaling import launcher
 from archord.benchmarks.cost.timing import Process, Run, time_all
 from archord.report.table import Table
 

@@ -1,17 +1,16 @@
 """The scaling benchmark concludes what its numbers say."""
 
 import csv
-import json
 import math
+from dataclasses import replace
 from functools import cache
 
 import pytest
 
-from archord.benchmarks.cost import scaling, scaling_cases
-from archord.benchmarks.cost.scaling import Costs, exponent, extrapolated, goals, serial_fraction
-from archord.benchmarks.cost.scaling_cases import ELASTIC, Case, cases, refined
-from archord.benchmarks.cost.scaling_report import markdown
-from archord.benchmarks.cost.scaling_run import PARTS, Cost, middle, read_cost, solve
+from archord.benchmarks.cost import scaling
+from archord.benchmarks.cost.scaling import ELASTIC, PARTS, Cost, Costs, Setting, cost_of, process, refined, settings
+from archord.benchmarks.cost.scaling_report import exponent, extrapolated, goals, markdown, serial_fraction
+from archord.benchmarks.cost.timing import Run, Timing, time_all
 from archord.cli import run
 from archord.scene.errors import InputError
 
@@ -20,7 +19,7 @@ def cost(dofs: int, ranks: int = 1, *, solve: float = 10.0, contact: float = 0.5
     """A made-up run of 2 s and the seconds of these parts."""
     seconds = {part: 0.25 for part in PARTS} | {"linear solve": solve, "contact": contact, "rest": 0.25}
     plastic = options.pop("plastic", False)
-    return Cost(Case(dofs, ranks, plastic), dofs=dofs, total=sum(seconds.values()), seconds=seconds,
+    return Cost(Setting(dofs, ranks, plastic), dofs=dofs, total=sum(seconds.values()), seconds=seconds,
                 memory=[100 * dofs] * ranks, iterations=10, factorisations=8, evaluations=12, force=0.0128,
                 **options)  # fmt: skip
 
@@ -60,38 +59,40 @@ def test_meshes_of_the_series_are_alike(dofs):
 
 
 def test_every_size_runs_on_every_number_of_ranks_and_doubled_ones_on_two():
-    found = cases(1e6, [1, 2])
+    found = settings(1e6, [1, 2])
     assert {(c.dofs, c.ranks) for c in found if not c.plastic} >= {(n, r) for n in ELASTIC for r in (1, 2)}
     assert {(c.dofs, c.ranks) for c in found if c.weak} == {(60_000, 2), (200_000, 2), (600_000, 2)}
     assert [c.dofs for c in found if c.plastic and c.guided] == [5_000, 30_000, 100_000]
     assert {(c.dofs, c.plastic) for c in found if not c.guided} == {(30_000, False), (100_000, False), (30_000, True)}
     assert all(c.scene().joint.expected_cells <= 1e6 for c in found)
-    assert max(c.dofs for c in cases(30_000, [1])) == 30_000
+    assert max(c.dofs for c in settings(30_000, [1])) == 30_000
 
 
 @pytest.mark.parametrize(("largest", "ranks", "said"), [(100, [1], "--largest 100"), (1e6, [2], "--ranks 2"),
                                                          (1e6, [1, 1], "--ranks 1,1")])  # fmt: skip
 def test_what_cannot_be_compared_is_refused(largest, ranks, said):
     with pytest.raises(InputError, match=said):
-        cases(largest, ranks)
+        settings(largest, ranks)
 
 
 def test_ranks_take_turns_and_the_median_counts(monkeypatch, tmp_path):
-    """Where the speed-up is asked for, every number of ranks is solved several times, one after the other."""
-    order, seconds = [], iter([0, 0, 9, 8, 5, 3, 7, 4])
+    """Where the speed-up is asked for, every number of ranks is solved several times."""
+    seconds, rounds = {1: [9.0, 5.0, 7.0], 2: [8.0, 3.0, 4.0]}, []
+    counted = ("newton_iterations", "factorisations", "residual_evaluations")
+    report = {"seconds": {}, "mesh": {"dofs": 10**6}, "peak_memory": [1], "totals": dict.fromkeys(counted, 1)}
+    report |= {"model": {"E_star": 1.0}, "steps": [{"P": 1.0, "coarse_iterations": 0}]}
 
-    def solved(case, folder):
-        order.append(case.ranks)
-        return cost(case.dofs, case.ranks, solve=float(next(seconds)))
+    def timed(processes, repeats):
+        rounds.append(repeats)
+        ranks = [2 if "mpirun" in process.command else 1 for process in processes]
+        return [Timing(p, [Run(s, s, 0, report) for s in seconds[r]]) for p, r in zip(processes, ranks, strict=True)]
 
-    monkeypatch.setattr(scaling, "solve", solved)
-    monkeypatch.setattr(scaling, "launcher", lambda ranks: [])
-    monkeypatch.setattr(scaling, "cases", lambda largest, ranks: [Case(10**6, 1), Case(10**6, 2)])
+    monkeypatch.setattr(scaling, "time_all", timed)
+    monkeypatch.setattr(scaling, "settings", lambda largest, ranks: [Setting(10**6, 1), Setting(10**6, 2)])
     found = scaling.run(1e6, [1, 2], tmp_path, 1)
-    assert order[2:] == [1, 2] * scaling.ROUNDS
-    assert [c.seconds["linear solve"] for c in found] == [7.0, 4.0]
-    failed = Cost(Case(10**6, 1), fault="exit code 3: no")
-    assert middle([*found, failed]) is failed
+    assert rounds == [1, scaling.ROUNDS]
+    assert [c.total for c in found] == [7.0, 4.0]
+    assert cost_of(Setting(10**6, 1), Timing(process(Setting(10**4, 1), tmp_path), [], "no")).fault == "no"
 
 
 def test_goals_follow_the_numbers():
@@ -103,7 +104,7 @@ def test_goals_follow_the_numbers():
         cost(5_000),
         cost(50_000, solve=1e3, contact=500.0),
         cost(5_000, 2, contact=9.0),
-        Cost(Case(50_000, 2), fault="exit code 3: no"),
+        Cost(Setting(50_000, 2), fault="exit code 3: no"),
     ]
     assert [met for _, _, met in goals(Costs(bad))] == [False, True, False, False, False]
     assert Costs(bad).faults() == ["elastic_50000_on_2: exit code 3: no"]
@@ -114,24 +115,31 @@ def test_goals_follow_the_numbers():
 
 def test_the_parts_of_a_run_are_its_time(tmp_path):
     """A real run: no part is negative, they sum up to the time from outside, and little is in no part."""
-    found = solve(Case(3_000, 1), tmp_path)
+    setting = Setting(3_000, 1)
+    (timing,) = time_all([process(setting, tmp_path)], 1)
+    found = cost_of(setting, timing)
     assert not found.fault
     assert min(found.seconds.values()) >= 0
     assert sum(found.seconds.values()) == pytest.approx(found.total, rel=1e-12)
     assert found.seconds["rest"] < 0.5 * found.total
     assert found.factorisations <= found.iterations < found.evaluations
-    report = json.loads((tmp_path / found.case.name / "run.json").read_text())
-    again = read_cost(found.case, report, 2 * found.total)
+    (slow,) = [replace(run, seconds=2 * run.seconds) for run in timing.runs]
+    again = cost_of(setting, Timing(timing.process, [slow]))
     assert again.seconds["rest"] == pytest.approx(found.seconds["rest"] + found.total, rel=1e-9)
 
 
 def test_the_command_writes_its_table(tmp_path, capsys, monkeypatch):
     """Of the smallest meshes, here those of its first, untimed runs, which then need no second one."""
     for name in ("ELASTIC", "PLASTIC"):
-        monkeypatch.setattr(scaling_cases, name, (3_000,))
-    monkeypatch.setattr(scaling_cases, "PLASTIC_STEPS", 2)
-    once = cache(solve)
-    monkeypatch.setattr(scaling, "solve", lambda case, folder, repeats=1: once(case, folder))
+        monkeypatch.setattr(scaling, name, (3_000,))
+    monkeypatch.setattr(scaling, "PLASTIC_STEPS", 2)
+    once = cache(lambda process, repeats: time_all([process], repeats)[0])
+    place = {}  # one process object a scene, so that none is solved twice
+    monkeypatch.setattr(
+        scaling,
+        "time_all",
+        lambda processes, repeats: [once(place.setdefault(p.command, p), 1) for p in processes],
+    )
     assert run(["benchmark", "scaling", "--largest", "5000", "--ranks", "1", "-o", str(tmp_path), "-q"]) == 0
     assert {"scaling.csv", "scaling.md", "scaling.png"} <= {p.name for p in tmp_path.iterdir()}
     with (tmp_path / "scaling.csv").open() as file:
