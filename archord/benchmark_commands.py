@@ -145,14 +145,9 @@ def variants(output: Path, repeats: int, quiet: bool) -> int:
     """
     from archord.benchmarks.cost import variants as table
 
-    say = _telling(quiet)
-
-    def said(use) -> None:
-        say(f"{use.variant.name}: {use.seconds:.2f} s, {use.modules} modules")
-
-    uses = table.run(output / "runs", repeats, said)
+    uses = table.run(output / "runs", repeats, _telling(quiet))
     faults = [fault for use in uses for fault in use.faults()]
-    return _conclude(table.markdown(uses), table.write_report(uses, output), faults, quiet)
+    return _conclude(*table.write(uses, output), faults, quiet)
 
 
 @benchmark.command()
@@ -172,7 +167,7 @@ def accuracy(output: Path, only: str, quiet: bool) -> int:
         raise InputError(f"--only {only}: must be part of {', '.join(case.name for case in table.CASES)}.")
     lines = table.run(output / "runs", cases, _telling(quiet))
     faults = [fault for line in lines if (fault := line.fault())]
-    return _conclude(table.markdown(lines), table.write_report(lines, output), faults, quiet)
+    return _conclude(*table.write(lines, output), faults, quiet)
 
 
 @benchmark.command("work-precision")

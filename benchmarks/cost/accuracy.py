@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import nan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from archord.benchmarks.case import E, paper_joint
-from archord.benchmarks.report_files import rows_table, write_files
+from archord.benchmarks.case import Case, E, paper_joint, slug, varied
 from archord.output.folder import claim_folder
-from archord.output.run import Outcome, solve_scene
-from archord.postprocess.convergence import difference, richardson
+from archord.output.run import Outcome
+from archord.postprocess.convergence import difference
+from archord.report.files import write_report
+from archord.report.table import Table
 from archord.scene.scene import Scene
 from archord.studies.accuracy import Accuracy, solve_to_accuracy
 from archord.studies.mesh_family import RATIO, MeshFamily
@@ -26,35 +26,23 @@ _STEPS = 8  # of a plastic joint an output step
 Said = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Case:
-    """The paper's joint (`paper_joint`) in ``steps`` output steps, with other ``sections``, at all accuracies
-    ``asked``."""
-
-    name: str
-    steps: int = 4
-    asked: tuple[float, ...] = ELASTIC
-    yield_stress: float | None = None
-    sections: Mapping[str, dict] = field(default_factory=dict)
-
-    def scene(self, accuracy: float) -> Scene:
-        """The scene with that accuracy."""
-        sections: dict[str, dict] = {"joint": {}, "analysis": {}, "output": {"fields": False}, **self.sections}
-        sections["joint"] = sections["joint"] | {"element_size": None}
-        sections["analysis"] = sections["analysis"] | {"accuracy": accuracy}
-        return paper_joint(steps=self.steps, yield_stress=self.yield_stress, **sections)
+def open_joint(name: str, steps: int = 4, yield_stress: float | None = None, **sections: dict) -> Case:
+    """The paper's joint with other ``sections``, its mesh left open, to be solved to the coarsest accuracy."""
+    analysis = {"accuracy": ELASTIC[0], **sections.pop("analysis", {})}
+    scene = paper_joint(0.04, steps, yield_stress, output={"fields": False}, **sections)
+    return Case(name, varied(scene, joint={"element_size": None}, analysis=analysis))
 
 
 CASES = (
-    Case("paper's joint"),
-    Case("small load, 0.05 dR", sections={"load": {"displacement": 0.05}}),
-    Case("rigid pin", sections={"pin": {"rigid": True}}),
-    Case("pin three times as stiff", sections={"pin": {"E": 3 * E, "nu": 0.3}}),
-    Case("plane stress", sections={"analysis": {"plane": "stress"}}),
-    Case("by force, 0.005 E* R", sections={"load": {"displacement": None, "relative_force": 0.005}}),
-    Case("plastic", 10, PLASTIC, 0.002),
-    Case("plastic, plane stress", 10, PLASTIC, 0.002, {"analysis": {"plane": "stress"}}),
-    Case("plastic, pressed and let go", 10, PLASTIC, 0.002, {"load": {"displacement": [1.5, 0.5]}}),
+    open_joint("paper's joint"),
+    open_joint("small load, 0.05 dR", load={"displacement": 0.05}),
+    open_joint("rigid pin", pin={"rigid": True}),
+    open_joint("pin three times as stiff", pin={"E": 3 * E, "nu": 0.3}),
+    open_joint("plane stress", analysis={"plane": "stress"}),
+    open_joint("by force, 0.005 E* R", load={"displacement": None, "relative_force": 0.005}),
+    open_joint("plastic", 10, 0.002),
+    open_joint("plastic, plane stress", 10, 0.002, analysis={"plane": "stress"}),
+    open_joint("plastic, pressed and let go", 10, 0.002, load={"displacement": [1.5, 0.5]}),
 )
 
 
@@ -66,36 +54,41 @@ class Line:
     accuracy: Accuracy
     true_error: float
 
-    @property
-    def dofs(self) -> int:
-        """Of the mesh that stays."""
-        return self.accuracy.levels[-1].dofs
-
     def fault(self) -> str | None:
         """A sentence if the estimate or the error is larger than what was asked."""
-        if self.accuracy.estimated is None or self.accuracy.estimated > self.accuracy.asked:
-            return f"{self.case.name}: {self.accuracy.asked:g} was not reached"
-        if self.true_error > self.accuracy.asked:
-            return f"{self.case.name}: the error is {self.true_error:.1e}, {self.accuracy.asked:g} was asked"
+        asked, estimated = self.accuracy.asked, self.accuracy.estimated
+        if estimated is None or estimated > asked:
+            return f"{self.case.name}: {asked:g} was not reached"
+        if self.true_error > asked:
+            return f"{self.case.name}: the error is {self.true_error:.1e}, {asked:g} was asked"
         return None
 
 
-def run(folder: Path, cases: tuple[Case, ...] = CASES, said: Said = lambda sentence: None) -> list[Line]:
-    """Solve ``cases`` below ``folder``, references first; ``said`` follows each run.
+def run(
+    folder: Path,
+    cases: Sequence[Case] = CASES,
+    said: Said = lambda sentence: None,
+    asked: Sequence[float] | None = None,
+) -> list[Line]:
+    """Solve ``cases`` below ``folder`` to the accuracies ``asked``, those of their material if absent, references
+    first; ``said`` follows each run.
 
     Raises `RuntimeError` if one fails.
     """
     lines = []
     for case in cases:
         known = reference(case, folder, said)
-        for asked in case.asked:
-            scene = case.scene(asked)
-            run_folder = _made(folder, f"{case.name}_{asked:g}")
-            outcome = solve_to_accuracy(scene, run_folder)
-            curve, accuracy = _curve(scene, outcome), outcome.accuracy
-            assert accuracy is not None
-            lines.append(Line(case, accuracy, difference(curve, known, float(np.abs(known).max()))))
-            said(f"{case.name}: {asked:g}: {accuracy.estimated} estimated, {lines[-1].true_error:.1e} true")
+        for wanted in asked or (PLASTIC if case.scene.plastic else ELASTIC):
+            run_folder = folder / slug(f"{case.name} {wanted:g}")
+            claim_folder(run_folder, force=True)
+            outcome = solve_to_accuracy(varied(case.scene, analysis={"accuracy": wanted}), run_folder)
+            if outcome.status == "interrupted":
+                raise KeyboardInterrupt
+            if outcome.status != "done" or outcome.accuracy is None:
+                raise RuntimeError(f"{run_folder.name}: {outcome.message}")
+            error = difference(_curve(case.scene, outcome), known, float(np.abs(known).max()))
+            lines.append(Line(case, outcome.accuracy, error))
+            said(f"{case.name}: {wanted:g}: {outcome.accuracy.estimated} estimated, {error:.1e} true")
     return lines
 
 
@@ -105,37 +98,26 @@ def reference(case: Case, folder: Path, said: Said) -> np.ndarray:
     Of a plastic joint in steps that are an eighth as long; what their error is, is extrapolated with order 1 from steps
     twice as long on the mesh before.
     """
-    scene = case.scene(ELASTIC[-1])
-    family = MeshFamily(scene, 1.0)
+    family = MeshFamily(case.scene, 1.0)
 
     def curve(mesh: int, substeps: int) -> np.ndarray:
         level = family.scene_of(mesh, substeps)
         assert level is not None
-        found = np.array(_curve(scene, solve_scene(level, _made(folder, f"{case.name}_{mesh}_{substeps}"))))
+        found = np.array(_curve(level, Case(f"{case.name} {mesh} {substeps}", level).solve(folder)))
         said(f"{case.name}: reference on mesh {mesh}, {substeps} substeps: {found[-1]:.9g}")
         return found
 
-    finest, steps = (_FINE - 1, _STEPS) if scene.plastic else (_FINE, 1)
+    finest, steps = (_FINE - 1, _STEPS) if case.scene.plastic else (_FINE, 1)
     before, last = curve(finest - 1, steps), curve(finest, steps)
-    limit = last + richardson(last - before, RATIO, 3)
-    return limit + (before - curve(finest - 1, steps // 2)) if scene.plastic else limit
+    limit = last + (last - before) / (RATIO**3 - 1)
+    return limit + (before - curve(finest - 1, steps // 2)) if case.scene.plastic else limit
 
 
 def _curve(scene: Scene, outcome: Outcome) -> list[float]:
-    if outcome.status == "interrupted":
-        raise KeyboardInterrupt
-    if outcome.status != "done":
-        raise RuntimeError(f"{outcome.folder.name}: {outcome.message}")
     return [m.delta if scene.force_controlled else m.P for m in outcome.steps]
 
 
-def _made(folder: Path, name: str) -> Path:
-    made = folder / name.replace(",", "").replace("'", "").replace("*", "").replace(" ", "_")
-    claim_folder(made, force=True)
-    return made
-
-
-def row(line: Line) -> dict[str, Any]:
+def row(line: Line) -> dict[str, object]:
     """The entries of a line by heading."""
     a = line.accuracy
     return {
@@ -148,16 +130,13 @@ def row(line: Line) -> dict[str, Any]:
         "meshes": a.levels[-1].mesh,
         "element size / R": f"{a.levels[-1].element_size:.3g}",
         "substeps": a.substeps,
-        "dofs": line.dofs,
+        "dofs": a.levels[-1].dofs,
         "seconds": f"{a.seconds:.1f}",
     }
 
 
-def markdown(lines: list[Line]) -> str:
-    """The lines as a table."""
-    return "\n".join([*rows_table([row(line) for line in lines]), ""])
-
-
-def write_report(lines: list[Line], folder: Path) -> list[Path]:
-    """Write accuracy.csv and accuracy.md into ``folder``; returns the files."""
-    return write_files(folder, "accuracy", [row(line) for line in lines], markdown(lines))
+def write(lines: Sequence[Line], folder: Path) -> tuple[str, list[Path]]:
+    """Write accuracy.csv and accuracy.md into ``folder``; returns the table and the files."""
+    rows = [row(line) for line in lines]
+    text = Table.of(rows).markdown()
+    return text, write_report(folder, "accuracy", rows, text)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
-from time import perf_counter
 from typing import Any
 
-from archord.benchmarks.case import paper_joint
-from archord.benchmarks.report_files import rows_table, write_files
+from archord.benchmarks.case import paper_joint, slug
+from archord.benchmarks.cost.timing import Process, Timing, time_all
 from archord.output.folder import claim_folder
+from archord.report.files import write_report
+from archord.report.table import Table
 from archord.scene.file import resolved
 
 STEPS, ELEMENT_SIZE, YIELD_STRESS = 5, 0.04, 0.002
@@ -34,9 +34,8 @@ code = run(arguments)
 modules = sorted(sys.modules)
 import json, re
 from pathlib import Path
-from archord.output.run_json import peak_memory
 kernels = sorted(set(re.findall(r"/(\\w+)-[0-9a-f]{16}\\.so", Path("/proc/self/maps").read_text())))
-Path(note).write_text(json.dumps({"modules": modules, "kernels": kernels, "memory": peak_memory()}))
+Path(note).write_text(json.dumps({"modules": modules, "kernels": kernels}))
 sys.exit(code)
 """
 
@@ -87,84 +86,79 @@ class Use:
         return [f"{self.variant.name}: loads {name}, which it does not need" for name in unused]
 
 
-def run(folder: Path, repeats: int = 3, said: Callable[[Use], None] = lambda used: None) -> list[Use]:
-    """Run every variant ``repeats`` times in processes of their own below ``folder``; ``said`` follows each.
+def run(
+    folder: Path,
+    repeats: int = 3,
+    said: Callable[[str], None] = lambda sentence: None,
+    variants: Sequence[Variant] = VARIANTS,
+) -> list[Use]:
+    """Run the ``variants`` ``repeats`` times, in turn, in processes of their own below ``folder``; ``said`` follows
+    each.
 
     The first runs compile forms and kernels, which no variant pays for: each runs once more, uncounted.
     Raises `RuntimeError` if one fails.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    uses = []
-    for variant in VARIANTS:
-        uses.append(use(variant, folder, repeats))
-        said(uses[-1])
-    return uses
+    names = {process(variant, folder): variant for variant in variants}
+
+    def told(done: Process, repeat: int, sentence: str) -> None:
+        said(f"{names[done].name}: {sentence}{'' if repeat else ' (not counted)'}")
+
+    return [use_of(names[timing.process], timing, folder) for timing in time_all(list(names), repeats, told)]
 
 
-def use(variant: Variant, folder: Path, repeats: int) -> Use:
-    """What ``variant`` uses, of the runs below the existing ``folder``. Raises `RuntimeError` if it fails."""
-    run_folder = folder / slug(variant.drawn or variant.name)
+def process(variant: Variant, folder: Path) -> Process:
+    """The command of ``variant`` in the existing ``folder``; its result is the note of what it loaded."""
+    run_folder, note = folder.resolve() / slug(variant.drawn or variant.name), folder.resolve() / "note.json"
     arguments = ["picture", str(run_folder)]
     if not variant.drawn:
-        scene = folder / f"{slug(variant.name)}.toml"
+        scene = folder.resolve() / f"{slug(variant.name)}.toml"
         joint = paper_joint(ELEMENT_SIZE, STEPS, variant.yield_stress, **variant.sections)
         scene.write_text(resolved(joint), encoding="utf-8")
         claim_folder(run_folder, force=True)
         arguments = ["solve", str(scene), "-o", str(run_folder), "--force", "--quiet"]
-    _process(variant, arguments, folder)
-    processes = [_process(variant, arguments, folder) for _ in range(repeats)]
-    note = processes[0][1]
+
+    def read() -> dict[str, Any]:
+        return json.loads(note.read_text(encoding="utf-8"))
+
+    return Process((sys.executable, "-c", _PROBE, str(note), *arguments), folder, read, kind=variant.name)
+
+
+def use_of(variant: Variant, timing: Timing, folder: Path) -> Use:
+    """What ``variant`` used. Raises `RuntimeError` if it failed."""
+    if timing.failure:
+        raise RuntimeError(f"{variant.name}: {timing.failure}")
+    run_folder = folder / slug(variant.drawn or variant.name)
+    note = timing.middle.result
     names = {*note["modules"], *(f"kernel {name}" for name in note["kernels"])}
     report = json.loads((run_folder / "run.json").read_text(encoding="utf-8"))
-    files = [file for file in run_folder.rglob("*") if file.is_file()]
-    written = sum(file.stat().st_size for file in files if (file.name == "picture.png") == bool(variant.drawn))
+    files = (f for f in run_folder.rglob("*") if f.is_file() and (f.name == "picture.png") == bool(variant.drawn))
     return Use(
         variant,
         dofs=report["mesh"]["dofs"],
-        seconds=median(seconds for seconds, _ in processes),
-        memory=int(median(note["memory"] for _, note in processes)),
+        seconds=timing.median,
+        memory=int(median(run.memory for run in timing.runs)),
         modules=len(note["modules"]),
         loaded=tuple(name for name in WATCHED if name in names),
-        written=written,
+        written=sum(file.stat().st_size for file in files),
     )
 
 
-def _process(variant: Variant, arguments: list[str], folder: Path) -> tuple[float, dict[str, Any]]:
-    """Seconds of a process with the command line ``arguments``, and its note."""
-    note = folder / "note.json"
-    begun = perf_counter()
-    done = subprocess.run(
-        [sys.executable, "-c", _PROBE, str(note), *arguments], capture_output=True, text=True, check=False
-    )
-    seconds = perf_counter() - begun
-    if done.returncode:
-        raise RuntimeError(f"{variant.name}: exit code {done.returncode}: {done.stderr.strip()[-300:]}")
-    return seconds, json.loads(note.read_text(encoding="utf-8"))
-
-
-def slug(name: str) -> str:
-    """``name`` as the name of a folder."""
-    return name.replace(",", "").replace(" ", "_")
-
-
-def row(used: Use) -> dict[str, str]:
+def row(used: Use) -> dict[str, object]:
     """The entries of a variant by heading."""
     return {
         "variant": used.variant.name,
-        "dofs": str(used.dofs),
+        "dofs": used.dofs,
         "seconds": f"{used.seconds:.2f}",
         "peak memory [MB]": f"{used.memory / 1e6:.0f}",
-        "modules": str(used.modules),
+        "modules": used.modules,
         "written [kB]": f"{used.written / 1e3:.0f}",
         **{name: "loaded" if name in used.loaded else "" for name in WATCHED},
     }
 
 
-def markdown(uses: list[Use]) -> str:
-    """The variants as a table."""
-    return "\n".join([*rows_table([row(used) for used in uses]), ""])
-
-
-def write_report(uses: list[Use], folder: Path) -> list[Path]:
-    """Write variants.csv and variants.md into ``folder``; returns the files."""
-    return write_files(folder, "variants", [row(used) for used in uses], markdown(uses))
+def write(uses: Sequence[Use], folder: Path) -> tuple[str, list[Path]]:
+    """Write variants.csv and variants.md into ``folder``; returns the table and the files."""
+    rows = [row(used) for used in uses]
+    text = Table.of(rows).markdown()
+    return text, write_report(folder, "variants", rows, text)

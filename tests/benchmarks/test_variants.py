@@ -1,29 +1,32 @@
 """A scene's variants pay only for what they use."""
 
+from dataclasses import replace
+
 import pytest
 
 from archord.benchmarks.cost import variants
-from archord.benchmarks.cost.variants import VARIANTS, WATCHED, Use, markdown, use, write_report
+from archord.benchmarks.cost.timing import time_all
+from archord.benchmarks.cost.variants import VARIANTS, WATCHED, run, write
 
 CHOSEN = ("elastic, rigid pin", "elastic, no fields", "plastic", "picture of plastic")
 
 
 @pytest.fixture(scope="module")
 def uses(tmp_path_factory):
-    """On a coarser mesh and in fewer steps than the benchmark's, which load the same; each once, untimed."""
-    folder = tmp_path_factory.mktemp("variants")
-    process, notes = variants._process, {}
+    """On a coarser mesh and in fewer steps than the benchmark's, which load the same; each once, none uncounted."""
 
-    def once(variant, arguments, folder):
-        if variant.name not in notes:
-            notes[variant.name] = process(variant, arguments, folder)
-        return notes[variant.name]
+    def once(processes, repeats, told):
+        kindless = time_all([replace(process, kind=None) for process in processes], repeats)
+        for timing, process in zip(kindless, processes, strict=True):
+            timing.process = process
+        return kindless
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(variants, "ELEMENT_SIZE", 0.12)
         patch.setattr(variants, "STEPS", 2)
-        patch.setattr(variants, "_process", once)
-        return {v.name: use(v, folder, 1) for v in VARIANTS if v.name in CHOSEN}
+        patch.setattr(variants, "time_all", once)
+        chosen = [v for v in VARIANTS if v.name in CHOSEN]
+        return {used.variant.name: used for used in run(tmp_path_factory.mktemp("variants"), 1, variants=chosen)}
 
 
 @pytest.mark.parametrize("name", CHOSEN)
@@ -48,8 +51,9 @@ def test_less_is_written_and_solved_where_less_is_wanted(uses):
 
 def test_what_is_not_needed_is_told(uses, tmp_path):
     plastic = uses["plastic"]
-    wasteful = Use(**{**vars(plastic), "loaded": (*plastic.loaded, "scipy")})
+    wasteful = replace(plastic, loaded=(*plastic.loaded, "scipy"))
     assert wasteful.faults() == ["plastic: loads scipy, which it does not need"]
-    assert markdown([plastic]).count("\n") == 3
-    assert {f.name for f in write_report([wasteful], tmp_path)} == {"variants.csv", "variants.md"}
+    text, files = write([wasteful], tmp_path)
+    assert text.count("\n") == 3
+    assert {file.name for file in files} == {"variants.csv", "variants.md"}
     assert all(set(v.unused) <= set(WATCHED) for v in VARIANTS)
