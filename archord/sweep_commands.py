@@ -100,7 +100,7 @@ def sweep(
 
 
 def _announced(design) -> str:
-    from archord.studies.cost import expected_seconds
+    from archord.studies.sweep import expected_seconds
 
     n, distinct = len(design.cases), len(design.distinct)
     seconds = sum(expected_seconds(case.scene) for case in design.distinct)
@@ -115,7 +115,7 @@ def _duration(seconds: float) -> str:
 
 
 def _print_cases(design) -> None:
-    from archord.studies.cost import expected_dofs, expected_seconds
+    from archord.studies.sweep import expected_dofs, expected_seconds
     from archord.studies.tables import entry, heading
 
     keys = [heading(key, design.cases[0].scene) for key in design.keys]

@@ -1,23 +1,31 @@
-"""The cases of a sweep: checked scenes, each with a name made from its content."""
+"""The cases of a sweep: overrides, multiplied, and for each a checked scene with a name made from its content."""
 
 from __future__ import annotations
 
 import copy
 import hashlib
+import itertools
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import archord
 from archord.scene.errors import InputError
-from archord.scene.file import parse_scene, put, read_targets, resolved
+from archord.scene.faults import shortened
+from archord.scene.file import ALTERNATIVES, parse_scene, put, read_targets, resolved
+from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
-from archord.studies.design import ABSENT, combinations, factors, same_quantity, varied_keys
-from archord.studies.sweep_file import Overrides, SweepFile, load_sweep
+from archord.studies.sweep_file import LatinHypercube, Overrides, SweepFile, flattened, load_sweep
 
+ABSENT = "none"  # the value that drops a key, so that its default holds
+MOST_CASES = 100_000
 _MOST_SENTENCES = 20
+_DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm
 _VALUE = re.compile(r"""^(\S+) = (?:"(?:[^"\\]|\\.)*"|\[.*?\]|\{.*?\}|\S+)""")
 _MARK = "\0"  # the source of a scene, which is told apart later
 
@@ -66,7 +74,7 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
         rows = combinations(found)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    keys = varied_keys(found)
+    keys = list(dict.fromkeys(key for factor in found for key in factor.keys))
     for override in overrides:
         name = override.partition("=")[0].strip()
         varied = next((key for key in keys if key in same_quantity(name)), None)
@@ -87,6 +95,96 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
         given = [*keys, *(override.partition("=")[0].strip() for override in overrides)]
         raise InputError("\n".join(_told(faults, path, len(rows), file.base_file, given)))
     return Sweep(path, file, keys, cases)
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One factor of the product: ``choices`` of overrides, and the section of the sweep file they come ``from``."""
+
+    source: str
+    choices: list[Overrides]
+
+    @property
+    def keys(self) -> list[str]:
+        """All dotted keys that it varies."""
+        return list(dict.fromkeys(key for choice in self.choices for key in choice))
+
+
+def factors(sweep: SweepFile) -> list[Factor]:
+    """What is multiplied, the slowest first: list, zip, each key of the grid, Latin hypercube.
+
+    Raises `InputError` if two of them vary the same key, or a key cannot be one of a scene.
+    """
+    found = []
+    if sweep.list_:
+        found.append(Factor("[[list]]", [dict(choice) for choice in sweep.list_]))
+    if sweep.zip:
+        rows = zip(*sweep.zip.values(), strict=True)
+        found.append(Factor("[zip]", [flattened(dict(zip(sweep.zip, row, strict=True))) for row in rows]))
+    for key, values in sweep.grid.items():
+        found.append(Factor("[grid]", [flattened({key: value}) for value in values]))
+    if sweep.latin_hypercube is not None:
+        found.append(Factor("[latin_hypercube]", samples(sweep.latin_hypercube)))
+    _check_keys(found)
+    return found
+
+
+def samples(hypercube: LatinHypercube) -> list[Overrides]:
+    """The samples of a Latin hypercube: of the ``number`` equal parts of each range every one holds one sample.
+
+    The same seed gives the same samples.
+    """
+    from scipy.stats import qmc
+
+    ranges = list(hypercube.ranges.values())
+    generator = np.random.default_rng(hypercube.seed)
+    points = qmc.LatinHypercube(d=len(ranges), seed=generator).random(hypercube.number)
+    log = np.array([r.scale == "log" for r in ranges])
+    ends = np.array([[r.low, r.high] for r in ranges])
+    ends[log] = np.log(ends[log])
+    values = ends[:, 0] + points * (ends[:, 1] - ends[:, 0])
+    values[:, log] = np.exp(values[:, log])
+    return [
+        {key: float(f"{value:.{_DIGITS}g}") for key, value in zip(hypercube.ranges, row, strict=True)} for row in values
+    ]
+
+
+def combinations(found: list[Factor]) -> list[Overrides]:
+    """The overrides of every case, the last factor varying fastest; those of the base, none, if nothing varies.
+
+    Raises `InputError` if there are too many.
+    """
+    number = math.prod(len(factor.choices) for factor in found)
+    if number > MOST_CASES:
+        product = " x ".join(f"{len(factor.choices)}" for factor in found)
+        raise InputError(f"has {number} cases ({product}); {MOST_CASES} are allowed.")
+    rows = itertools.product(*(factor.choices for factor in found))
+    return [dict(itertools.chain.from_iterable(choice.items() for choice in row)) for row in rows]
+
+
+def _check_keys(found: list[Factor]) -> None:
+    source: dict[str, tuple[str, str]] = {}
+    for factor in found:
+        for key in factor.keys:
+            section, _, name = key.partition(".")
+            if not name or "." in name:
+                value = shortened(toml_value(next(choice[key] for choice in factor.choices if key in choice)), 60)
+                raise InputError(f"{factor.source} {key} = {value}: must read section.key, like joint.clearance.")
+            if section == "units":
+                raise InputError(f"{factor.source} {key}: cannot vary; all cases of a table have the same units.")
+        taken = {other: key for key in factor.keys for other in same_quantity(key)}
+        for other, key in taken.items():
+            if other in source:
+                by, given = source[other]
+                raise InputError(f"{factor.source} {key}: is varied by {by} {given} already.")
+        source |= {other: (factor.source, key) for other, key in taken.items()}
+
+
+def same_quantity(key: str) -> list[str]:
+    """The key and its alternatives, of which a scene holds one."""
+    section, _, name = key.partition(".")
+    group = next((names for names in ALTERNATIVES.get(section, []) if name in names), (name,))
+    return [f"{section}.{other}" for other in group]
 
 
 def run_name(scene: Scene) -> str:

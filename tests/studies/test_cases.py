@@ -13,10 +13,8 @@ from hypothesis import strategies as st
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, resolved
 from archord.studies import sweep as run
-from archord.studies.cases import read_sweep, run_name
-from archord.studies.cost import expected_seconds
-from archord.studies.design import combinations, factors, samples
-from archord.studies.sweep import Share
+from archord.studies.cases import combinations, factors, read_sweep, run_name, samples
+from archord.studies.sweep import Share, expected_seconds
 from archord.studies.sweep_file import LatinHypercube, SweepFile
 
 SCENES = Path(__file__).parents[2] / "scenes"
