@@ -57,11 +57,9 @@ class FieldWriter:
         """Add the last accepted state as a step, reached at ``load``. Collective. Raises `WriteError`."""
         joint = self.joint
         u = joint.equilibrium.displacement()
-        means = joint.bulk.cell_fields(u)
-        values: dict[str, Array | None] = {"von_mises": means.von_mises, "mean_stress": means.mean_stress}
-        values |= {"peeq": means.peeq, "peeq_increment": means.peeq_increment}
+        values = joint.bulk.cell_fields(u)
         values["contact_state"], values["contact_pressure"] = self._contact_on_cells()
-        arrays = {name: self.order.cells(np.asarray(values[name])) for name in self.names}
+        arrays = {name: self.order.cells(values[name]) for name in self.names}
         on_nodes = {"displacement": u, "residual": joint.equilibrium.residual()}
         nodal = {name: self.order.collect(on_nodes[name]) for name in self.nodal}
 

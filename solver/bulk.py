@@ -6,8 +6,7 @@ tangent that changes; without them nothing of it is compiled or stored.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import basix.ufl
 import numpy as np
@@ -21,16 +20,6 @@ from archord.geometry.basis import Array, bulk_quadrature, bulk_quadrature_degre
 from archord.materials.elasticity import mean_stress, von_mises
 from archord.materials.material import Material
 from archord.materials.points import Points
-
-
-@dataclass(frozen=True)
-class CellFields:
-    """Means over each cell of this rank, ``(n_cells,)`` each."""
-
-    von_mises: Array
-    mean_stress: Array
-    peeq: Array | None
-    peeq_increment: Array | None  # since the last step accepted
 
 
 def _voigt(u):
@@ -252,33 +241,23 @@ class Bulk:
             integral += float(data.weight.ravel() @ peeq)
         return largest, integral
 
-    def cell_fields(self, u: Array) -> CellFields:
-        """Cell means of stress measures and PEEQ at ``u`` ``(n_nodes, 2)``."""
-        n = self.V.mesh.topology.index_map(2).size_local
-        mises, mean = np.zeros(n), np.zeros(n)
-        peeq, increment = np.zeros(n), np.zeros(n)
-        for data in self._plastic.values():
-            mises[data.cells] = _cell_mean(data.weight, von_mises(data.stress))
-            mean[data.cells] = _cell_mean(data.weight, mean_stress(data.stress))
-            peeq[data.cells] = _cell_mean(data.weight, data.points.peeq)
-            increment[data.cells] = _cell_mean(data.weight, data.points.increment)
-        for cells, weight, sigma in self._elastic_points(u):
-            mises[cells] = _cell_mean(weight, von_mises(sigma))
-            mean[cells] = _cell_mean(weight, mean_stress(sigma))
-        return CellFields(mises, mean, *((peeq, increment) if self.plastic else (None, None)))
-
-    def _elastic_points(self, u: Array) -> Iterator[tuple[np.ndarray, Array, Array]]:
-        """Cells ``(n,)``, weights ``(n, q)`` and stresses ``(n q, 4)`` of each elastic body."""
+    def cell_fields(self, u: Array) -> dict[str, Array]:
+        """Means over each cell of this rank ``(n_cells,)`` at ``u`` ``(n_nodes, 2)``: "von_mises", "mean_stress" and,
+        where a body can yield, "peeq" and "peeq_increment" since the last step accepted."""
+        names = ["von_mises", "mean_stress", *(["peeq", "peeq_increment"] if self.plastic else [])]
+        fields = {name: np.zeros(self.V.mesh.topology.index_map(2).size_local) for name in names}
         X, w = bulk_quadrature(self.degree)
         for tag, cells in self.cells.items():
-            if tag not in self._plastic:
-                material = self.materials[tag]
-                basis = cell_basis(self.V.mesh, self.degree, cells, X)
+            values = {}
+            if tag in self._plastic:
+                data = self._plastic[tag]
+                weight, stress = data.weight, data.stress
+                values = {"peeq": data.points.peeq, "peeq_increment": data.points.increment}
+            else:
+                material, basis = self.materials[tag], cell_basis(self.V.mesh, self.degree, cells, X)
                 eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)
-                stress, _, _ = material.update(eps, material.state(len(eps)))
-                yield cells, basis.measure * w, stress
-
-
-def _cell_mean(weight: Array, values: Array) -> Array:
-    """Mean over each cell ``(n,)`` of values at its points ``(n q,)`` with ``weight`` ``(n, q)``."""
-    return (weight * values.reshape(weight.shape)).sum(axis=1) / weight.sum(axis=1)
+                weight, (stress, _, _) = basis.measure * w, material.update(eps, material.state(len(eps)))
+            values |= {"von_mises": von_mises(stress), "mean_stress": mean_stress(stress)}
+            for name, at_points in values.items():
+                fields[name][cells] = (weight * at_points.reshape(weight.shape)).sum(axis=1) / weight.sum(axis=1)
+        return fields
