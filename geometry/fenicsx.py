@@ -62,13 +62,11 @@ def gmsh_to_mesh(
     """
     made, failure = PlaneMesh.empty(order), None
     if comm.rank == 0:
-        known = MESHES.find((*key, order, refinements)) if key else None
+        drawn = build, adjust, order, refinements
         try:
-            made = known if known is not None else _made(build, adjust, order, refinements)
+            made = MESHES.get((*key, order, refinements), lambda: _made(*drawn)) if key else _made(*drawn)
         except Exception as error:  # raised on all ranks below
-            failure = f"gmsh could not mesh the joint: {error}"
-        if key and known is None and failure is None:
-            MESHES.keep((*key, order, refinements), made)
+            failure = f"gmsh could not mesh the problem: {error}"
     failure = comm.bcast(failure)
     if failure:
         raise RuntimeError(failure)

@@ -1,23 +1,35 @@
-"""What the meshes of all kinds of joints share: tags, the size of their elements, exact circles."""
+"""What the meshes of all kinds of joints share: sets, element sizes, exact circles. gmsh works in units of the pin's
+radius whatever the units of the scene, so meshes do not depend on them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from enum import IntEnum
 
 import numpy as np
+from mpi4py import MPI
 
 from archord.geometry.basis import Array
+from archord.geometry.fenicsx import gmsh_to_mesh
+from archord.geometry.tagged_mesh import TaggedMesh
 
 
-class Cells(IntEnum):
+class _Set(IntEnum):
+    @property
+    def set_name(self) -> str:
+        """Name in a problem: "pin" and "block", and of facets "pin" and "hole" (the arcs), "pin top", ..."""
+        return self.name.removesuffix("_ARC").replace("_", " ").lower()
+
+
+class Cells(_Set):
     """Cell tags: the two bodies."""
 
     PIN = 1
     BLOCK = 2
 
 
-class Facets(IntEnum):
+class Facets(_Set):
     """Facet tags of the edges that carry a condition; other edges are free."""
 
     PIN_ARC = 1
@@ -30,32 +42,51 @@ class Facets(IntEnum):
 _CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
 
 
-def tag_and_size(gmsh, faces: dict[Cells, int], curves: dict[Facets, list[int]], sizes: dict[Cells, str]) -> None:
-    """Make the physical groups of ``faces`` and ``curves``, and ``sizes`` (expressions in x, y) the element sizes of
-    the bodies."""
-    gmsh.model.geo.synchronize()
-    for tag, face in faces.items():
-        gmsh.model.addPhysicalGroup(2, [face], tag, _set_name(tag))
-    for edge, lines in curves.items():
-        if lines:
-            gmsh.model.addPhysicalGroup(1, lines, edge, _set_name(edge))
-    field, parts = gmsh.model.mesh.field, []
-    for size in dict.fromkeys(sizes[tag] for tag in faces):
-        parts.append(field.add("MathEval"))
-        field.setString(parts[-1], "F", size)
-    if len(parts) > 1:
-        for i, tag in enumerate(faces):
-            whole, parts[i] = parts[i], field.add("Restrict")
-            field.setNumber(parts[i], "InField", whole)
-            field.setNumbers(parts[i], "SurfacesList", [faces[tag]])
-        parts.append(field.add("Min"))
-        field.setNumbers(parts[-1], "FieldsList", parts[:-1])
-    field.setAsBackgroundMesh(parts[-1])
+def mesh_joint(
+    comm: MPI.Comm,
+    draw: Callable,
+    circles: dict[Facets, tuple[float, float]],
+    key: tuple,
+    *,
+    radius: float,
+    degree: int = 2,
+    refinements: int = 0,
+    partitioner=None,
+) -> TaggedMesh:
+    """Mesh what ``draw(gmsh.model.geo)`` returns: by `Cells` the faces and the element sizes (expressions in x and y),
+    by `Facets` the lines.
 
+    ``circles`` are the heights of the centre and the radii of sets of arcs, on which all their nodes are put; ``key``
+    is all that enters the drawing. The mesh is made with larger elements, which are then cut in four as often as
+    ``refinements`` says: much quicker. ``partitioner`` is a dolfinx cell partitioner (tests cut meshes in unusual
+    ways). Collective over ``comm``; rank 0 meshes.
+    """
 
-def _set_name(tag: Cells | Facets) -> str:
-    """Name of a set in a problem: "pin" and "block", and of facets "pin" and "hole" (the arcs), "pin top", ..."""
-    return tag.name.removesuffix("_ARC").replace("_", " ").lower()
+    def build(gmsh) -> None:
+        faces, sizes, curves = draw(gmsh.model.geo)
+        gmsh.model.geo.synchronize()
+        groups = [(2, [face], tag) for tag, face in faces.items()]
+        groups += [(1, lines, tag) for tag, lines in sorted(curves.items()) if lines]
+        for dim, entities, tag in groups:
+            gmsh.model.addPhysicalGroup(dim, entities, tag, tag.set_name)
+        field, parts = gmsh.model.mesh.field, []
+        for size in dict.fromkeys(sizes[tag] for tag in faces):
+            parts.append(field.add("MathEval"))
+            field.setString(parts[-1], "F", size)
+        if len(parts) > 1:
+            for i, face in enumerate(faces.values()):
+                whole, parts[i] = parts[i], field.add("Restrict")
+                field.setNumber(parts[i], "InField", whole)
+                field.setNumbers(parts[i], "SurfacesList", [face])
+            parts.append(field.add("Min"))
+            field.setNumbers(parts[-1], "FieldsList", parts[:-1])
+        field.setAsBackgroundMesh(parts[-1])
+
+    def exact(x: Array, tag: int) -> Array:
+        return on_circle(x, *circles[Facets(tag)]) if tag in circles else x
+
+    options = {"order": degree, "scale": radius, "refinements": refinements, "partitioner": partitioner}
+    return gmsh_to_mesh(comm, build, exact, **options, key=key)
 
 
 def edges_on(angle: float, size: float) -> int:
@@ -71,10 +102,11 @@ def refinements(cells: float) -> int:
     return sum(cells > limit for limit in _CUT_ABOVE)
 
 
-def on_circle(x: Array, centre: tuple[float, float], radius: float) -> Array:
-    """Points ``x`` ``(n, 2)`` moved along their rays to exact ``radius``.
+def on_circle(x: Array, height: float, radius: float) -> Array:
+    """Points ``x`` ``(n, 2)`` moved along their rays from ``(0, height)`` to exact ``radius``.
 
     The clearance is a small difference of large numbers, which the rounding of a mesh generator would spoil.
     """
+    centre = np.array([0.0, height])
     ray = x - centre
     return ray * (radius / np.linalg.norm(ray, axis=1))[:, None] + centre

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 class MeshCache:
     """The last meshes of this process, by what they were made from; ``capacity`` is how many it keeps.
 
-    ``made`` and ``reused`` count the meshes that gmsh made and those that it did not have to.
+    ``made`` and ``reused`` count the meshes that gmsh made for it and those that it did not have to.
     """
 
     def __init__(self, capacity: int = 0) -> None:
@@ -20,23 +21,19 @@ class MeshCache:
         self.made = self.reused = 0
         self._kept: OrderedDict[tuple, PlaneMesh] = OrderedDict()
 
-    def find(self, key: tuple) -> PlaneMesh | None:
-        """The mesh that was made from ``key``; None if it is not kept."""
-        if key not in self._kept:
-            return None
-        self.reused += 1
-        self._kept.move_to_end(key)
-        return self._kept[key]
-
-    def keep(self, key: tuple, mesh: PlaneMesh) -> None:
-        """Keep a ``mesh`` just made from ``key``, if there is room, and forget the one that was not used for
-        longest."""
-        if not self.capacity:
-            return
-        self.made += 1
-        self._kept[key] = mesh
+    def get(self, key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
+        """The mesh that ``key`` says all about: a kept one or what ``make`` returns, for the one not used longest."""
+        if key in self._kept:
+            self.reused += 1
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        mesh = make()
+        if self.capacity:
+            self.made += 1
+            self._kept[key] = mesh
         while len(self._kept) > self.capacity:
             self._kept.popitem(last=False)
+        return mesh
 
     def forget(self) -> None:
         """Keep none of the meshes any longer."""

@@ -194,7 +194,7 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> TaggedMe
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
     radii = {INNER: a, OUTER: b}
-    return gmsh_to_mesh(comm, build, lambda x, tag: on_circle(x, (0.0, 0.0), radii[tag]) if tag in radii else x)
+    return gmsh_to_mesh(comm, build, lambda x, tag: on_circle(x, 0.0, radii[tag]) if tag in radii else x)
 
 
 def solve(problem: Problem, loads) -> System:
