@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from archord.geometry.basis import Array
 from archord.kernels.compiled import library, pointer
 
-Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.integer]
 
 _END_MARGIN = 0.05  # a polynomial facet may be continued by this much beyond a free end of its curve
@@ -62,19 +62,13 @@ class Curve:
         self.connectivity = (np.arange(self.n_facets)[:, None] * degree + np.arange(degree + 1)).astype(np.int32)
         self._coefficients = lagrange(degree)
 
-    def shapes(self, xi: Array) -> tuple[Array, Array, Array]:
-        """Shape functions and their first and second derivatives, each ``(..., p + 1)``, at ``xi`` ``(...)``."""
+    def shapes(self, xi: Array) -> tuple[Array, Array]:
+        """Shape functions and their derivatives, each ``(..., p + 1)``, at ``xi`` ``(...)``."""
         k = np.arange(self.degree + 1)
-        zero = np.zeros_like(xi)[..., None]
-        powers = np.ones((*xi.shape, self.degree + 1))
-        for i in k[1:]:
-            powers[..., i] = powers[..., i - 1] * xi
-        first = np.concatenate([zero, powers[..., :-1] * k[1:]], axis=-1)
-        second = np.concatenate([zero, first[..., :-1] * k[1:]], axis=-1)
+        powers = np.stack([xi[..., None] ** k, k * xi[..., None] ** np.maximum(k - 1, 0)])
         # one product of two matrices: numpy would multiply point by point
-        p = np.stack([powers, first, second]).reshape(-1, self.degree + 1) @ self._coefficients.T
-        value, slope, bend = p.reshape(3, *powers.shape)
-        return value, slope, bend
+        value, slope = (powers.reshape(-1, self.degree + 1) @ self._coefficients.T).reshape(powers.shape)
+        return value, slope
 
     def vertices(self) -> tuple[Array, Array]:
         """Where facets meet or the curve ends ``(n + 1, 2)``, and the outward normals of the chords there."""
@@ -95,7 +89,7 @@ class Curve:
         xi = np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1]))
         ends = np.concatenate([xi, np.ones((self.n_facets, 1))], axis=1)
         q, w = np.polynomial.legendre.leggauss(8)
-        _, slope, _ = self.shapes(ends[..., None] * (q + 1) / 2)
+        _, slope = self.shapes(ends[..., None] * (q + 1) / 2)
         speed = np.linalg.norm(np.einsum("fai,fmqa->fmqi", self.X[self.connectivity], slope), axis=-1)
         lengths = (speed @ w) * ends / 2
         start = np.concatenate([[0.0], np.cumsum(lengths[:, -1])[:-1]])

@@ -19,7 +19,7 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.materials.points import Points
-from archord.solver.contact.interaction import Interaction, raise_together
+from archord.solver.contact.interaction import Interaction, first_failure
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.sparsity import Reach
 from archord.solver.contact.surface import Surface
@@ -85,11 +85,9 @@ class Contact:
                 pair.evaluate(u, motion)
         except ProjectionError as error:
             failure = str(error)
-        try:
-            raise_together(self.comm, failure)
-        except ProjectionError:
+        if failure := first_failure(self.comm, failure):
             self.search()
-            raise
+            raise ProjectionError(failure)
         self.active_set_changes = sum(pair.changes for pair in self.pairs)
         grew = any([reach.extend() for reach in self._reaches if reach.pair.moves])
         if grew:

@@ -70,7 +70,8 @@ class Interaction:
                 self.pairs.append(Pair(own, opposite, law, float(share), moves=moves))
             except ProjectionError as error:
                 failure = str(error)
-        raise_together(self.bodies[0].comm, failure)
+        if failure := first_failure(self.bodies[0].comm, failure):
+            raise ProjectionError(failure)
         if not moves and not self.rigid and chosen[0] == 0:
             self.pairs[0].use_own_normals()
         self.limit_gamma(gamma_factor)
@@ -88,8 +89,6 @@ class Interaction:
         return self.bodies[0].sum_over_ranks(total)
 
 
-def raise_together(comm: MPI.Comm, failure: str | None) -> None:
-    """Raise `ProjectionError` on every rank if any rank reports a ``failure``."""
-    failures = [f for f in comm.allgather(failure) if f]
-    if failures:
-        raise ProjectionError(failures[0])
+def first_failure(comm: MPI.Comm, failure: str | None) -> str | None:
+    """The first of what the ranks report, on all of them."""
+    return next((f for f in comm.allgather(failure) if f), None)

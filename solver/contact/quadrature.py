@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from archord.geometry.curve import Array, Curve
+from archord.geometry.basis import Array
+from archord.geometry.curve import Curve
 
 _SHORTEST = 1e-6  # breaks nearer than this, in xi, are one
 

@@ -118,7 +118,7 @@ def test_every_rank_holds_the_same_curve(number, radius, centre, comm):
             np.testing.assert_array_equal(other, item)
     facets = np.sort(np.concatenate(comm.allgather(side.facet)))
     np.testing.assert_array_equal(facets, np.arange(side.n_facets))
-    N, _, _ = side.curve.shapes(side.curve_xi[side.facet])
+    N, _ = side.curve.shapes(side.curve_xi[side.facet])
     on_curve = np.einsum("nqa,nai->nqi", N, side.curve.X[side.curve.connectivity[side.facet]])
     np.testing.assert_allclose(side.point, on_curve, rtol=0, atol=1e-14)
     step = np.diff(side.curve.X, axis=0)
