@@ -55,7 +55,7 @@ class SweepFit:
     @property
     def model(self) -> CalibratedModel | None:
         """The model of k and c, if there is one."""
-        return self.study and self.study.model
+        return self.study.model if self.study else None
 
     def text(self) -> str:
         """The cases, the model and its errors; of another sweep than archord's own also those of archord's law."""

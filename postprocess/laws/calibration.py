@@ -12,12 +12,11 @@ from string import Template
 import numpy as np
 from numpy.typing import ArrayLike
 
-from archord.geometry.basis import Array
 from archord.postprocess.convergence import Refined, group
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.chord_laws import plastic_force, plastic_stiffness
 from archord.postprocess.laws.curve_fit import CurveFit, fit_curve, fit_plateau
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.joint import Array, LawJoint
 from archord.postprocess.laws.law import monotone_root
 from archord.scene.errors import InputError
 

@@ -14,12 +14,11 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from archord.geometry.basis import Array
 from archord.postprocess.arc import plateau_pressure
 from archord.postprocess.convergence import Order, Refined
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.chord_laws import plastic_force, plastic_peak
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.joint import Array, LawJoint
 from archord.scene.errors import InputError
 
 _STARTS_OF_C = (0.7, 1.0, 1.5, 2.5)  # p0 has a kink at the onset: one start may miss the best side of it
@@ -43,12 +42,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class LeastSquares:
-    """Parameters ``(m,)`` with their standard errors, residuals ``(n,)`` (prediction - data), R2, degrees of
-    freedom."""
+    """Parameters ``(m,)`` with their standard errors, R2, degrees of freedom."""
 
     parameters: Array
     standard_errors: Array
-    residuals: Array
     r2: float
     dof: int
 
@@ -71,8 +68,9 @@ def fit(predict: Callable[[Array], Array], starts: Sequence[Sequence[float]], da
     m, n = len(starts[0]), len(data)
     if n <= m:
         raise ValueError(f"{n} points cannot determine {m} parameters and their errors")
+    spread = float(((data - data.mean()) ** 2).sum()) or np.nan
     if m == 0:
-        return _judged(np.zeros(0), np.zeros(0), predict(np.zeros(0)) - data, data)
+        return LeastSquares(np.zeros(0), np.zeros(0), 1 - float(((predict(np.zeros(0)) - data) ** 2).sum()) / spread, n)
     tight = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
     found = [least_squares(lambda v: predict(v) - data, s, bounds=(0, np.inf), x_scale="jac", **tight) for s in starts]
     best = min(found, key=lambda solution: solution.cost)
@@ -84,13 +82,7 @@ def fit(predict: Callable[[Array], Array], starts: Sequence[Sequence[float]], da
     squares = float(best.fun @ best.fun)
     errors = np.full(m, np.inf)
     errors[felt] = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)) * squares / (n - m)) / size[felt]
-    return _judged(best.x, errors, best.fun, data)
-
-
-def _judged(parameters: Array, errors: Array, residuals: Array, data: Array) -> LeastSquares:
-    squares, spread = float(residuals @ residuals), float(((data - data.mean()) ** 2).sum())
-    r2 = 1 - squares / spread if spread else float("nan")
-    return LeastSquares(parameters, errors, residuals, r2, len(data) - len(parameters))
+    return LeastSquares(best.x, errors, 1 - squares / spread, n - m)
 
 
 @dataclass(frozen=True)

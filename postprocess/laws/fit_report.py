@@ -167,8 +167,8 @@ def _draw_curve(axis: Axes, fits: Fits, fit: CurveFit, label: str, what: str) ->
     for i, (run, part) in enumerate(zip(fits.runs, fit.residuals, strict=True)):
         axis.plot(part.load, part.data, "o", ms=4, mfc="none", color=f"C{i}", label=part.name)
         if fit.k:
-            load = np.linspace(0, part.load.max(), 400)
-            law = dimensionless_law(fit.quantity, run, load * run.dR, fit.k.value, fit.c and fit.c.value)
+            load, c = np.linspace(0, part.load.max(), 400), fit.c.value if fit.c else None
+            law = dimensionless_law(fit.quantity, run, load * run.dR, fit.k.value, c)
             axis.plot(load, law, "-", lw=1.4, color=f"C{i}")
     found = [f"{name} = {value.value:.3f} ± {value.error:.3f}" for name, value in (("k", fit.k), ("c", fit.c)) if value]
     axis.set(ylabel=label, ylim=(0, None))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -21,15 +22,19 @@ _FAR = 1e150  # no displacement, and its square is still a number
 _ENOUGH = 1000  # halvings leave no digit of any bracket after 64; the rest is for doubling and halving to tiny roots
 
 
+def _nothing() -> Array:
+    return np.array(np.nan)
+
+
 @dataclass(frozen=True)
 class LawState:
     """What a law says at several points; nan where it is outside its range, or says nothing of that quantity."""
 
     delta: Array
     load: Array
-    stiffness: Array | float = math.nan
-    peak_pressure: Array | float = math.nan
-    angle: Array | float = math.nan
+    stiffness: Array = field(default_factory=_nothing)
+    peak_pressure: Array = field(default_factory=_nothing)
+    angle: Array = field(default_factory=_nothing)
 
 
 @dataclass(frozen=True)
@@ -108,24 +113,23 @@ class Law:
 
     def _at_load(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside) -> LawState:
         self._heed(joint, outside)
-        P, bounds = np.asarray(load, dtype=float), [self.limit(joint), self.end(joint)]
+        P, limit, end = np.asarray(load, dtype=float), self.limit(joint), self.end(joint)
         if not self.gives_displacement:
-            return self._known(joint, self._inside(joint, P, *bounds, "P", outside))
-        bounds = [x if math.isinf(x) else float(self.state(joint, np.array(x)).load) for x in bounds]
-        P = self._inside(joint, P, *bounds, "P", outside)
+            return self._known(joint, self._inside(joint, P, limit, end, "P", outside))
+        state = partial(self.state, joint)
+        limit, end = (x if math.isinf(x) else float(state(np.array(x)).load) for x in (limit, end))
+        P = self._inside(joint, P, limit, end, "P", outside)
         if self.inverse is not None:
             delta = self.inverse(joint, np.where(P >= 0, P, 0.0))
         else:
-            delta = monotone_root(
-                lambda x: self.state(joint, x).load, lambda x: self.state(joint, x).stiffness, P, joint.clearance
-            )
+            delta = monotone_root(lambda x: state(x).load, lambda x: state(x).stiffness, P, joint.clearance)
         return replace(self._known(joint, np.where(P >= 0, delta, np.nan)), load=P)
 
     def _known(self, joint: LawJoint, x: Array) -> LawState:
         """The state at checked points ``x``: nan in, nan out."""
         valid = x >= 0
         state = self.state(joint, np.where(valid, x, 0.0))
-        return LawState(*(np.where(valid, getattr(state, field.name), np.nan) for field in fields(LawState)))
+        return LawState(*(np.where(valid, getattr(state, each.name), np.nan) for each in fields(LawState)))
 
     def _with_pressure(self, joint: LawJoint, state: LawState, outside: Outside) -> LawState:
         """``state``, with pressure and angle taken out beyond their own range."""

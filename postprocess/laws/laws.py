@@ -11,6 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from archord.postprocess.laws import calibrated
 from archord.postprocess.laws import chord_laws as chord
 from archord.postprocess.laws import elastic_laws as elastic
@@ -88,7 +90,7 @@ def _of_load(peak: _Function, angle: _Function, **more: Any) -> dict[str, Any]:
     """A law that gives pressure and contact angle of a load."""
 
     def state(joint: LawJoint, P: Array) -> LawState:
-        return LawState(math.nan, P, math.nan, peak(joint, P), angle(joint, P))
+        return LawState(np.array(np.nan), P, peak_pressure=peak(joint, P), angle=angle(joint, P))
 
     return {"state": state, "gives": ("pressure", "contact angle"), **more}
 

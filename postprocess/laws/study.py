@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -35,7 +35,7 @@ from archord.postprocess.laws.curve_fit import fit_curve, fit_plateau
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.scene.errors import InputError
 
-Cases = pd.DataFrame  # with the columns of `COLUMNS` and of `table_of`
+Cases: TypeAlias = pd.DataFrame  # with the columns of `COLUMNS` and of `table_of`
 Form = dict[str, Any]  # name, and the terms of each polynomial, see `CalibratedModel`
 Row = tuple[str, str, str, dict[str, Any]]  # what, plane, which bodies yield, `summary` of errors
 

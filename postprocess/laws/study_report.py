@@ -20,7 +20,7 @@ from archord.report.table import Table
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from archord.geometry.basis import Array
+    from archord.postprocess.laws.joint import Array
 
 PAPER_K = 0.85
 _YIELDS = {"none": "none (elastic)", "block": "block alone"}
@@ -174,9 +174,13 @@ def _points(axis: Axes, cases: Cases, x: str, y: str, color: str) -> None:
             axis.plot(same[x], same[y], marker, ms=4, mfc="none", color=color)
 
 
-def _line(axis: Axes, x: Array, model: CalibratedModel, plane: str, color: str, said: str, **numbers: Any) -> None:
+def _line(
+    axis: Axes, x: Array, model: CalibratedModel | None, plane: str, color: str, said: str, **numbers: Any
+) -> None:
     """c of the model where both bodies yield, k without ``s``, for joints of these ``numbers`` and one Poisson's ratio,
-    where the model holds; named in plane strain."""
+    where there is a model and it holds; named in plane strain."""
+    if model is None:
+        return
     joints = {"plane": plane, "alpha": 0.0, "nu": 0.3, "s": math.inf, "clearance": 0.005, "pin_nu": math.nan} | numbers
     points = Points.of(joints)
     k, c = model.coefficients((plane, "both" if "s" in numbers else "none"), points)
@@ -190,11 +194,11 @@ def _elastic_k(by_nu: Axes, by_moduli: Axes, cases: Cases, model: CalibratedMode
     pins = {-0.5: "pin 3 times softer", 0.0: "like bodies", 0.5: "pin 3 times stiffer", 1.0: "rigid pin"}
     for i, (ratio, words) in enumerate(pins.items()):
         _points(by_nu, alike[abs(alike.alpha - ratio) < _ALIKE], "nu", "k", f"C{i}")
-        for plane in PLANES if model else ():
+        for plane in PLANES:
             _line(by_nu, nu, model, plane, f"C{i}", words, alpha=ratio, nu=nu)
     for i, value in enumerate((0.0, 0.3, 0.49)):
         _points(by_moduli, alike[(abs(alike.nu - value) < 1e-3) & (alike.alpha < 1)], "ratio", "k", f"C{i}")
-        for plane in PLANES if model else ():
+        for plane in PLANES:
             x = (1 + alpha) / (1 - alpha)
             _line(by_moduli, x, model, plane, f"C{i}", f"ν = {value:g}", alpha=alpha, nu=value)
     for axis in (by_nu, by_moduli):

@@ -1,6 +1,8 @@
 """What holds for every law: derivative, inverse, units, and a word at the end of the range."""
 
 import re
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -186,3 +188,17 @@ def test_a_small_block_is_as_soft_as_is_said(width, sections):
     assert (fall < most).all()
     assert fall == pytest.approx(about, rel=0.7 if sections else 0.2)
     assert LawJoint.from_scene(blocks[1]).softer[0] < 2e-4
+
+
+def test_the_room_needs_no_finite_elements():
+    """Formulas, fits and the study are imported without any library of the solver, or one that draws."""
+    code = (
+        "import importlib, pkgutil, sys; import archord.postprocess.laws as room\n"
+        "names = [module.name for module in pkgutil.iter_modules(room.__path__)]\n"
+        "for name in names: importlib.import_module(f'{room.__name__}.{name}')\n"
+        "print(len(names), {'dolfinx', 'basix', 'petsc4py', 'mpi4py', 'gmsh', 'matplotlib'} & {*sys.modules})"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    number, _, loaded = result.stdout.strip().partition(" ")
+    assert int(number) > 10
+    assert loaded == "set()"
