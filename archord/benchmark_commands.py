@@ -224,10 +224,10 @@ def _work_precision(
     warm: bool,
     quiet: bool,
 ) -> int:
-    from archord.benchmarks.cost.timing import INTERRUPTED, time_all
     from archord.benchmarks.cost.work_precision import judge, warm_seconds
     from archord.benchmarks.cost.work_precision_codes import chosen, tasks
     from archord.benchmarks.cost.work_precision_report import markdown, write
+    from archord.benchmarks.timing import INTERRUPTED, time_all
     from archord.output.folder import claim_folder
 
     claim_folder(output, force=True)

@@ -10,43 +10,34 @@ import argparse
 import json
 import sys
 import tempfile
-from importlib.resources import files
 from pathlib import Path
 
-from mpi4py import MPI
-
-from archord.benchmarks.case import paper_joint
-from archord.output.run import solve_scene
+from archord.benchmarks.case import Case, paper_joint
 
 ALLOWED = 1.1  # of what is kept
-SIZES = (0.12, 0.08)  # elements on the arcs, over R
-CASES: dict[str, dict] = {"elastic": {"steps": 2}, "plastic": {"steps": 20, "yield_stress": 0.002}}
-KEPT = "counts.json"
+KEPT = Path(__file__).with_name("counts.json")
 _TOTALS = {"iterations": "newton_iterations", "factorisations": "factorisations", "evaluations": "residual_evaluations"}
+# ``elastic 0.12`` is the elastic joint of the paper with elements of 0.12 R on its arcs.
+CASES = [
+    Case(f"{kind} {size:g}", paper_joint(size, steps, yield_stress))
+    for kind, steps, yield_stress in (("elastic", 2, None), ("plastic", 20, 0.002))
+    for size in (0.12, 0.08)
+]
 
 Counts = dict[str, int]
 
 
-def names() -> list[str]:
-    """The cases: ``elastic 0.12`` is the elastic joint of the paper with elements of 0.12 R on its arcs."""
-    return [f"{kind} {size:g}" for kind in CASES for size in SIZES]
-
-
-def count(name: str) -> Counts:
-    """Solve the case ``name``; its dofs, Newton iterations, factorisations and evaluations of the residual."""
-    kind, size = name.split()
-    scene = paper_joint(float(size), **CASES[kind])
+def count(case: Case) -> Counts:
+    """Solve ``case``; its dofs, Newton iterations, factorisations and evaluations of the residual."""
     with tempfile.TemporaryDirectory() as folder:
-        outcome = solve_scene(scene, Path(folder), MPI.COMM_SELF)
-        if outcome.status != "done":
-            raise RuntimeError(f"{name}: {outcome.message}")
-        report = json.loads((Path(folder) / "run.json").read_text())
+        case.solve(Path(folder))
+        report = json.loads((case.folder(Path(folder)) / "run.json").read_text(encoding="utf-8"))
     return {"dofs": report["mesh"]["dofs"]} | {ours: report["totals"][theirs] for ours, theirs in _TOTALS.items()}
 
 
 def kept() -> dict[str, Counts]:
     """The counts in counts.json, by case."""
-    return json.loads(files("archord.benchmarks.cost").joinpath(KEPT).read_text(encoding="utf-8"))
+    return json.loads(KEPT.read_text(encoding="utf-8"))
 
 
 def grown(name: str, now: Counts, before: Counts) -> list[str]:
@@ -63,12 +54,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python3 -m archord.benchmarks.cost.counts", description=main.__doc__)
     parser.add_argument("--write", action="store_true", help="keep these counts in counts.json")
     write = parser.parse_args().write
-    now = {name: count(name) for name in names()}
+    now = {case.name: count(case) for case in CASES}
     for name, counts in now.items():
         print(f"{name}: " + ", ".join(f"{value} {what}" for what, value in counts.items()))
     if write:
         lines = ",\n".join(f" {json.dumps(name)}: {json.dumps(counts)}" for name, counts in now.items())
-        Path(__file__).with_name(KEPT).write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
+        KEPT.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
         return 0
     faults = [fault for name, before in kept().items() for fault in grown(name, now[name], before)]
     for fault in faults:

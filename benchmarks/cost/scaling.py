@@ -17,7 +17,7 @@ from pathlib import Path
 from scipy.optimize import brentq
 
 from archord.benchmarks.case import paper_joint
-from archord.benchmarks.cost.timing import Process, Timing, time_all
+from archord.benchmarks.timing import Process, Timing, time_all
 from archord.output.folder import claim_folder
 from archord.scene.errors import InputError
 from archord.scene.file import resolved

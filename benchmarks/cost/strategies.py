@@ -14,9 +14,8 @@ from pathlib import Path
 from statistics import median
 
 from archord.benchmarks.case import matches, paper_joint
-from archord.benchmarks.cost.scaling_cases import refined
-from archord.benchmarks.cost.scaling_run import launcher
-from archord.benchmarks.cost.timing import Process, time_all
+from archord.benchmarks.cost.scaling import launcher, refined
+from archord.benchmarks.timing import Process, time_all
 from archord.report.table import Table
 from archord.scene.file import resolved
 
@@ -86,12 +85,10 @@ def _measured(case: _Case, strategy: str, place: Path, pairs: int) -> list[objec
     """The row of ``strategy`` in ``case``. Raises RuntimeError if a run failed."""
     runs = []
     for name, change in (("with", "pass"), ("without", _WITHOUT[strategy])):
-        folder = place / name
-        arguments = [*case.arguments, *([str(folder / "sweep")] if case.arguments[0] == "sweep" else [])]
+        arguments = [*case.arguments, *(["sweep"] if case.arguments[0] == "sweep" else [])]
         command = (*launcher(case.ranks), sys.executable, "-c", _COMMAND.format(change), *arguments)
-        runs.append(Process(command, folder, kind=case.name))
-    if case.arguments[0] == "sweep":  # what is there is not solved again
-        runs = [Process((sys.executable, "-c", _AFRESH, *r.command), r.folder, kind=r.kind) for r in runs]
+        # what a sweep finds is not solved again
+        runs.append(Process(command, place / name, clear=("sweep",), kind=case.name))
     timings = time_all(runs, pairs)
     failure = next((t.failure for t in timings if t.failure), "")
     if failure:
@@ -105,8 +102,6 @@ def _measured(case: _Case, strategy: str, place: Path, pairs: int) -> list[objec
     seconds = (f"{t.median:.2f}" for t in timings)
     return [case.name, case.ranks, strategy, *seconds, share("seconds"), share("cpu")]
 
-
-_AFRESH = "import shutil, subprocess, sys; shutil.rmtree('sweep', True); sys.exit(subprocess.call(sys.argv[1:]))"
 
 if __name__ == "__main__":
     sys.exit(main())

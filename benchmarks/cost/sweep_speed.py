@@ -11,11 +11,10 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from shutil import rmtree
 from statistics import median
 
 from archord.benchmarks.cost.scaling import launcher
-from archord.benchmarks.cost.timing import Process, Run, time_all
+from archord.benchmarks.timing import Process, Run, time_all
 from archord.report.table import Table
 
 _A_DAY = 86400.0  # seconds
@@ -26,14 +25,10 @@ def measure(
 ) -> tuple[list[Run], list[Run]]:
     """The runs of ``sweep`` on one rank and on ``ranks``, in turn; ``said`` follows each. Raises RuntimeError if one
     failed, `InputError` without mpirun."""
+    archord = (sys.executable, "-m", "archord", "sweep", str(sweep.resolve()), "-q", "-o", "sweep")
     with tempfile.TemporaryDirectory() as place:
-        out = Path(place) / "sweep"
-        archord = (sys.executable, "-m", "archord", "sweep", str(sweep.resolve()), "-q", "-o", str(out))
-
-        def solved() -> None:
-            rmtree(out)  # what is there is not solved again
-
-        processes = [Process((*launcher(n), *archord), Path(place), solved, _A_DAY) for n in (1, ranks)]
+        # what is there is not solved again
+        processes = [Process((*launcher(n), *archord), Path(place), limit=_A_DAY, clear=("sweep",)) for n in (1, ranks)]
         timings = time_all(processes, pairs, lambda process, repeat, text: said(f"pair {repeat} of {pairs}: {text}"))
     for n, timing in zip((1, ranks), timings, strict=True):
         if timing.failure:

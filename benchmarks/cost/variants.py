@@ -11,7 +11,7 @@ from statistics import median
 from typing import Any
 
 from archord.benchmarks.case import paper_joint, slug
-from archord.benchmarks.cost.timing import Process, Timing, time_all
+from archord.benchmarks.timing import Process, Timing, time_all
 from archord.output.folder import claim_folder
 from archord.report.files import write_report
 from archord.report.table import Table

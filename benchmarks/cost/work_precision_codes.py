@@ -17,17 +17,16 @@ from time import perf_counter
 
 from archord.benchmarks.case import matches, slug
 from archord.benchmarks.cost.pressure_profile import interpolated
-from archord.benchmarks.cost.timing import LIMIT, Failure, Process, last_core
 from archord.benchmarks.cost.work_precision_cases import DECKS, SERIES, JointCase, Kinematics, Mesh, Series
 from archord.benchmarks.cost.work_precision_reference import profile_of, values_of
-from archord.benchmarks.peers.calculix import read_opinion
+from archord.benchmarks.peers import calculix
 from archord.benchmarks.peers.installed import Peer, installed
+from archord.benchmarks.timing import LIMIT, Failure, Process, last_core
 from archord.geometry.basis import Array
 from archord.output.history import read_history
-from archord.postprocess.deck import PlaneMesh, deck, deck_mesh
+from archord.postprocess.deck import deck_mesh
 from archord.scene.errors import InputError
 from archord.scene.file import resolved
-from archord.scene.scene import Scene
 
 OURS, CALCULIX = "archord", "CalculiX"
 
@@ -104,19 +103,18 @@ def chosen(found: Sequence[Task], patterns: Sequence[str]) -> list[Task]:
     return [task for task in found if not patterns or any(fits(task, pattern) for pattern in patterns)]
 
 
-def _task(case: JointCase, code: str, series: str, size: float, folder: Path, command: Sequence[str]) -> Task:
-    """The task in a folder of its own, which is made."""
+def _task(case: JointCase, code: str, series: str, size: float, folder: Path) -> Task:
+    """The task, without a command, in a folder of its own, which is made."""
     label = f"{size:g} R"
     place = (folder / slug(f"{case.name} {code} {series} {label}")).resolve()
     place.mkdir(parents=True, exist_ok=True)
     named = {"case": case.name, "code": code, "series": series, "label": label, "size": size, "steps": case.steps}
-    return Task(tuple(command), place, core=last_core(), kind=(code, case.name, series), **named)
+    return Task((), place, core=last_core(), kind=(code, case.name, series), **named)
 
 
 def _archord_task(case: JointCase, series: Series, mesh: Mesh, folder: Path, limit: float) -> Task:
     scene = case.scene(mesh)
-    command = (sys.executable, "-m", "archord", "solve", "input.toml", "-o", "run", "--force", "--quiet")
-    task = _task(case, OURS, series.name, scene.joint.h, folder, command)
+    task = _task(case, OURS, series.name, scene.joint.h, folder)
     (task.folder / "input.toml").write_text(resolved(scene), encoding="utf-8")
 
     def read() -> Values:
@@ -134,25 +132,36 @@ def _archord_task(case: JointCase, series: Series, mesh: Mesh, folder: Path, lim
             "both",
         )
 
-    return replace(task, read=read, limit=limit, version=importlib.metadata.version("archord"))
+    command = (sys.executable, "-m", "archord", "solve", "input.toml", "-o", "run", "--force", "--quiet")
+    return replace(task, command=command, read=read, limit=limit, version=importlib.metadata.version("archord"))
 
 
 def _calculix_task(case: JointCase, series: Series, keys: Mesh, folder: Path, limit: float) -> Task:
     if case.name == "elastic":
         case = replace(case, steps=series.elastic_steps)
     scene = case.scene(keys)
-    task = _task(case, CALCULIX, series.name, scene.joint.h, folder, ("ccx", "joint"))
-    start = perf_counter()
+    task, start = _task(case, CALCULIX, series.name, scene.joint.h, folder), perf_counter()
     mesh = deck_mesh(scene, series.elements or "quadratic")
-    (task.folder / "joint.inp").write_text(deck(scene, mesh), encoding="utf-8")
-    return replace(
-        task,
-        read=lambda: calculix_values(case, scene, mesh, task.folder),
-        limit=limit,
-        export=perf_counter() - start,
-        clear=tuple(f"joint.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d")),
-        version=_calculix_version(),
-    )
+    ccx = calculix.process(scene, mesh, task.folder)
+    export = perf_counter() - start
+
+    def read() -> Values:
+        opinion = ccx.read()
+        values = {"P": opinion.P, "p0": opinion.p0}
+        if case.yield_stress:
+            # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
+            values["dissipation"] = case.yield_stress * opinion.peeq_integral
+        # no contact angle: pressures at the nodes near the edge scatter too much to find one
+        return Values(
+            {name: value for name, value in values.items() if math.isfinite(value)},
+            2 * len(mesh.x),
+            iterations=opinion.iterations,
+            profile=interpolated(opinion.angle, opinion.pressure),
+            side="pin",
+        )
+
+    version = _calculix_version()
+    return replace(task, command=ccx.command, clear=ccx.clear, read=read, limit=limit, export=export, version=version)
 
 
 @cache
@@ -161,32 +170,9 @@ def _calculix_version() -> str:
     return found[1] if found else ""
 
 
-def calculix_values(case: JointCase, scene: Scene, mesh: PlaneMesh, place: Path) -> Values:
-    """What CalculiX's result files in ``place`` say. Raises `Failure` if it did not reach the last step.
-
-    There is no contact angle: pressures at the nodes near the edge scatter too much to find one.
-    """
-    try:
-        opinion = read_opinion(scene, mesh, place, (place / "stdout.txt").read_text(errors="replace"))
-        rows = [line.split() for line in (place / "joint.sta").read_text().splitlines()]
-    except (RuntimeError, OSError) as error:
-        raise Failure(str(error)) from None
-    values = {"P": opinion.P, "p0": opinion.p0}
-    if case.yield_stress:
-        # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
-        values["dissipation"] = case.yield_stress * opinion.peeq_integral
-    return Values(
-        {name: value for name, value in values.items() if math.isfinite(value)},
-        2 * len(mesh.x),
-        iterations=sum(int(row[3]) for row in rows if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()),
-        profile=interpolated(opinion.angle, opinion.pressure),
-        side="pin",
-    )
-
-
 def peer_task(case: JointCase, peer: Peer, size: float, order: int, folder: Path, limit: float = LIMIT) -> Task:
     """A mesh of ``peer``'s, for its own time limit or, if that is less, ``limit``."""
-    task = _task(case, peer.label, f"order {order}", size, folder, ())
+    task = _task(case, peer.label, f"order {order}", size, folder)
     output = task.folder / "result.json"
     return replace(
         task,

@@ -12,6 +12,7 @@ families, each smoothed by itself, and between this and twice as many terms.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,20 +34,6 @@ FILE = Path(__file__).with_name("work_precision_reference.json")
 COLUMNS = {"P": "P/(E* R)", "p0": "p0/E*", "eps": "eps", "dissipation": "plastic_dissipation/(E* R2)"}  # of history.csv
 _FINEST = 3  # meshes of each family whose profiles are taken
 _TERMS = {"elastic": 6, "plastic": 10}  # of the smoothed profile
-# Fixed pairs can be chosen with either side's normals, which is a difference of the order of (dR/R)^2: another code's
-# choice tells how much of the value depends on that. GetFEM's value is good to 1e-5 only.
-_INDEPENDENT: dict[tuple[str, str], dict[str, Any]] = {
-    ("elastic", "reference"): {
-        "P": 0.012759596231085768,
-        "source": "NGSolve 6.2, fourth order elements, fixed pairs in the touching configuration, linear gap",
-        "another choice of pairs": True,
-    },
-    ("elastic", "current"): {
-        "P": 0.012778525299802898,
-        "source": "GetFEM 5.4, Q2 elements of 0.5 %R, closest points on the deformed curves, digits to 1e-5",
-        "another choice of pairs": False,
-    },
-}
 
 
 @dataclass(frozen=True)
@@ -67,7 +54,7 @@ def read_reference(case: str, kinematics: Kinematics = "current") -> Reference:
     data = stored(case, kinematics)
     values = {name: entry["value"] for name, entry in data["quantities"].items()}
     errors = {name: entry["error"] for name, entry in data["quantities"].items()}
-    profile = {side: np.array(p) for side, p in data.get("profile", {}).items()}
+    profile = {side: np.array(pressures) for side, pressures in data.get("profile", {}).items()}
     return Reference(values, errors, profile | {"both": _mean(profile)} if profile else {})
 
 
@@ -122,15 +109,19 @@ def compute(
     entry["quantities"]["profile"] = {"value": 0.0, "error": apart}
     if kinematics == "current":
         entry["profile"] = {side: [float(f"{p:.7g}") for p in values] for side, values in profile.items()}
-    if (case.name, kinematics) in _INDEPENDENT:
-        entry["independent"] = independent = _INDEPENDENT[case.name, kinematics]
-        force = entry["quantities"]["P"]
+    everything = _stored()
+    # Fixed pairs can be chosen with either side's normals, which is a difference of the order of (dR/R)^2: another
+    # code's choice, which the file holds, tells how much of the value depends on that.
+    if independent := everything.get(case.name, {}).get(kinematics, {}).get("independent"):
+        entry["independent"], force = independent, entry["quantities"]["P"]
         if independent["another choice of pairs"]:
             force["error"] = max(force["error"], abs(independent["P"] / force["value"] - 1))
-    everything = _stored()
     everything.setdefault(case.name, {})[kinematics] = entry
     ordered = {name: everything[name] for name in CASES if name in everything}
-    FILE.write_text(_json({"angles": f"{len(ANGLES)} equal ones from 0 to pi/2", "cases": ordered}), encoding="utf-8")
+    text = json.dumps({"angles": f"{len(ANGLES)} equal ones from 0 to pi/2", "cases": ordered}, indent=1)
+    # one line for each list of numbers
+    text = re.sub(r"\[[^][{}]*\]", lambda numbers: json.dumps(json.loads(numbers[0])), text)
+    FILE.write_text(text + "\n", encoding="utf-8")
 
 
 def smooth_profile(families: list[list[dict[str, Array]]], terms: int) -> tuple[dict[str, Array], float]:
@@ -176,13 +167,3 @@ def _solve(
 
 def _stored() -> dict[str, dict[str, Any]]:
     return json.loads(FILE.read_text(encoding="utf-8"))["cases"] if FILE.exists() else {}
-
-
-def _json(data: dict[str, Any]) -> str:
-    """Indented, but for the profiles, which would be a line a number."""
-    text = json.dumps(data, indent=1)
-    for case in data["cases"].values():
-        for entry in case.values():
-            for values in entry.get("profile", {}).values():
-                text = text.replace(json.dumps(values, indent=1).replace("\n", "\n" + " " * 5), json.dumps(values))
-    return text + "\n"

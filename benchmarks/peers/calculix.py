@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -19,10 +18,10 @@ from time import perf_counter
 import numpy as np
 
 from archord.benchmarks.case import Case, paper_joint
+from archord.benchmarks.timing import Failure, Process, Run, run_once
 from archord.geometry.basis import Array
 from archord.geometry.joint_mesh import Facets
 from archord.postprocess.deck import Elements, PlaneMesh, deck, deck_mesh, loaded_nodes, thickness
-from archord.presets.measures import Measures
 from archord.report.table import Table
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
@@ -61,7 +60,7 @@ class SecondOpinion:
     pressure: Array
     peeq_max: float
     peeq_integral: float
-    seconds: float
+    iterations: int
 
     @property
     def P(self) -> float:
@@ -85,43 +84,32 @@ def require_calculix() -> None:
         )
 
 
-def run_calculix(
-    scene: Scene, mesh: PlaneMesh, folder: Path, *, thick: float | None = None, timeout: float = 1800
-) -> SecondOpinion:
-    """Solve ``scene`` on ``mesh`` with CalculiX in ``folder``, in a model of the deck's thickness, or ``thick``.
+def process(scene: Scene, mesh: PlaneMesh, folder: Path, thick: float | None = None, limit: float = 1800.0) -> Process:
+    """CalculiX on the deck of ``scene`` on ``mesh``, which is written into ``folder``; its result is a `SecondOpinion`.
 
-    Raises `InputError` if there is no ``ccx``, RuntimeError if it does not reach the last step within ``timeout``
-    seconds.
+    The model has the deck's thickness, or ``thick``.
     """
-    require_calculix()
+    folder.mkdir(parents=True, exist_ok=True)
     thick = thickness(scene) if thick is None else thick
     (folder / "joint.inp").write_text(deck(scene, mesh, thick), encoding="utf-8")
-    start = perf_counter()
-    try:
-        done = subprocess.run(["ccx", "joint"], cwd=folder, capture_output=True, text=True, timeout=timeout)
-    except subprocess.TimeoutExpired:
-        raise RuntimeError(f"CalculiX did not finish within {timeout:g} s") from None
-    return read_opinion(scene, mesh, folder, done.stdout, thick, perf_counter() - start)
+    old = tuple(f"joint.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d"))
+    return Process(("ccx", "joint"), folder, lambda: read_opinion(scene, mesh, folder, thick), limit, clear=old)
 
 
-def read_opinion(
-    scene: Scene, mesh: PlaneMesh, folder: Path, said: str, thick: float | None = None, seconds: float = math.nan
-) -> SecondOpinion:
-    """CalculiX's results in ``folder``, for which it took ``seconds`` and ``said`` this on the terminal.
-
-    Raises RuntimeError if it did not reach the last step.
-    """
-    thick = thickness(scene) if thick is None else thick
+def read_opinion(scene: Scene, mesh: PlaneMesh, folder: Path, thick: float) -> SecondOpinion:
+    """CalculiX's results in ``folder``. Raises `Failure` if it did not reach the last step."""
     printed = read_printed((folder / "joint.dat").read_text()) if (folder / "joint.dat").exists() else []
     pin, block = (step_forces(printed, name, thick) for name in (loaded_nodes(scene), "BLOCK_HELD"))
     if len(pin) != len(scene.targets):
-        errors = [line.strip() for line in said.splitlines() if "*ERROR" in line]
-        raise RuntimeError("; ".join([f"CalculiX ended after step {len(pin)} of {len(scene.targets)}", *errors]))
+        said = (folder / "stdout.txt").read_text(errors="replace").splitlines()
+        errors = [line.strip() for line in said if "*ERROR" in line]
+        raise Failure("; ".join([f"CalculiX ended after step {len(pin)} of {len(scene.targets)}", *errors]))
     pressure = read_contact_pressure((folder / "joint.frd").read_text(), len(mesh.x))
     arc = np.unique(mesh.edge_nodes(Facets.PIN_ARC))
     angle = np.arctan2(mesh.x[arc, 0], -mesh.x[arc, 1] - scene.joint.dR)
     order = np.argsort(angle)
     largest, integral = plastic_strain(printed, mesh)
+    increments = [line.split() for line in (folder / "joint.sta").read_text().splitlines()]
     return SecondOpinion(
         forces=pin,
         force_balance=float(np.abs(pin + block).max() / pin[-1]),
@@ -129,7 +117,7 @@ def read_opinion(
         pressure=pressure[arc[order]],
         peeq_max=largest,
         peeq_integral=integral,
-        seconds=seconds,
+        iterations=sum(int(row[3]) for row in increments if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()),
     )
 
 
@@ -213,14 +201,15 @@ def cases() -> Iterator[Case]:
             yield Case(f"plane {plane}, {name}", scene)
 
 
-def row(name: str, scene: Scene, elements: Elements, m: Measures, seconds: float, thick: float | None = None) -> list:
-    """One line of the table, which says so if CalculiX does not get to the end; ``thick`` as in `run_calculix`."""
-    mesh = deck_mesh(scene, elements)
+def row(name: str, scene: Scene, elements: Elements, ours: Run, thick: float | None = None) -> list:
+    """One line of the table, which says so if CalculiX does not get to the end; ``thick`` as in `process`."""
+    mesh, m = deck_mesh(scene, elements), ours.result
     try:
         with tempfile.TemporaryDirectory() as folder:
-            c = run_calculix(scene, mesh, Path(folder), thick=thick)
-    except RuntimeError as error:
-        return [name, elements, error] + [""] * (len(HEADINGS) - 3)
+            theirs = run_once(process(scene, mesh, Path(folder), thick))
+    except Failure as failure:
+        return [name, elements, failure] + [""] * (len(HEADINGS) - 3)
+    c = theirs.result
     force, pressure, area = scene.E_star * scene.joint.radius, scene.E_star, scene.joint.radius**2
     plane = "CPE" if scene.analysis.plane == "strain" else "CPS"
     cells = [name, f"{plane}{mesh.elements.shape[1]}", 2 * len(mesh.x)]
@@ -231,7 +220,7 @@ def row(name: str, scene: Scene, elements: Elements, m: Measures, seconds: float
         cells += [f"{m.peeq_integral / area:.4g}", f"{c.peeq_integral / area:.4g}"]
     else:
         cells += ["-"] * 4
-    return [*cells, f"{seconds:.1f}", f"{c.seconds:.1f}"]
+    return [*cells, f"{ours.seconds:.1f}", f"{theirs.seconds:.1f}"]
 
 
 def main() -> int:
@@ -241,15 +230,14 @@ def main() -> int:
         require_calculix()
         with tempfile.TemporaryDirectory() as folder:
             for case in cases():
-                start = perf_counter()
+                name, scene, start = case.name, case.scene, perf_counter()
                 last = case.solve(Path(folder)).steps[-1]
-                seconds, name, scene = perf_counter() - start, case.name, case.scene
-                kinds: list[tuple] = [(name, "quadratic", None), (name, "linear", None)]
+                ours = Run(perf_counter() - start, 0.0, 0, last)
+                table.add(*row(name, scene, "quadratic", ours))
+                table.add(*row(name, scene, "linear", ours))
                 if scene.plastic and scene.analysis.plane == "stress":
-                    kinds.append((f"{name}, R thick", "quadratic", scene.joint.radius))
-                for name, elements, thick in kinds:
-                    table.add(*row(name, scene, elements, last, seconds, thick))
-                    print(f"{name}, {elements} elements: {table.rows[-1][5] or table.rows[-1][2]}", file=sys.stderr)
+                    table.add(*row(f"{name}, R thick", scene, "quadratic", ours, scene.joint.radius))
+                print(f"{name}: {perf_counter() - start:.0f} s", file=sys.stderr)
     except (InputError, RuntimeError) as error:
         print(error, file=sys.stderr)
         return 2

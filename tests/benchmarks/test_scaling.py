@@ -10,7 +10,7 @@ import pytest
 from archord.benchmarks.cost import scaling
 from archord.benchmarks.cost.scaling import ELASTIC, PARTS, Cost, Costs, Setting, cost_of, process, refined, settings
 from archord.benchmarks.cost.scaling_report import exponent, extrapolated, goals, markdown, serial_fraction
-from archord.benchmarks.cost.timing import Run, Timing, time_all
+from archord.benchmarks.timing import Run, Timing, time_all
 from archord.cli import run
 from archord.scene.errors import InputError
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from archord.benchmarks.cost import variants
-from archord.benchmarks.cost.timing import time_all
 from archord.benchmarks.cost.variants import VARIANTS, WATCHED, run, write
+from archord.benchmarks.timing import time_all
 
 CHOSEN = ("elastic, rigid pin", "elastic, no fields", "plastic", "picture of plastic")
 

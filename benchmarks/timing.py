@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import statistics
 import subprocess
@@ -36,8 +37,8 @@ class Process:
     """A ``command`` to be timed in its ``folder``, on one ``core`` (on any if negative), for ``limit`` seconds at most.
 
     ``read`` gives the result of a process that ended with code 0, and raises `Failure` if there is none. The files
-    ``clear`` of an earlier run are removed before. The first process of a ``kind`` runs once before all, untimed, so
-    that what is compiled on first use is there.
+    and folders ``clear`` of an earlier run are removed before. The first process of a ``kind`` runs once before all,
+    untimed, so that what is compiled on first use is there.
     """
 
     command: tuple[str, ...]
@@ -132,8 +133,11 @@ def _add(timing: Timing, repeat: int, said: Said) -> None:
 def run_once(process: Process) -> Run:
     """One run. Raises `Failure`."""
     process.folder.mkdir(parents=True, exist_ok=True)
-    for name in process.clear:
-        (process.folder / name).unlink(missing_ok=True)
+    for old in (process.folder / name for name in process.clear):
+        if old.is_dir():
+            shutil.rmtree(old)
+        else:
+            old.unlink(missing_ok=True)
     command = (sys.executable, "-I", "-S", __file__, repr(process.limit), str(process.core), *process.command)
     launched = subprocess.run(command, cwd=process.folder, capture_output=True, text=True)
     if launched.returncode:
