@@ -57,7 +57,7 @@ def reproduce(figures: tuple[str, ...], output: Path, quiet: bool) -> int:
     from archord.benchmarks.paper.reproduce import reproduce as make
 
     comm, say = MPI.COMM_WORLD, _telling(quiet)
-    wanted = chosen(figures or ["all"])
+    wanted = chosen(list(figures) or ["all"])
     try:
         files = make(wanted, output, comm, lambda case, P: say(f"{case.name:34s} P(2 dR)/(E* R) = {P:.6f}"))
     except RuntimeError as error:

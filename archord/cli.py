@@ -19,21 +19,14 @@ import archord
 from archord.ranks import COLLECTIVE, launcher_rank, run_on_ranks
 from archord.scene.errors import InputError
 
-COMMANDS = {
-    "solve": "solve_commands",
-    "show": "result_commands",
-    "compare": "result_commands",
-    "export": "result_commands",
-    "picture": "result_commands",
-    "fit": "law_commands",
-    "reproduce": "benchmark_commands",
-    "sweep": "sweep_commands",
-    "export-deck": "result_commands",
-    "scene": "solve_commands",
-    "laws": "law_commands",
-    "law": "law_commands",
-    "benchmark": "benchmark_commands",
+FILES = {
+    "solve_commands": ("solve", "scene"),
+    "result_commands": ("show", "compare", "export", "export-deck", "picture"),
+    "sweep_commands": ("sweep",),
+    "law_commands": ("laws", "law", "fit"),
+    "benchmark_commands": ("reproduce", "benchmark"),
 }
+COMMANDS = {command: file for file, commands in FILES.items() for command in commands}
 
 
 class _Commands(click.Group):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,8 @@ PATH = click.Path(path_type=Path)
 class _Argument(click.Argument):
     """An argument that help pages explain; those of click have no help."""
 
-    def __init__(self, *names: str, help: str, **settings: Any) -> None:
-        super().__init__(*names, **settings)
+    def __init__(self, names: Sequence[str], help: str, **settings: Any) -> None:
+        super().__init__(names, **settings)
         self.help = help
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str]:

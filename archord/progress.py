@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable
 from contextlib import nullcontext
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Self
@@ -148,10 +147,10 @@ class _MeshProgress(Progress):
                 self._print_step(m)
 
 
-def reporting(scene: Scene, *, silent: bool, done: int = 0) -> tuple[Progress, dict[str, Callable]]:
+def reporting(scene: Scene, *, silent: bool, done: int = 0) -> tuple[Progress, dict[str, Any]]:
     """Who reports a solve of ``scene``, of which ``done`` steps are there, and what the solve has to call."""
     report = Progress(scene, silent, done) if scene.analysis.accuracy is None else _MeshProgress(scene, silent)
-    calls: dict[str, Callable] = {"on_start": report.start, "on_step": report.step, "on_attempt": report.attempt}
+    calls: dict[str, Any] = {"on_start": report.start, "on_step": report.step, "on_attempt": report.attempt}
     if isinstance(report, _MeshProgress):
         calls["on_level"] = report.level
     return report, calls

@@ -14,6 +14,7 @@ _MOST_FITS = 200  # runs of a sweep; an elastic fit takes some milliseconds
 _MOST_FITS = 200  # runs of a sweep; an elastic fit takes some milliseconds
 
 if TYPE_CHECKING:
+    from archord.postprocess.deck import Elements
     from archord.postprocess.run import Run
     from archord.postprocess.sweep import Sweep
 
@@ -155,7 +156,7 @@ def picture(folder: Path, output: Path | None) -> int:
 )
 @overrides()
 @flag("--force", "overwrite a file that is there")
-def export_deck(scene: Path, output: Path | None, elements: str, overrides: tuple[str, ...], force: bool) -> int:
+def export_deck(scene: Path, output: Path | None, elements: Elements, overrides: tuple[str, ...], force: bool) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
     from archord.output.user_file import check_target
     from archord.postprocess.deck import write_deck

@@ -14,7 +14,7 @@ from archord.scene.faults import shortened
 from archord.scene.scene import CHOSEN, Scene, parse_scene
 from archord.scene.sections import LOADS
 
-ALTERNATIVES = {
+ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
     "load": [(*LOADS, "path")],
 }

@@ -65,8 +65,8 @@ def reference() -> str:
     """All sections and keys as Markdown tables."""
     top = Table("key", "default", "what")
     for name in TOP_LEVEL:
-        info = Scene.model_fields[name]
-        top.add(f"`{name}`", f"`{toml_value(info.default)}`", info.description)
+        key = Scene.model_fields[name]
+        top.add(f"`{name}`", f"`{toml_value(key.default)}`", key.description)
     parts = [
         "# Scene reference\n",
         "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.\n",
