@@ -25,7 +25,7 @@ Real = TypeVar("Real", float, Array)
 
 _ASSUMED = 1.0  # P converges faster, but peak pressures and perfect plasticity do not for certain
 _LOWEST, _HIGHEST = 0.5, 2.0  # below, extrapolation multiplies noise; above, the error would be told too small
-_TELLABLE = 0.05, 12.0  # orders that three meshes can show
+_SHOWN = 0.05, 12.0  # orders that three meshes can show
 _SLOWEST, _CAUTIOUS = 1.5, 2.0  # orders that `mesh_error` takes
 _USUAL = 3.0  # order of P on meshes that are refined everywhere (docs/accuracy.md)
 _FREE = 1.4, 4.0  # of a clamped corner's singularity, twice its exponent of 0.7, and of smooth solutions in P2
@@ -40,16 +40,16 @@ def observed_order(sizes: Sequence[float], finer: float, coarser: float) -> floa
     """Order p of three results of the rising ``sizes`` h, the two ``finer`` and the two ``coarser`` so far apart.
 
     p of ``(h3^p - h2^p)/(h2^p - h1^p) = coarser/finer`` (Roache 1998, section 5.10); -inf below 0.05 and inf above 12,
-    which differences cannot tell.
+    which three meshes cannot show.
     """
     from scipy.optimize import brentq
 
     h2, h3 = sizes[1] / sizes[0], sizes[2] / sizes[0]
     goal = coarser / finer
-    low, high = ((h3**p - h2**p) / (h2**p - 1) for p in _TELLABLE)
+    low, high = ((h3**p - h2**p) / (h2**p - 1) for p in _SHOWN)
     if not low < goal < high:
         return -math.inf if goal <= low else math.inf
-    return float(brentq(lambda p: (h3**p - h2**p) / (h2**p - 1) / goal - 1, *_TELLABLE))
+    return float(brentq(lambda p: (h3**p - h2**p) / (h2**p - 1) / goal - 1, *_SHOWN))
 
 
 @dataclass(frozen=True)

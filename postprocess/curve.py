@@ -108,7 +108,7 @@ def curve_of(folder: Path, scene: Scene, columns: Columns) -> RunCurve:
     """The curves among the ``columns`` of a run of ``scene``. Raises `InputError` if it has no accepted step."""
     if not columns["delta"]:
         raise InputError(f"{folder}: holds no accepted step.")
-    return RunCurve(str(folder), scene, *(np.array(columns[name]) for name in _CURVES), folder)
+    return RunCurve(str(folder), scene, **{name: np.array(columns[name]) for name in _CURVES}, folder=folder)
 
 
 def read_run(folder: str | Path) -> RunCurve:

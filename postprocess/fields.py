@@ -13,6 +13,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -93,7 +94,7 @@ def read_fields(folder: str | Path, scene: Scene, step: int) -> Fields:
             if not 1 <= step <= accepted:
                 held = f"steps 1 to {accepted}" if accepted > 1 else "step 1 alone" if accepted else "none"
                 raise InputError(f"{path}: has no step {step}; it holds {held}.")
-            values = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
+            values: dict[str, Any] = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
             return Fields(
                 step=step,
                 delta=float(file["load"][step - 1]),

@@ -32,6 +32,22 @@ def comm() -> MPI.Comm:
     return MPI.COMM_WORLD
 
 
+@pytest.fixture
+def refused(capsys):
+    """``refused(arguments)`` is what the command line says when it refuses them: one sentence, exit code 2, and nothing
+    on stdout."""
+
+    def sentence(arguments) -> str:
+        from archord.cli import run
+
+        assert run(arguments) == 2
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n"), err[-1:]) == ("", 1, "\n")
+        return err
+
+    return sentence
+
+
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory):
     """Folders of small runs, solved once, by name: an elastic joint on two meshes, one of plane stress that yields."""

@@ -287,14 +287,12 @@ def test_a_quick_run_through_the_command(tmp_path, capsys):
     assert "**elastic, 2 steps to 2 dR**" in (tmp_path / "b" / "work_precision.md").read_text(encoding="utf-8")
 
 
-def test_wrong_options(tmp_path, capsys):
-    """One sentence, exit code 2."""
+def test_wrong_options(tmp_path, refused):
     for options, said in (
         (["--case", "soft"], "--case soft: must be elastic, plastic or both."),
         (["--only", "nothing", "--no-peers"], "--only nothing: no code or series has such a name; there are archord"),
     ):
-        assert run(["benchmark", "work-precision", "-o", str(tmp_path), *options]) == 2
-        assert said in capsys.readouterr().err
+        assert said in refused(["benchmark", "work-precision", "-o", str(tmp_path), *options])
 
 
 def test_patterns_choose_codes_series_and_meshes(tmp_path):

@@ -70,7 +70,7 @@ def test_a_random_pressure_on_random_points_keeps_its_force(degrees, start):
     assert 2 * np.trapezoid(chord.py, chord.x) == pytest.approx(chord.resultant, rel=1e-6)
 
 
-def test_a_ring_s_arc_goes_round_but_its_contact_need_not():
+def test_an_arc_may_go_on_where_nothing_presses():
     """Points without pressure may lie anywhere up to pi."""
     phi = np.linspace(0, np.pi, 181)
     pressure = np.maximum(1 - phi, 0)

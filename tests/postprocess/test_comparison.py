@@ -129,13 +129,10 @@ def test_compare_draws_and_tells_the_difference(runs, more, tmp_path, capsys):
         (["{coarse}", "nowhere"], "nowhere: is not a run folder: scene.toml is missing."),
     ],
 )
-def test_what_cannot_be_compared_is_one_sentence(runs, tmp_path, monkeypatch, capsys, arguments, said):
-    """Exit code 2, nothing printed, nothing drawn."""
+def test_what_cannot_be_compared_is_one_sentence(runs, tmp_path, monkeypatch, refused, arguments, said):
+    """And nothing is drawn."""
     monkeypatch.chdir(tmp_path)
-    assert command(["compare", *(a.format(**runs) for a in arguments)]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    assert err.startswith(said)
+    assert refused(["compare", *(a.format(**runs) for a in arguments)]).startswith(said)
     assert not list(tmp_path.iterdir())
 
 

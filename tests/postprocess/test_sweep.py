@@ -107,22 +107,19 @@ def test_a_run_that_cannot_be_read_does_not_hide_the_others(sweep, tmp_path, cap
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "case,run,status,message\n1,2,3,4,5\n"])
-def test_broken_tables_are_one_sentence(sweep, tmp_path, capsys, text):
+def test_broken_tables_are_one_sentence(tmp_path, refused, text):
     """No table, or another one."""
     (tmp_path / "sweep.toml").write_text("")
     (tmp_path / "cases.csv").write_text(text)
-    assert command(["show", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == f"{tmp_path}/cases.csv: cannot be read as the cases of a sweep.\n"
+    assert refused(["show", str(tmp_path)]) == f"{tmp_path}/cases.csv: cannot be read as the cases of a sweep.\n"
     (tmp_path / "cases.csv").unlink()
-    assert command(["show", str(tmp_path)]) == 2
     said = f"is not the folder of a sweep: cases.csv is missing; archord sweep {tmp_path} --gather writes it."
-    assert said in capsys.readouterr().err
+    assert said in refused(["show", str(tmp_path)])
 
 
 @pytest.mark.parametrize("arguments", [["compare", "{0}", "{0}"], ["export", "{0}", "--csv", "x"], ["picture", "{0}"]])
-def test_a_sweep_is_no_run(sweep, tmp_path, monkeypatch, capsys, arguments):
+def test_a_sweep_is_no_run(sweep, tmp_path, monkeypatch, refused, arguments):
     monkeypatch.chdir(tmp_path)
-    assert command([argument.format(sweep) for argument in arguments]) == 2
     said = f"{sweep}: is a sweep, not a run; its runs are the folders in {sweep}/cases.\n"
-    assert capsys.readouterr().err == said
+    assert refused([argument.format(sweep) for argument in arguments]) == said
     assert not list(tmp_path.iterdir())
