@@ -34,20 +34,19 @@ _MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which
 
 
 class Equilibrium:
-    """Equilibrium of ``bulk`` and, if given, ``contact`` under the supports and loads of ``problem``. Collective."""
+    """Equilibrium of ``bulk`` and ``contact`` under the supports and loads of ``problem``. Collective."""
 
     def __init__(
         self,
         problem: Problem,
         V: fem.FunctionSpace,
         bulk: Bulk,
-        contact: Contact | None = None,
-        *,
-        timer: Timer | None = None,
+        contact: Contact,
+        timer: Timer,
     ) -> None:
         self.problem, self.V, self.bulk, self.contact = problem, V, bulk, contact
         self.comm = V.mesh.comm
-        self.timer = timer or Timer()
+        self.timer = timer
         self.interrupt = Interrupt()
         self.u = fem.Function(V, name="displacement")
         self.load = self.factor = 0.0
@@ -181,16 +180,13 @@ class Equilibrium:
             with self._force.localForm() as local:
                 local.set(0.0)
             self.bulk.add_force(self.u.x.petsc_vec, self._force)
-        self._pattern_grew = False
         with self.timer("contact"):
-            if self.contact is not None:
-                self.contact.move(self.factor)
-                self._pattern_grew = self.contact.evaluate(u)
-                self.contact.add_force(self._force.array.reshape(-1, 2))
+            self.contact.move(self.factor)
+            self._pattern_grew = self.contact.evaluate(u)
+            self.contact.add_force(self._force.array.reshape(-1, 2))
         self._force.array[:] -= self.factor * self.applied.ravel()
         self._reaction = np.where(self._free_owned, 0.0, self._force.array_r).reshape(-1, 2)
-        noise = 0.0 if self.contact is None else self.contact.round_off()
-        changes = 0 if self.contact is None else self.contact.active_set_changes
+        changes, noise = self.contact.active_set_changes, self.contact.round_off()
         totals = np.array([(self._reaction**2).sum(), noise**2, self.interrupt.received > 0, changes])
         self.comm.Allreduce(MPI.IN_PLACE, totals)
         self.changes = int(totals[3])
@@ -214,14 +210,14 @@ class Equilibrium:
 
     def force_on_factor(self) -> float:
         """Force that works on the load factor: those of supports and rigid discs along their rates, over all ranks."""
-        total = self.comm.allreduce(float((self._reaction * self.rate[: self.n_owned]).sum()))
-        return total if self.contact is None else total + self.contact.force_on_factor()
+        on_supports = self.comm.allreduce(float((self._reaction * self.rate[: self.n_owned]).sum()))
+        return on_supports + self.contact.force_on_factor()
 
     # ------------------------------------------------------------------ state
 
     def plastic_points(self) -> list[Points]:
         """The points with history of bulk and contact."""
-        return self.bulk.plastic_points() + (self.contact.plastic_points() if self.contact is not None else [])
+        return self.bulk.plastic_points() + self.contact.plastic_points()
 
     def worst_place(self) -> tuple[float, float] | None:
         """Where the residual is largest, over all ranks."""
@@ -253,8 +249,7 @@ class Equilibrium:
         """Take up an accepted state of an earlier process, whose history the points have already, and evaluate it."""
         self.restore(load, state)
         self.largest_reaction = largest_reaction
-        if self.contact is not None:
-            self.contact.search()
+        self.contact.search()
         self.evaluate()
         self._follow_pattern()
 
@@ -262,5 +257,4 @@ class Equilibrium:
         """Accept the last solve: bulk and contact keep their trial history."""
         self.largest_reaction = max(self.largest_reaction, self.reaction_norm)
         self.bulk.commit()
-        if self.contact is not None:
-            self.contact.commit()
+        self.contact.commit()

@@ -122,7 +122,7 @@ class MeshOrder:
         found = {}
         for tag, (cells, points) in self.system.bulk.histories().items():
             found[f"bulk {tag}"] = points, _through(self._cell_index[cells], points)
-        for place, (facets, points) in (self.system.contact.histories() if self.system.contact else {}).items():
+        for place, (facets, points) in self.system.contact.histories().items():
             found[place] = points, _through(facets, points)
         return {place: entry for place, entry in found.items() if entry[0].state is not None}
 

@@ -176,7 +176,7 @@ class NewtonSolver:
         self._renewed = True
         at = self.equilibrium
         at.pack(guess, self._x)
-        if at.contact is not None and search:
+        if search:
             at.contact.search()
         self._raised = None
         with at.timer("solve"):
@@ -220,7 +220,7 @@ class NewtonSolver:
         at = self.equilibrium
         reason = self._failure or _REASONS.get(code, f"SNES reason {code}")
         if self.equilibrium.control.singular:
-            pressed = at.load > 0 and at.contact is not None and at.contact.n_active() > 0
+            pressed = at.load > 0 and at.contact.n_active() > 0
             cause = "no stiffness is left" if pressed else "nothing resists the force"
             reason = f"{cause} (singular mode)"
         increment = max((float(np.max(p.increment, initial=0.0)) for p in at.plastic_points()), default=0.0)

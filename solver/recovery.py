@@ -39,8 +39,8 @@ class Recovery:
         """
         self.equilibrium.load = load
         contact, result = self.equilibrium.contact, None
-        wanted = 0.0 if contact is None else contact.gamma_factor
-        if contact is None or wanted <= _STIFF_CONTACT:
+        wanted = contact.gamma_factor
+        if wanted <= _STIFF_CONTACT:
             return self._solve_at_once(guess, afar)
         if not self.continues_gamma:
             result = self._solve_at_once(guess, afar)
@@ -100,7 +100,7 @@ class Recovery:
         result, contact = self.newton.solve(guess, line_search=line_search, goal=goal), self.equilibrium.contact
         changes = result.active_set_changes
         circles = len(changes) > CIRCLING and not any(changes[-CIRCLING:])
-        if result.converged or contact is None or not contact.pairs_move or not circles:
+        if result.converged or not contact.pairs_move or not circles:
             return result
         iterate = self.newton.last_iterate()
         contact.hold()

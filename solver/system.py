@@ -46,13 +46,10 @@ class System:
             materials = {problem.tag(body): body.material for body in problem.bodies}
             self.bulk = Bulk(self.V, problem.mesh.cells, materials)
             self.sides: dict[str, Surface] = {}
-            self.contact = self._contact(problem.interactions)
-            self.equilibrium = Equilibrium(problem, self.V, self.bulk, self.contact, timer=self.timer)
+            self.contact = Contact(self.V, [self._interaction(i) for i in problem.interactions])
+            self.equilibrium = Equilibrium(problem, self.V, self.bulk, self.contact, self.timer)
             tolerance, most = problem.tolerance, problem.max_iterations
             self.solver = Recovery(NewtonSolver(self.equilibrium, tolerance=tolerance, max_iterations=most))
-
-    def _contact(self, interactions: Sequence[Interaction]) -> Contact | None:
-        return Contact([self._interaction(i) for i in interactions]) if interactions else None
 
     def _interaction(self, given: Interaction) -> contact.Interaction:
         integrated = given.surfaces.index(given.integrated) if given.integrated else None

@@ -28,7 +28,7 @@ class TangentMatrix:
         self,
         V: fem.FunctionSpace,
         bulk: Bulk,
-        contact: Contact | None,
+        contact: Contact,
         fixed: np.ndarray,
         rate: Array,
         timer: Timer,
@@ -52,7 +52,7 @@ class TangentMatrix:
             return
         n, start = self._index_map.size_local, self._index_map.local_range[0]
         slots = None
-        if self.contact is not None and not self._condense:
+        if not self._condense:
             rows, columns = self.contact.pattern()
             mine = (rows >= start) & (rows < start + n)
             slots = rows[mine], columns[mine]
@@ -68,7 +68,6 @@ class TangentMatrix:
         A.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
         self.A = A
         if self._condense:
-            assert self.contact is not None
             self._touching = np.unique(np.concatenate([surface.curve_dofs for surface in self.contact.surfaces]))
             with self.timer(BEFORE_SOLVING):
                 A.convert("aij")  # PETSc has no Cholesky factors of block matrices from MUMPS
@@ -86,8 +85,6 @@ class TangentMatrix:
     def _find_contact(self) -> None:
         """Which contact slots are free ``(n, 2, 2)``, and the rates of their rows and columns ``(n, 2)``; rigid
         surfaces are the block dofs behind the last."""
-        if self.contact is None:
-            return
         tangent, size = self.contact.tangent, self._index_map.size_global
         places = np.concatenate([tangent.rows, tangent.columns])
         near = np.unique(places)
@@ -118,13 +115,11 @@ class TangentMatrix:
             self._elastic.copy(self.A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             self.bulk.assemble_correction(self.A, self._bcs)
         with self.timer("assemble contact"):
-            if self.contact is not None:
-                self._contact_blocks = self.contact.tangent.blocks()
-                self._add_contact(self.contact.tangent.rows, self.contact.tangent.columns)
+            self._contact_blocks = self.contact.tangent.blocks()
+            self._add_contact(self.contact.tangent.rows, self.contact.tangent.columns)
             self.A.assemble()
 
     def _update_condensed(self, condensed: Condensed) -> None:
-        assert self.contact is not None
         self.factorisations = 1
         with self.timer("assemble contact"):
             self._contact_blocks = self.contact.tangent.blocks()
@@ -135,7 +130,6 @@ class TangentMatrix:
         """Go over to the contact points that would be closed after ``increment`` ``(k, 2)`` of the nodes near the
         contact: the change of the residual ``(m, 2)`` at those of the contact, with the matrix up to date; None if they
         are closed already."""
-        assert self.contact is not None
         assert self.condensed is not None
         with self.timer("contact"):
             u = np.zeros((len(self._fixed), 2))
@@ -150,7 +144,6 @@ class TangentMatrix:
 
     def _contact_force(self) -> Array:
         """The contact's part of the residual at its nodes ``(m, 2)``, on every rank."""
-        assert self.contact is not None
         n, start = self._index_map.size_local, self._index_map.local_range[0]
         force = np.zeros((n, 2))
         self.contact.add_force(force)
@@ -185,16 +178,15 @@ class TangentMatrix:
         n, start = self._index_map.size_local, self._index_map.local_range[0]
         d = self.comm.allreduce(float((bulk * self._rate[:n]).sum()))
         b, c = bulk.copy(), bulk.copy()
-        if self.contact is not None:
-            near = np.zeros((2, len(self._near), 2))
-            values, row, column = self._contact_blocks, self._row, self._column
-            np.add.at(near[0], row, np.einsum("nij,nj->ni", values, self._rate_near[column]))
-            np.add.at(near[1], column, np.einsum("ni,nij->nj", self._rate_near[row], values))
-            self.comm.Allreduce(MPI.IN_PLACE, near)
-            d += float((near[0] * self._rate_near).sum())
-            mine = (self._near >= start) & (self._near < start + n)
-            b[self._near[mine] - start] += near[0, mine]
-            c[self._near[mine] - start] += near[1, mine]
+        near = np.zeros((2, len(self._near), 2))
+        values, row, column = self._contact_blocks, self._row, self._column
+        np.add.at(near[0], row, np.einsum("nij,nj->ni", values, self._rate_near[column]))
+        np.add.at(near[1], column, np.einsum("ni,nij->nj", self._rate_near[row], values))
+        self.comm.Allreduce(MPI.IN_PLACE, near)
+        d += float((near[0] * self._rate_near).sum())
+        mine = (self._near >= start) & (self._near < start + n)
+        b[self._near[mine] - start] += near[0, mine]
+        c[self._near[mine] - start] += near[1, mine]
         free = ~self._fixed[:n].ravel()
         border.update(b.ravel() * free, c.ravel() * free, d, factorise=factorise)
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from dolfinx import fem
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
@@ -27,22 +28,22 @@ from archord.solver.contact.tangent import ContactTangent, trial_rate
 
 
 class Contact:
-    """All ``interactions`` of a problem, any number but none; ``surfaces`` are those of bodies, ``rigid`` the others.
+    """All ``interactions`` of a problem in the displacement space ``V``, none too: ``surfaces`` of bodies, ``rigid`` ones.
 
     A surface belongs to one interaction, as its points do. ``active_set_changes`` counts the points of this rank that
     opened or closed at the last evaluation. Collective.
     """
 
-    def __init__(self, interactions: Sequence[Interaction]) -> None:
+    def __init__(self, V: fem.FunctionSpace, interactions: Sequence[Interaction] = ()) -> None:
         self.interactions = list(interactions)
         self.surfaces = [surface for i in interactions for surface in i.bodies]
         self.rigid = [surface for i in interactions for surface in i.rigid]
         self.pairs = [pair for i in interactions for pair in i.pairs]
-        self.comm = self.surfaces[0].comm
-        behind = self.surfaces[0].V.dofmap.index_map.size_global
+        self.comm = V.mesh.comm
+        self._n_dofs = V.dofmap.index_map.size_global
         for number, surface in enumerate(self.rigid):
-            surface.curve_dofs[:] = behind + number
-        self.gamma_factor = max(i.gamma_factor for i in interactions)
+            surface.curve_dofs[:] = self._n_dofs + number
+        self.gamma_factor = max((i.gamma_factor for i in interactions), default=0.0)
         self.pairs_move = any(pair.moves for pair in self.pairs)
         self.active_set_changes = 0
         self._reaches = [Reach(pair, i.slide) for i in interactions for pair in i.pairs]
@@ -130,7 +131,7 @@ class Contact:
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
         """Block ``(rows, columns)`` in global dofs that the contact may fill, those of all ranks, each once.
         Collective."""
-        size = self.surfaces[0].V.dofmap.index_map.size_global
+        size = self._n_dofs
         rows, columns = self.tangent.rows, self.tangent.columns
         slots = (rows * size + columns)[(rows < size) & (columns < size)]
         return np.divmod(np.unique(np.concatenate(self.comm.allgather(slots))), size)

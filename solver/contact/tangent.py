@@ -30,7 +30,7 @@ class ContactTangent:
         parts = [_dofs(reach) for reach in reaches]
         size = 1 + max((part[i].max(initial=0) for part in parts for i in (1, 2)), default=0)
         keys = [rows[:, :, None] * size + columns[:, None, :] for _, rows, columns in parts]
-        unique = np.unique(np.concatenate([k.ravel() for k in keys]))
+        unique = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(k.ravel() for k in keys)]))
         self.rows, self.columns = np.divmod(unique, size)
         self._keys = [part[0] for part in parts]  # of the facets that may meet
         self._slots = [np.searchsorted(unique, key).astype(np.int32) for key in keys]

@@ -132,8 +132,8 @@ def joint_parts(
 def interact(surfaces, *, kinematics="current", **options) -> Contact:
     """The contact of two surfaces; "tied" is a law that has no kinematics."""
     if kinematics == "tied":
-        return Contact([Interaction("tie", surfaces, law=LAWS["tied"], **options)])
-    return Contact([Interaction("contact", surfaces, kinematics=kinematics, **options)])
+        return Contact(surfaces[1].V, [Interaction("tie", surfaces, law=LAWS["tied"], **options)])
+    return Contact(surfaces[1].V, [Interaction("contact", surfaces, kinematics=kinematics, **options)])
 
 
 def blocks(comm: MPI.Comm, *edges: int) -> TaggedMesh:
