@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from markdown_it import MarkdownIt
 from mpi4py import MPI
 
 from archord.benchmarks.case import Case
@@ -39,11 +38,6 @@ FIGURES: dict[str, tuple[Callable[[Runs], Figure], list[str]]] = {
     "fig8": (fig8, [plastic(MILD_YIELD), "elastic_0.1"]),
     "fig9": (fig9, ["elastic", plastic(FULL_YIELD)]),
 }
-_STYLE = (
-    "body{font:16px/1.5 sans-serif;max-width:75em;margin:2em auto}td,th{border:1px solid #ccc;padding:.4em}"
-    "table{border-collapse:collapse}img{max-width:100%}"
-)
-_HEAD = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Hu et al.</title><style>{_STYLE}</style>'
 
 
 def chosen(names: list[str]) -> list[str]:
@@ -59,7 +53,7 @@ def reproduce(
 ) -> list[Path]:
     """Solve what ``names`` need and is not in ``folder`` yet, and write their CSV files and pictures.
 
-    With all figures also ``report.md`` and ``report.html``. ``said(case, P)`` follows every run. Returns the files, on
+    With all figures also ``report.md``. ``said(case, P)`` follows every run. Returns the files, on
     rank 0. Raises `InputError` for unknown figures and a folder that cannot be written, and RuntimeError if a run
     failed. Collective.
     """
@@ -72,7 +66,7 @@ def reproduce(
     if comm.rank != 0:
         return []
     files = [file for name in wanted for file in FIGURES[name][0](runs).write(folder, name)]
-    return files + (_report(runs, folder) if len(wanted) == len(FIGURES) else [])
+    return files + ([_report(runs, folder)] if len(wanted) == len(FIGURES) else [])
 
 
 def _claim(folder: Path, wanted: list[str]) -> None:
@@ -93,7 +87,8 @@ def mesh_errors(runs: Runs) -> dict[str, float]:
     return errors
 
 
-def _report(runs: Runs, folder: Path) -> list[Path]:
+def _report(runs: Runs, folder: Path) -> Path:
+    """Write the claims, judged, and the figures to ``report.md``."""
     errors = mesh_errors(runs)
     worst = max(errors, key=lambda name: errors[name])
     table = Table("claim", "figure", "the paper", *(f"ours, plane {plane}" for plane in PLANES), "verdict")
@@ -110,8 +105,6 @@ discretisation error of the finer one, which all numbers come from, is below tha
 
 {table.markdown()}
 {pictures}"""
-    html = MarkdownIt("commonmark").enable("table").render(text)
-    files = {folder / "report.md": text, folder / "report.html": f"{_HEAD}{html}</html>\n"}
-    for file, content in files.items():
-        file.write_text(content, encoding="utf-8")
-    return list(files)
+    file = folder / "report.md"
+    file.write_text(text, encoding="utf-8")
+    return file

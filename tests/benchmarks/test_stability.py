@@ -9,8 +9,8 @@ from dataclasses import replace
 import h5py
 import pytest
 
-from archord.benchmarks.case import slug
-from archord.benchmarks.stability.cases import FINE, cases, same_as
+from archord.benchmarks.case import Expected, slug
+from archord.benchmarks.stability.cases import FINE, cases
 from archord.benchmarks.stability.fine import fine_scene, read_fine
 from archord.benchmarks.stability.run import Result, chosen, judge, not_finite, solve_case, with_references
 from archord.cli import run
@@ -77,7 +77,7 @@ def test_a_pattern_brings_what_it_is_compared_with():
 
 def test_verdicts():
     """Each check alone turns a good line into a wrong one."""
-    other = a_case(name="b", expected=(same_as("a", 1e-3, "a law"),))
+    other = a_case(name="b", expected=(Expected("P/(E* R)", "a", 1e-3, "a law"),))
     results = {"a": DONE, "b": DONE}
     assert judge(other, results, {}).verdict == "converges"
     for change, said in (
