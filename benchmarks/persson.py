@@ -53,21 +53,28 @@ def theory(load: float, alpha: float = 0.0) -> tuple[float, float]:
 
 def main() -> None:
     """Solve and print."""
-    cases = [("like bodies", load, size, 1, 0.0, {}) for load in LOADS for size in (0.08, 0.04, 0.02)]
-    cases += [("interference", load, 0.04, 4, 0.0, {}) for load in INTERFERENCE]
-    for pair in (UNLIKE, UNLIKE[::-1]):
-        bodies, alpha = unlike(*pair)
-        cases.append((f"unlike, alpha = {alpha:+.3f}", 0.5, 0.04, 1, alpha, bodies))
     angles = ("eps [deg]", "theory", "difference")
     table = Table("case", "E* dR/P", "h/R", "R p0/P", "theory", "difference", *angles, "time")
-    for name, load, size, steps, alpha, bodies in cases:
+
+    def compare(
+        name: str, load: float, size: float = 0.04, steps: int = 1, alpha: float = 0.0, sections: dict | None = None
+    ) -> None:
         start = perf_counter()
         with tempfile.TemporaryDirectory() as folder:
-            m = Case(name, persson_joint(load, size, steps, **bodies)).solve(Path(folder)).steps[-1]
+            m = Case(name, persson_joint(load, size, steps, **(sections or {}))).solve(Path(folder)).steps[-1]
         eps, peak = theory(load, alpha)
         pressure = f"{m.p0 / m.P:.6f}", f"{peak:.6f}", f"{m.p0 / m.P / peak - 1:+.1e}"
         angle = (f"{np.degrees(value):{form}}" for value, form in ((m.eps, ".3f"), (eps, ".3f"), (m.eps - eps, "+.3f")))
         table.add(name, f"{load:g}", f"{size:g}", *pressure, *angle, f"{perf_counter() - start:.1f} s")
+
+    for load in LOADS:
+        for size in (0.08, 0.04, 0.02):
+            compare("like bodies", load, size)
+    for load in INTERFERENCE:
+        compare("interference", load, steps=4)
+    for pair in (UNLIKE, UNLIKE[::-1]):
+        bodies, alpha = unlike(*pair)
+        compare(f"unlike, alpha = {alpha:+.3f}", 0.5, alpha=alpha, sections=bodies)
     print(table.markdown(), end="")
 
 

@@ -73,7 +73,7 @@ class Figure:
         return [table, save(canvas, picture)]
 
 
-def law_force(name: str, run: RunCurve, delta: Array | None = None) -> Array:
+def law_force(name: str, run: RunCurve, delta: np.ndarray | None = None) -> Array:
     """P of a law at ``delta`` (those of the run) over the unit E* dR of the run's joint; nan beyond the law's limit."""
     law, joint = find_law(name), LawJoint.from_scene(run.scene)
     delta = run.delta if delta is None else delta
@@ -178,7 +178,8 @@ def fig4(runs: Runs) -> Figure:
 
 def fig5(runs: Runs) -> Figure:
     """Pressure over the yield stress along arc and chord at 2 dR, and the mean pressure over delta."""
-    profiles, means = [], []
+    profiles: list[Part] = []
+    means: list[Part] = []
     for plane in PLANES:
         run = runs.curve(plastic(FULL_YIELD), plane)
         assert run.sigY is not None

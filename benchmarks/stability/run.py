@@ -106,7 +106,7 @@ class Line:
     @property
     def worst(self) -> Comparison | None:
         """The comparison that takes the largest share of its tolerance, if there is any."""
-        return max(self.comparisons, key=lambda c: c.share, default=None)
+        return max(self.comparisons, key=lambda c: c.share) if self.comparisons else None
 
 
 def chosen(pattern: str | None) -> list[str]:
