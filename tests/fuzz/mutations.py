@@ -57,9 +57,6 @@ def mutate(rng: Random, text: str) -> tuple[str, bytes]:
     return kind, new
 
 
-# ---------------------------------------------------------------------- bytes
-
-
 def _bytes(rng: Random, text: str) -> bytes:
     raw = bytearray(text.encode() or b"\n")
     at, length = rng.randrange(len(raw) + 1), rng.choice((1, 1, 2, 5, 40))
@@ -95,9 +92,6 @@ def _bytes(rng: Random, text: str) -> bytes:
     return bytes(raw)
 
 
-# ---------------------------------------------------------------------- tokens
-
-
 def _tokens(rng: Random, text: str) -> bytes:
     places = list((_NUMBER if rng.random() < 0.7 else _VALUE).finditer(text))
     if not places:
@@ -109,9 +103,6 @@ def _tokens(rng: Random, text: str) -> bytes:
     elif rng.random() < 0.1:
         new = place[0] + rng.choice(("e5", "e-5", ".", "_", "__0", " ", "e", "x", "0"))
     return (text[: place.start()] + new + text[place.end() :]).encode("utf-8", "surrogatepass")
-
-
-# ---------------------------------------------------------------------- structure
 
 
 def _structure(rng: Random, text: str) -> bytes:
@@ -164,9 +155,6 @@ def _lines(rng: Random, text: str) -> bytes:
     else:
         lines[a] = lines[a].lstrip("# ")
     return "".join(lines).encode()
-
-
-# ---------------------------------------------------------------------- values
 
 
 def _values(rng: Random, text: str) -> bytes:
