@@ -1,4 +1,4 @@
-/* The radial return of J2 plasticity in plane strain: see materials/j2.py. */
+/* The radial return of J2 plasticity in plane strain: see return_map.py. */
 
 #include <math.h>
 
