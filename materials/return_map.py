@@ -47,7 +47,7 @@ class PlasticState:
 
 
 def return_map(strain: Array, old: PlasticState, m: Elastic, hardening: Hardening) -> tuple[Array, Array, PlasticState]:
-    """Stress ``(n, 4)``, tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from the ``old`` state, of a solid
+    """Stress ``(n, 4)``, tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from the ``old`` state,
     with the elasticity of ``m``."""
     parts, Q, deviator = _PLANES[m.plane]
     lam, mu = m.lame
