@@ -145,7 +145,7 @@ def variants(output: Path, repeats: int, quiet: bool) -> int:
     """
     from archord.benchmarks.cost import variants as table
 
-    uses = table.run(output / "runs", repeats, _telling(quiet))
+    uses = table.run(table.variants(), output / "runs", repeats, _telling(quiet))
     faults = [fault for use in uses for fault in use.faults()]
     return _conclude(*table.write(uses, output), faults, quiet)
 

@@ -5,24 +5,20 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
-from typing import Any
 
-from archord.benchmarks.case import paper_joint, slug
+from archord.benchmarks.case import Case, paper_joint
 from archord.benchmarks.timing import Process, Timing, time_all
 from archord.output.folder import claim_folder
 from archord.report.files import write_report
 from archord.report.table import Table
 from archord.scene.file import resolved
 
-STEPS, ELEMENT_SIZE, YIELD_STRESS = 5, 0.04, 0.002
-PLOTTING = ("matplotlib", "pyvista")
 PLASTICITY = ("archord.materials.j2", "kernel radial_return")
 FIELDS = ("archord.output.fields",)
 CURVES = ("kernel closest_point",)
-ALWAYS_ABSENT = (*PLOTTING, "scipy", "rich", "numba")  # from a solve
+ALWAYS_ABSENT = ("matplotlib", "pyvista", "scipy", "rich", "numba")  # from a solve
 WATCHED = (*ALWAYS_ABSENT, *PLASTICITY, *FIELDS, *CURVES, "dolfinx")
 
 # Runs the command line in a process of its own, and leaves a note of what that loaded before the note itself does.
@@ -42,29 +38,39 @@ sys.exit(code)
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to treat the scene: the ``sections`` that differ, and what must not be loaded for it.
+    """A joint that is solved or, if ``drawn``, the picture of its run."""
 
-    With ``drawn`` it is the picture of the run of another variant.
-    """
+    case: Case
+    drawn: bool = False
 
-    name: str
-    unused: tuple[str, ...]
-    yield_stress: float | None = None
-    sections: dict[str, dict] = field(default_factory=dict)
-    drawn: str = ""
+    @property
+    def name(self) -> str:
+        """What the tables call it."""
+        return f"picture of {self.case.name}" if self.drawn else self.case.name
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """What must not be loaded for it."""
+        if self.drawn:
+            return ("dolfinx", "pyvista", *FIELDS, *PLASTICITY, *CURVES)
+        scene = self.case.scene
+        absent = (PLASTICITY, not scene.plastic), (CURVES, scene.pin.rigid), (FIELDS, not scene.output.fields)
+        return ALWAYS_ABSENT + tuple(name for names, missing in absent if missing for name in names)
 
 
-_NO_FIELDS = {"output": {"fields": False}}
-_RIGID = {"pin": {"rigid": True}}
-VARIANTS = (
-    Variant("elastic", (*ALWAYS_ABSENT, *PLASTICITY)),
-    Variant("elastic, rigid pin", (*ALWAYS_ABSENT, *PLASTICITY, *CURVES), sections=_RIGID),
-    Variant("elastic, no fields", (*ALWAYS_ABSENT, *PLASTICITY, *FIELDS), sections=_NO_FIELDS),
-    Variant("plastic", ALWAYS_ABSENT, YIELD_STRESS),
-    Variant("plastic, rigid pin", (*ALWAYS_ABSENT, *CURVES), YIELD_STRESS, _RIGID),
-    Variant("plastic, no fields", (*ALWAYS_ABSENT, *FIELDS), YIELD_STRESS, _NO_FIELDS),
-    Variant("picture of plastic", ("dolfinx", "pyvista", *FIELDS, *PLASTICITY, *CURVES), drawn="plastic"),
-)
+def variants(element_size: float = 0.04, steps: int = 5) -> list[Variant]:
+    """The paper's joint, elastic and plastic, deformable, with a rigid pin, without fields; and a picture."""
+    ways: dict[str, dict] = {
+        "": {},
+        ", rigid pin": {"pin": {"rigid": True}},
+        ", no fields": {"output": {"fields": False}},
+    }
+    found = [
+        Variant(Case(material + way, paper_joint(element_size, steps, yield_stress, **sections)))
+        for material, yield_stress in (("elastic", None), ("plastic", 0.002))
+        for way, sections in ways.items()
+    ]
+    return [*found, Variant(found[len(ways)].case, drawn=True)]
 
 
 @dataclass(frozen=True)
@@ -87,19 +93,21 @@ class Use:
 
 
 def run(
+    chosen: Sequence[Variant],
     folder: Path,
     repeats: int = 3,
     said: Callable[[str], None] = lambda sentence: None,
-    variants: Sequence[Variant] = VARIANTS,
+    *,
+    warm: bool = True,
 ) -> list[Use]:
-    """Run the ``variants`` ``repeats`` times, in turn, in processes of their own below ``folder``; ``said`` follows
+    """Run the ``chosen`` ones ``repeats`` times, in turn, in processes of their own below ``folder``; ``said`` follows
     each.
 
-    The first runs compile forms and kernels, which no variant pays for: each runs once more, uncounted.
+    The first runs compile forms and kernels, which no variant pays for: each runs once more, uncounted, if ``warm``.
     Raises `RuntimeError` if one fails.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    names = {process(variant, folder): variant for variant in variants}
+    names = {process(variant, folder, warm): variant for variant in chosen}
 
     def told(done: Process, repeat: int, sentence: str) -> None:
         said(f"{names[done].name}: {sentence}{'' if repeat else ' (not counted)'}")
@@ -107,37 +115,33 @@ def run(
     return [use_of(names[timing.process], timing, folder) for timing in time_all(list(names), repeats, told)]
 
 
-def process(variant: Variant, folder: Path) -> Process:
+def process(variant: Variant, folder: Path, warm: bool) -> Process:
     """The command of ``variant`` in the existing ``folder``; its result is the note of what it loaded."""
-    run_folder, note = folder.resolve() / slug(variant.drawn or variant.name), folder.resolve() / "note.json"
+    run_folder, note = variant.case.folder(folder.resolve()), folder.resolve() / "note.json"
     arguments = ["picture", str(run_folder)]
     if not variant.drawn:
-        scene = folder.resolve() / f"{slug(variant.name)}.toml"
-        joint = paper_joint(ELEMENT_SIZE, STEPS, variant.yield_stress, **variant.sections)
-        scene.write_text(resolved(joint), encoding="utf-8")
+        scene = run_folder.with_suffix(".toml")
+        scene.write_text(resolved(variant.case.scene), encoding="utf-8")
         claim_folder(run_folder, force=True)
         arguments = ["solve", str(scene), "-o", str(run_folder), "--force", "--quiet"]
-
-    def read() -> dict[str, Any]:
-        return json.loads(note.read_text(encoding="utf-8"))
-
-    return Process((sys.executable, "-c", _PROBE, str(note), *arguments), folder, read, kind=variant.name)
+    command = (sys.executable, "-c", _PROBE, str(note), *arguments)
+    kind = variant.name if warm else None
+    return Process(command, folder, lambda: json.loads(note.read_text(encoding="utf-8")), kind=kind)
 
 
 def use_of(variant: Variant, timing: Timing, folder: Path) -> Use:
     """What ``variant`` used. Raises `RuntimeError` if it failed."""
     if timing.failure:
         raise RuntimeError(f"{variant.name}: {timing.failure}")
-    run_folder = folder / slug(variant.drawn or variant.name)
-    note = timing.middle.result
+    run_folder, note = variant.case.folder(folder), timing.middle.result
     names = {*note["modules"], *(f"kernel {name}" for name in note["kernels"])}
     report = json.loads((run_folder / "run.json").read_text(encoding="utf-8"))
-    files = (f for f in run_folder.rglob("*") if f.is_file() and (f.name == "picture.png") == bool(variant.drawn))
+    files = (f for f in run_folder.rglob("*") if f.is_file() and (f.name == "picture.png") == variant.drawn)
     return Use(
         variant,
         dofs=report["mesh"]["dofs"],
         seconds=timing.median,
-        memory=int(median(run.memory for run in timing.runs)),
+        memory=timing.middle.memory,
         modules=len(note["modules"]),
         loaded=tuple(name for name in WATCHED if name in names),
         written=sum(file.stat().st_size for file in files),

@@ -12,10 +12,9 @@ from typing import cast
 import numpy as np
 
 from archord.benchmarks.case import Case, paper_joint
-from archord.benchmarks.cost.pressure_profile import profile_error
 from archord.benchmarks.cost.work_precision_cases import edged
 from archord.benchmarks.cost.work_precision_codes import CALCULIX, Task, Values
-from archord.benchmarks.cost.work_precision_reference import Reference, read_reference
+from archord.benchmarks.cost.work_precision_reference import Reference, profile_error, read_reference
 from archord.benchmarks.timing import Timing
 from archord.geometry.mesh_cache import MESHES
 from archord.postprocess.convergence import Limit, extrapolated

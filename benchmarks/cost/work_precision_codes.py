@@ -16,9 +16,8 @@ from pathlib import Path
 from time import perf_counter
 
 from archord.benchmarks.case import matches, slug
-from archord.benchmarks.cost.pressure_profile import interpolated
 from archord.benchmarks.cost.work_precision_cases import DECKS, SERIES, JointCase, Kinematics, Mesh, Series
-from archord.benchmarks.cost.work_precision_reference import profile_of, values_of
+from archord.benchmarks.cost.work_precision_reference import interpolated, profile_of, values_of
 from archord.benchmarks.peers import calculix
 from archord.benchmarks.peers.installed import Peer, installed
 from archord.benchmarks.timing import LIMIT, Failure, Process, last_core

@@ -4,29 +4,16 @@ from dataclasses import replace
 
 import pytest
 
-from archord.benchmarks.cost import variants
-from archord.benchmarks.cost.variants import VARIANTS, WATCHED, run, write
-from archord.benchmarks.timing import time_all
+from archord.benchmarks.cost.variants import WATCHED, run, variants, write
 
 CHOSEN = ("elastic, rigid pin", "elastic, no fields", "plastic", "picture of plastic")
 
 
 @pytest.fixture(scope="module")
 def uses(tmp_path_factory):
-    """On a coarser mesh and in fewer steps than the benchmark's, which load the same; each once, none uncounted."""
-
-    def once(processes, repeats, told):
-        kindless = time_all([replace(process, kind=None) for process in processes], repeats)
-        for timing, process in zip(kindless, processes, strict=True):
-            timing.process = process
-        return kindless
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(variants, "ELEMENT_SIZE", 0.12)
-        patch.setattr(variants, "STEPS", 2)
-        patch.setattr(variants, "time_all", once)
-        chosen = [v for v in VARIANTS if v.name in CHOSEN]
-        return {used.variant.name: used for used in run(tmp_path_factory.mktemp("variants"), 1, variants=chosen)}
+    """On a coarser mesh and in fewer steps than the benchmark's, which load the same."""
+    chosen = [variant for variant in variants(0.12, 2) if variant.name in CHOSEN]
+    return {used.variant.name: used for used in run(chosen, tmp_path_factory.mktemp("runs"), 1, warm=False)}
 
 
 @pytest.mark.parametrize("name", CHOSEN)
@@ -56,4 +43,4 @@ def test_what_is_not_needed_is_told(uses, tmp_path):
     text, files = write([wasteful], tmp_path)
     assert text.count("\n") == 3
     assert {file.name for file in files} == {"variants.csv", "variants.md"}
-    assert all(set(v.unused) <= set(WATCHED) for v in VARIANTS)
+    assert all(set(v.unused) <= set(WATCHED) for v in variants())

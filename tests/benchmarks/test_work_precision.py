@@ -13,7 +13,6 @@ import pytest
 from archord.benchmarks.case import Case
 from archord.benchmarks.cost import work_precision_codes as codes
 from archord.benchmarks.cost import work_precision_reference
-from archord.benchmarks.cost.pressure_profile import ANGLES, interpolated, profile_error, sampled, smoothed
 from archord.benchmarks.cost.work_precision import (
     Line,
     envelope,
@@ -27,7 +26,16 @@ from archord.benchmarks.cost.work_precision import (
 )
 from archord.benchmarks.cost.work_precision_cases import CASES, DECKS, SERIES, Series, chosen_cases, families, scaled
 from archord.benchmarks.cost.work_precision_codes import Task, Values
-from archord.benchmarks.cost.work_precision_reference import combined, read_reference, smooth_profile
+from archord.benchmarks.cost.work_precision_reference import (
+    ANGLES,
+    combined,
+    interpolated,
+    profile_error,
+    read_reference,
+    sampled,
+    smooth_profile,
+    smoothed,
+)
 from archord.benchmarks.cost.work_precision_report import markdown, ratio_table, reference_table, row
 from archord.benchmarks.timing import Failure, Run, Timing, time_all
 from archord.cli import run
