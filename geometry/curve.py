@@ -112,7 +112,7 @@ class Curve:
         ``outward`` ``(m, 2)`` is the outward normal of the own body at ``x``; a partner must face it. ``start`` holds a
         facet for each point near its partner (by default `nearest_facet`, a search without a radius). Newton runs on
         that facet and its two neighbours, kept within each, and the nearest result is taken; a point that leaves them
-        is searched for on the whole curve. Raises `ProjectionError` when a point between the ends of the curve gets no partner.
+        is searched for on the whole curve. Raises `ProjectionError` if one between the curve's ends gets no partner.
         """
         home = self.nearest_facet(x, displacement) if start is None else start
         found = self._project(x, outward, displacement, home)

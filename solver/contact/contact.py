@@ -28,7 +28,7 @@ from archord.solver.contact.tangent import ContactTangent, trial_rate
 
 
 class Contact:
-    """All ``interactions`` of a problem in the displacement space ``V``, if any: ``surfaces`` of bodies, ``rigid`` ones.
+    """All ``interactions``, if any, in the displacement space ``V``: ``surfaces`` of bodies, ``rigid`` ones.
 
     A surface belongs to one interaction, as its points do. ``active_set_changes`` counts the points of this rank that
     opened or closed at the last evaluation. Collective.
