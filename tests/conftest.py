@@ -12,6 +12,12 @@ def pytest_addoption(parser):
     parser.addoption("--kills", type=int, default=12, help="how often test_kill.py kills runs (12)")
 
 
+def pytest_collection_modifyitems(items):
+    """On several ranks only tests that are made for them: the others would start processes or write the same files."""
+    if MPI.COMM_WORLD.size > 1:
+        items[:] = [item for item in items if item.get_closest_marker("mpi")]
+
+
 def pytest_collection_finish():
     """Leave what the imports made out of the collections below: they take a tenth of a second otherwise."""
     gc.collect()

@@ -1,6 +1,5 @@
 """archord from Python: scenes, runs, and an import that costs nothing."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -113,7 +112,6 @@ def test_a_run_that_stops_is_given_back_with_a_warning(caplog):
         run.pressure()
 
 
-@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="mpirun takes the signal for itself")
 def test_ctrl_c_ends_the_program_too(tmp_path, monkeypatch):
     """A loop over scenes stops, with the accepted steps on disk."""
     monkeypatch.setattr(Progress, "step", lambda self, m: signal.raise_signal(signal.SIGINT))

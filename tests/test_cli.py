@@ -19,8 +19,6 @@ COARSE = ["--set", "joint.relative_element_size=0.1", "--set", "joint.growth=1.0
 LONG = ["--set", "joint.relative_element_size=0.2", "--set", "load.steps=500"]
 # a launcher inside a launcher: processes started by a test must not inherit the rank of the test
 ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_"))}
-
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
 SOLVE = [sys.executable, "-m", "archord", "solve", SCENE]
 
 

@@ -3,18 +3,14 @@
 ``pytest tests/test_kill.py --kills 50`` kills more often.
 """
 
-import os
 import random
 import time
 from pathlib import Path
-
-import pytest
 
 from tests import forked
 from tests.output.run_files import accepted_steps, same_run
 from tests.test_cli import SCENE
 
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
 OPTIONS = ["--set", "joint.relative_element_size=0.3", "--set", "load.steps=15"]
 
 

@@ -1,6 +1,5 @@
 """The commands ``archord laws`` and ``archord law``: tables, pictures, sentences."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,6 @@ from archord.postprocess.laws.laws import LAWS
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
-
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="only rank 0 prints")
 
 
 def table(text: str) -> dict[str, np.ndarray]:

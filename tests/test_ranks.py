@@ -12,8 +12,6 @@ from tests.test_cli import archord
 SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")
 COARSE = ["--set", "joint.relative_element_size=0.3"]
 
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:

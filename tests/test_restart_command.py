@@ -13,7 +13,6 @@ from archord.output.history import read_history
 from tests.output.run_files import accepted_steps, same_run
 from tests.test_cli import ENVIRONMENT, SCENE, archord
 
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
 COARSE = ["--set", "joint.relative_element_size=0.2", "--set", "load.steps=12"]
 
 

@@ -1,6 +1,5 @@
 """Commands load no library that they do not need: each costs a part of a second."""
 
-import os
 import subprocess
 import sys
 
@@ -13,8 +12,6 @@ ELASTIC = ["--set", "pin.yield_stress=", "--set", "block.yield_stress="]
 SOLVER = {"dolfinx", "petsc4py", "mpi4py", "gmsh"}
 PLOTTING = {"matplotlib", "pyvista", "vtk"}
 LAUNCHER = {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "2", "PMIX_RANK": "0"}
-
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
 
 
 @pytest.mark.parametrize(

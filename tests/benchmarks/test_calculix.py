@@ -27,8 +27,6 @@ from archord.geometry.joint_mesh import Facets
 from archord.output.run import solve_scene
 from archord.postprocess.deck import contact_stiffness, deck_mesh
 
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="CalculiX runs beside one rank")
-
 # Written by CalculiX 2.20 for the scene below, quadratic elements; the .frd from its displacements on.
 REFERENCE = Path(__file__).parents[1] / "reference"
 JOINT = {"element_size": 0.4, "block_size": 4.0, "growth": 1.0}

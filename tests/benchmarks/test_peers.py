@@ -14,8 +14,6 @@ import pytest
 
 from archord.benchmarks.peers.installed import CASES, PACKAGES, PEERS, PLACE, Peer, installed, probe
 
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="peers run beside one rank")
-
 # Elastic: independent solvers of each kinematics, refined until the digits stood (README.md). Plastic: archord's for
 # fixed pairs, GetFEM's and NGSolve's for closest points.
 FORCE = {

@@ -2,12 +2,10 @@
 
 import csv
 import math
-import os
 import re
 from dataclasses import replace
 
 import h5py
-import pytest
 
 from archord.benchmarks.case import Expected, slug
 from archord.benchmarks.stability.cases import FINE, cases
@@ -15,10 +13,7 @@ from archord.benchmarks.stability.fine import fine_scene, read_fine
 from archord.benchmarks.stability.run import Result, chosen, judge, not_finite, solve_case, with_references
 from archord.cli import run
 
-alone = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="only rank 0 prints")
 
-
-@alone
 def test_three_cases_through_the_command(tmp_path, capsys):
     """Two loads of zero and one that must stop: table, summary and heat map, exit code 0."""
     assert run(["benchmark", "stability", "--only", "zero*", "-o", str(tmp_path / "b")]) == 0

@@ -12,8 +12,6 @@ from archord.benchmarks.cost.sweep_speed import measure, table
 from archord.benchmarks.timing import INTERRUPTED, Failure, Process, Run, Timing, last_core, run_once, time_all
 from tests.studies.parts import written
 
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="it starts processes of one rank")
-
 
 def named(folder, *command, **options):
     return Process(command or ("true",), folder, **options)

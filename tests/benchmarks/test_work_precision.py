@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import os
 import sys
 from pathlib import Path
 
@@ -41,8 +40,6 @@ from archord.benchmarks.timing import Failure, Run, Timing, time_all
 from archord.cli import run
 from archord.scene.errors import InputError
 from tests.postprocess.synthetic import arc
-
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="it starts processes of one rank")
 
 
 def task(folder=".", *command, **names):

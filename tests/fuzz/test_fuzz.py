@@ -40,7 +40,6 @@ def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
     assert 30 < refused < 140
 
 
-@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
 def test_the_command_ends_in_order_on_mutated_files(tmp_path):
     """Exit codes 0, 2 and 3 only, no traceback, no number that is none, nothing left of a refused scene."""
     options = ("--seed", "1", "--cases", "12", "--keep", str(tmp_path))

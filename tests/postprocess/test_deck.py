@@ -14,8 +14,6 @@ from archord.geometry.joint_mesh import Cells, Facets
 from archord.postprocess.deck import contact_stiffness, deck, deck_mesh
 from tests.forked import archord
 
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="decks are written by one rank")
-
 W, DR, STEPS = 4.0, 0.005, 3
 COARSE = {"element_size": 0.2, "block_size": W, "growth": 0.5}
 KINDS = ["quadratic", "linear"]

@@ -123,7 +123,6 @@ def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
         assert [standing(job.folder).message for job in jobs] == 3 * ["ValueError: broken"] + 3 * [""]
 
 
-@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")
 def test_a_farm_keeps_meshes_only_while_it_works(comm, tmp_path):
     _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 1.0]\n")
     results = []
@@ -136,7 +135,6 @@ def test_a_farm_keeps_meshes_only_while_it_works(comm, tmp_path):
     assert MESHES.capacity == 0
 
 
-@pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="looks at one process")
 def test_a_case_with_an_accuracy_gets_its_meshes_again_after_a_kill_between_two(comm, tmp_path):
     """Each of its meshes is a finished run: only one with an estimate is the case's."""
     varied = '[grid]\nanalysis.accuracy = [0.05]\njoint.relative_element_size = ["none"]\njoint.growth = ["none"]\n'

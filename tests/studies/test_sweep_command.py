@@ -1,6 +1,5 @@
 """archord sweep as a user runs it, in this process: what is solved, what is not solved again, what the tables say."""
 
-import os
 import shutil
 from pathlib import Path
 
@@ -14,8 +13,6 @@ from archord.postprocess.curve import read_run
 from archord.studies.case_run import standing
 from archord.studies.cases import read_sweep
 from tests.studies.parts import SOFT, STUCK, numbers, sweep, table, times, written
-
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="the whole command, on one rank")
 
 
 @pytest.fixture(scope="module")

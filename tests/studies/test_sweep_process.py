@@ -1,6 +1,5 @@
 """archord sweep in processes of its own: killed, interrupted, and under mpirun."""
 
-import os
 import random
 import signal
 import subprocess
@@ -15,7 +14,6 @@ from archord.studies.cases import read_sweep
 from tests.studies.parts import numbers, sweep, table, times, written
 from tests.test_cli import ENVIRONMENT, archord
 
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="starts processes of its own")
 TEXT = "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\nload.steps = [5, 6, 7]\n"  # twelve cases, some two seconds
 
 

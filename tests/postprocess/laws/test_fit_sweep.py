@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import os
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,6 @@ from archord.postprocess.laws.calibrated import ROWS, TABLE, CalibratedModel
 from archord.postprocess.laws.calibration import calibrate
 from archord.postprocess.laws.study import read_cases
 from archord.studies.cases import read_sweep
-
-pytestmark = pytest.mark.skipif("OMPI_COMM_WORLD_SIZE" in os.environ, reason="the whole command, on one rank")
 
 SWEEP = """
 list = [
