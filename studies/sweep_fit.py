@@ -28,6 +28,7 @@ from archord.postprocess.laws.study import (
     usable,
     write_cases,
 )
+from archord.report.table import Table
 from archord.scene.errors import InputError
 from archord.studies.case_run import report_of, standing
 from archord.studies.cases import Case, read_sweep
@@ -40,13 +41,11 @@ _SOFTER = 0.01  # share of P that a block may cost without a word
 
 @dataclass(frozen=True)
 class SweepFit:
-    """The fitted ``cases`` of a sweep with their ``numbers``, what they vary (columns by heading), ``notes`` on where
-    they are from, the runs ``left_out`` with the reason, and the ``study`` of a model over them, None where the cases
-    are ``too_few``."""
+    """The fitted ``cases`` of a sweep, their ``table`` with what they vary, ``notes`` on where they are from, the runs
+    ``left_out`` with the reason, and the ``study`` of a model over them, None where the cases are ``too_few``."""
 
     cases: Cases
-    numbers: list[int]
-    varied: dict[str, list[str]]
+    table: Table
     notes: dict[str, str]
     left_out: list[tuple[str, str]]
     study: Study | None
@@ -59,8 +58,7 @@ class SweepFit:
 
     def text(self) -> str:
         """The cases, the model and its errors; of another sweep than archord's own also those of archord's law."""
-        parts = [str(study_report.case_table(self.numbers, self.cases, self.varied)), ""]
-        parts += [f"left out: {name}: {reason}" for name, reason in self.left_out]
+        parts = [str(self.table), "", *(f"left out: {name}: {reason}" for name, reason in self.left_out)]
         if self.study is None:
             parts.append(f"model: {self.too_few}; the table stands alone.")
         else:
@@ -118,20 +116,23 @@ def fit_sweep(path: Path, load_range: tuple[float, float], confidence: float, he
         cases, notes = read_cases(path)
         if not len(cases):
             raise InputError(f"{path}: holds no case.")
-        numbers, varied, left_out = list(range(1, len(cases) + 1)), study_report.numbers_of(cases), []
+        numbers, left_out = range(1, len(cases) + 1), []
+        table = study_report.case_table(numbers, cases, study_report.numbers_of(cases))
     else:
-        cases, numbers, varied, notes, left_out = _solved(path, load_range, confidence)
+        cases, table, notes, left_out = _solved(path, load_range, confidence)
     used, unfit = usable(cases)
     left_out += unfit
     try:
         result, too_few = study(used, held_out, provenance=notes), ""
     except TooFewError as error:
         result, too_few = None, str(error)
-    return SweepFit(cases, numbers, varied, notes, left_out, result, too_few)
+    return SweepFit(cases, table, notes, left_out, result, too_few)
 
 
-def _solved(folder: Path, load_range: tuple[float, float], confidence: float) -> tuple:
-    """Fit k and c to every distinct case, on its finest mesh; the first five of `SweepFit`."""
+def _solved(
+    folder: Path, load_range: tuple[float, float], confidence: float
+) -> tuple[Cases, Table, dict[str, str], list[tuple[str, str]]]:
+    """Fit k and c to every distinct case, on its finest mesh; the first four of `SweepFit`."""
     design = read_sweep(folder / FILE)
     of: dict[str, Case] = {}
     runs, fitted, left_out = [], [], list[tuple[str, str]]()
@@ -156,7 +157,8 @@ def _solved(folder: Path, load_range: tuple[float, float], confidence: float) ->
     cases = rounded(table_of(found for _, found in fitted))
     varied = {heading(key, fitted[0][0].scene): [_shown(entry(case.value(key))) for case, _ in fitted]
               for key in design.keys}  # fmt: skip
-    return cases, [case.number for case, _ in fitted], varied, _notes(folder, design.distinct, cases), left_out
+    table = study_report.case_table([case.number for case, _ in fitted], cases, varied)
+    return cases, table, _notes(folder, design.distinct, cases), left_out
 
 
 def _shown(value: Any) -> str:

@@ -2,7 +2,7 @@
 
 `calibrated` gives the numbers of the model that comes with archord, ``LAWS["calibrated"]`` the law. The model with its
 ranges and errors is data, calibrated_law.json, the cases that it was fitted to are calibrated_rows.csv;
-docs/calibration.md tells how to solve and fit them again, and study.py fits.
+docs/calibration.md says how to solve and fit them again, study.py fits.
 
 Elastic: 1/k is the sum of what pin and block yield, each in its share of the compliance 1/E*. A joint in plane stress
 is one in plane strain with other constants, so ``n = nu/(1 - nu)`` (plane strain) or ``n = nu`` (plane stress) and
@@ -32,7 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from archord.postprocess.laws.joint import Array, LawJoint
-from archord.postprocess.laws.law import Outside, tell
+from archord.postprocess.laws.law import Outside, warn
 
 Kind = tuple[str, str]  # plane; which bodies yield, "none", "both" or "block"
 TABLE = Path(__file__).parent / "calibrated_law.json"
@@ -210,7 +210,7 @@ def calibrated(
     found = joint_calibrated(joint)
     if not found.outside:
         return found
-    tell(f"calibrated: {found.outside}", outside)
+    warn(f"calibrated: {found.outside}", outside)
     return found if outside == "extrapolate" else replace(found, k=math.nan, c=math.nan)
 
 

@@ -114,30 +114,25 @@ def _check_compatible(runs: list[RunCurve]) -> None:
     first = runs[0]
     for run in runs:
         if run.scene.joint.model != "block":
-            raise InputError(
-                f'{run.name}: joint.model = "{run.scene.joint.model}" has no law to fit; only "block" has.'
-            )
+            model = run.scene.joint.model
+            raise InputError(f'{run.name}: joint.model = "{model}" has no law to fit; only "block" has.')
         for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
             if solid.hardening > 0:
                 raise InputError(f"{run.name}: {body}.hardening = {solid.hardening:g} does not fit: the law is for "
                                  "perfect plasticity, hardening = 0.")  # fmt: skip
-        if run.plane != first.plane:
+        own, other = (LawJoint.from_scene(each.scene) for each in (run, first))
+        if own.plane != other.plane:
             raise InputError(f"{run.name}: analysis.plane = {run.plane!r} does not fit: {first.name} is in plane "
                              f"{first.plane}; fit the planes separately.")  # fmt: skip
-        if not np.allclose(_elastic_pair(run), _elastic_pair(first), rtol=1e-6, atol=1e-9):
+        numbers = ([joint.dundurs_alpha, joint.nu, joint.pin_nu or 0.0] for joint in (own, other))
+        if not np.allclose(*numbers, rtol=1e-6, atol=1e-9):
             raise InputError(f"{run.name}: the Poisson's ratios or the ratio of the moduli are not those of "
                              f"{first.name}; one k is for one pair of materials, fit them separately.")  # fmt: skip
-        softer = abs(LawJoint.from_scene(run.scene).softer[0] - LawJoint.from_scene(first.scene).softer[0])
+        softer = abs(own.softer[0] - other.softer[0])
         if softer > _LIKE:
             raise InputError(f"{run.name}: joint.block_size is {run.scene.joint.W / run.R:.4g} R and that of "
                              f"{first.name} {first.scene.joint.W / first.R:.4g} R, by which their P differs by about "
                              f"{softer:.1%}; fit them separately.")  # fmt: skip
-
-
-def _elastic_pair(run: RunCurve) -> tuple[float, float, float]:
-    """Poisson's ratios, and the pin's share of the compliance (0: rigid)."""
-    pin, block = run.scene.pin, run.scene.block
-    return (0.0, block.nu, 0.0) if pin.E is None else (pin.nu or 0.0, block.nu, 1 / (1 + pin.E / block.E))
 
 
 def _fits(

@@ -62,8 +62,7 @@ def fit(predict: Callable[[Array], Array], starts: Sequence[Sequence[float]], da
 
     The covariance is ``s^2 (J^T J)^-1`` with ``s^2 = sum r^2/(n - m)`` (Seber and Wild 2003, section 2.1). It takes the
     residuals as independent. A parameter without influence on any prediction gets an infinite error. Raises ValueError
-    unless there are more data than parameters, or where only combinations of parameters can be told. Without parameters
-    the residuals are all.
+    unless there are more data than parameters, or where they determine only combinations of parameters.
     """
     m, n = len(starts[0]), len(data)
     if n <= m:
@@ -146,7 +145,7 @@ def fit_curve(
 ) -> CurveFit:
     """Fit the law to the curve "P" or "p0" of all ``groups``.
 
-    ``c`` is fitted where two steps or more lie on the plateau. Where fewer than two have not yielded, p0 tells nothing
+    ``c`` is fitted where two steps or more lie on the plateau. Where fewer than two have not yielded, p0 says nothing
     of ``k``, and ``c`` alone is fitted to those that have. ``hold_k`` is ``k`` where it is given, without an error.
     Where some scenes have a second mesh, the fit is repeated with their data extrapolated to vanishing element size;
     the change of a parameter is its discretisation error.

@@ -107,12 +107,12 @@ class Law:
 
     def _at_displacement(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside) -> LawState:
         self._require("displacement")
-        self._heed(joint, outside)
+        self._check(joint, outside)
         given = np.asarray(delta, dtype=float)
         return self._known(joint, self._inside(joint, given, self.limit(joint), self.end(joint), "delta", outside))
 
     def _at_load(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside) -> LawState:
-        self._heed(joint, outside)
+        self._check(joint, outside)
         P, limit, end = np.asarray(load, dtype=float), self.limit(joint), self.end(joint)
         if not self.gives_displacement:
             return self._known(joint, self._inside(joint, P, limit, end, "P", outside))
@@ -141,7 +141,7 @@ class Law:
             f"{self.name}: p0 and eps are Hertz's, for P up to {limit / unit:.4g} E* dR, where the half-width of the "
             f"contact is R/2; asked for {_span(state.load[beyond] / unit)} E* dR"
         )
-        tell(said, outside)
+        warn(said, outside)
         if outside == "extrapolate":
             return state
         p0, eps = (np.where(beyond, np.nan, x) for x in (state.peak_pressure, state.angle))
@@ -155,11 +155,11 @@ class Law:
         if not (beyond.any() or reason):
             return x
         stray = reason or f"{what} = {_span(x[beyond] / unit)} {named} is outside 0 to {limit / unit:.4g} {named}"
-        tell(f"{self.name}: {stray} (range: {self.range})", outside)
+        warn(f"{self.name}: {stray} (range: {self.range})", outside)
         within_formula = (x >= 0) & (x <= end * (1 + _ROUND_OFF))
         return np.where(within_formula if outside == "extrapolate" else ~beyond & (not reason), x, np.nan)
 
-    def _heed(self, joint: LawJoint, outside: Outside) -> None:
+    def _check(self, joint: LawJoint, outside: Outside) -> None:
         """Refuse a joint that lacks what the law needs; of laws with displacements also a ring, whose P(delta) is
         another one, and warn of a small block, which is softer than the law's."""
         for name in self.needs:
@@ -180,10 +180,10 @@ class Law:
                 f"and its P about {about:.1%} smaller than the law's (up to {most:.1%} with a rigid pin, or beyond "
                 "yield)"
             )
-            tell(said, outside)
+            warn(said, outside)
 
 
-def tell(said: str, outside: Outside) -> None:
+def warn(said: str, outside: Outside) -> None:
     """Warn with `LawRangeWarning`, or raise `LawRangeError` where ``outside`` is "raise"."""
     if outside == "raise":
         raise LawRangeError(f"{said}.")

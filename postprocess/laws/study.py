@@ -69,7 +69,7 @@ COLUMNS = {  # of a case, with the heading in its file
 }
 _WORDS, _CURVES = ("run", "plane", "yielding"), ("load", "P")
 _PLENTY = 2  # cases per coefficient without which nothing is fitted
-_TOLD = 0.65  # of the largest load: where the plateau must have begun for c to count
+_CLEAR = 0.65  # of the largest load: where the plateau must have begun for c to count
 _SHORT = 0.99  # of the largest load of the sweep, that a case must have reached
 
 
@@ -126,7 +126,7 @@ def fit_case(
 
 def table_of(cases: Iterable[dict[str, Any]]) -> Cases:
     """The table of ``cases``, with what follows from their numbers: Dundurs' ``alpha``, ``s = sigY R/(E* dR)``, a
-    ``digest``, the same for a joint wherever it stands and random otherwise, and ``told_c``.
+    ``digest``, the same for a joint wherever it stands and random otherwise, and ``clear_c``.
 
     The last is c where the plateau fills the last third of the range or more, else nan: one that begins later hardly
     shows in P, and the fit then takes c to mend the shape of the curve.
@@ -135,7 +135,7 @@ def table_of(cases: Iterable[dict[str, Any]]) -> Cases:
     found["alpha"] = [dundurs_alpha(case.plane, case.ratio, case.pin_nu, case.nu) for case in found.itertuples()]
     found["s"] = found.strength / found.clearance
     longest = found.load.map(lambda load: load[-1])
-    found["told_c"] = found.c.where(found.c * found.s / found.k <= _TOLD * longest)
+    found["clear_c"] = found.c.where(found.c * found.s / found.k <= _CLEAR * longest)
     numbers = found[["ratio", "pin_nu", "nu", "clearance", "strength"]].to_numpy()
     said = [" ".join(f"{value:.5g}" for value in row) for row in numbers]
     names = found.plane + " " + found.yielding + " " + pd.Series(said, found.index, dtype=str)
@@ -257,7 +257,7 @@ def fit_model(cases: Cases, form: Form = FORM, plenty: int = _PLENTY) -> Calibra
 
 def _plastic(cases: Cases, kind: Kind, model: CalibratedModel, plenty: int) -> dict[str, Any]:
     late, threshold = model.data["form"]["late"], model.data["form"][kind[0]]
-    yielded, what = cases[cases.told_c.notna()], f"cases in plane {kind[0]} of which {kind[1]} yields"
+    yielded, what = cases[cases.clear_c.notna()], f"cases in plane {kind[0]} of which {kind[1]} yields"
     _suffice(cases, plenty * (len(late) + bool(late)), what)
     _suffice(yielded, plenty * len(threshold), what)
     rate, rest = 0.0, []
@@ -330,7 +330,7 @@ def errors(cases: Cases, k: Array, c: Array) -> pd.DataFrame:
     ]
     steps = rows.loc[cases.index.repeat([len(part) for part in forces])]
     load = np.concatenate(list(cases.load))
-    own = [rows.assign(what="k", off=k / cases.k - 1), rows.assign(what="c", off=c / cases.told_c - 1)]
+    own = [rows.assign(what="k", off=k / cases.k - 1), rows.assign(what="c", off=c / cases.clear_c - 1)]
     late = np.where(load > LATE, "P", "P early")
     return pd.concat([*own, steps.assign(what=late, off=np.concatenate(forces), load=load)], ignore_index=True)
 
@@ -380,7 +380,7 @@ class Study:
 
 def study(cases: Cases, share: float = HELD_OUT, form: Form = FORM, provenance: dict[str, Any] | None = None) -> Study:
     """Hold a ``share`` of ``cases`` out, fit the model to the others, cross-validate it on them, and judge it by those
-    held out; the model tells its errors and ``provenance``. Raises `TooFewError`."""
+    held out; the model carries its errors and ``provenance``. Raises `TooFewError`."""
     used, held = split(cases, share)
     model = fit_model(used, form)
     used, held = known(model, used), known(model, held)

@@ -29,7 +29,7 @@ _STYLES = {"strain": ("o", "-"), "stress": ("s", "--")}  # of points and lines
 _ALIKE = 0.01
 
 
-def case_table(numbers: list[int], cases: Cases, varied: dict[str, list[str]]) -> Table:
+def case_table(numbers: Iterable[int], cases: Cases, varied: dict[str, list[str]]) -> Table:
     """One row per case: number, what is ``varied`` (a column by heading), k and c with their errors, the plateau's
     median pressure over sigY, and rms and largest of ``law/run - 1``."""
     errors = {"_error": "s.e."} | ({"_mesh": "mesh"} if cases.k_mesh.notna().any() else {})
@@ -151,7 +151,7 @@ def draw_study(cases: Cases, model: CalibratedModel | None, target: str | Path) 
     axes = figure.subplots(2, 3)
     _elastic_k(axes[0, 0], axes[0, 1], cases[cases.yielding == "none"], model)
     alike = (abs(cases.alpha) < _ALIKE) & (abs(cases.nu - 0.3) < _ALIKE) & (abs(cases.pin_nu - 0.3) < _ALIKE)
-    c_of = cases[alike & (cases.yielding == "both") & cases.told_c.notna()]
+    c_of = cases[alike & (cases.yielding == "both") & cases.clear_c.notna()]
     _threshold(axes[1, 0], c_of, model, "strength", "sigY / E*", "clearance", "ΔR/R", (0.001, 0.005, 0.02))
     _threshold(axes[1, 1], c_of, model, "clearance", "ΔR / R", "strength", "sigY/E*", (0.0005, 0.001, 0.002, 0.004))
     if model is not None:
@@ -244,7 +244,7 @@ def _parity(axis: Axes, cases: Cases, model: CalibratedModel) -> None:
 
     k, c = predictions(model, cases)
     axis.plot(cases.k, k, ".", ms=4, color="C0", label="k")
-    axis.plot(cases.told_c, np.where(np.isfinite(c), c, np.nan), ".", ms=4, color="C3", label="c")
+    axis.plot(cases.clear_c, np.where(np.isfinite(c), c, np.nan), ".", ms=4, color="C3", label="c")
     ends = np.array([0.3, 2.6])
     axis.plot(ends, ends, color="black", lw=0.8)
     axis.fill_between(ends, 0.95 * ends, 1.05 * ends, color="0.85", label="5 %")

@@ -168,7 +168,7 @@ def test_everywhere_in_the_range_k_and_c_are_sensible(plane, yielding):
     """Between those of the cases fitted, give or take a tenth: polynomials do not run away between them."""
     random = np.random.default_rng(5)
     same = of_kind(CASES, (plane, yielding))
-    k, c, least, most = same.k, same.told_c.dropna(), same.s.min(), 1.0
+    k, c, least, most = same.k, same.clear_c.dropna(), same.s.min(), 1.0
     checked = 0
     for nu, pin_nu, ratio, s in random.uniform([0, 0, 0.5, least], [0.49, 0.49, 9, most], (200, 4)):
         try:

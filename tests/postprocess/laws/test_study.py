@@ -99,7 +99,7 @@ def test_cross_validation_detects_a_useless_model():
     """Where k and c do not depend on anything, more terms fit better and predict worse than a constant."""
     random = np.random.default_rng(3)
     cases = synthetic(36, law=lambda cases: np.exp(0.3 * random.standard_normal((len(cases), 2)).T))
-    cases.loc[cases.yielding == "none", ["c", "told_c"]] = math.nan
+    cases.loc[cases.yielding == "none", ["c", "clear_c"]] = math.nan
     constant = form("constant", "1", "", "1", "1")
     many = form("many", "p q pm qn pq pmm qnn", "", "1 x q xq qn pm", "1")
     seen = [summary(errors(cases, *predictions(fit_model(cases, terms), cases))) for terms in (constant, many)]
