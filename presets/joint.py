@@ -36,7 +36,6 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     scene.require_mesh()
     g, analysis, by_force = scene.joint, scene.analysis, scene.force_controlled
     ring, rigid = g.model == "ring", scene.pin.rigid
-    mesh = _ring_mesh(scene, comm, partitioner) if ring else _block_mesh(scene, comm, partitioner)
     solids = {"pin": scene.pin.solid, "block": scene.block}
     supports = [Support("axis", "symmetry", 0), *(Support("block", "block held", axis) for axis in (0, 1))]
     if not rigid and not ring:
@@ -60,7 +59,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         return Guess(shift, {"pin": (0.0, -shift)})
 
     return Problem(
-        mesh,
+        _mesh(scene, comm, partitioner, ring),
         [Body(name, solid.material(analysis.plane)) for name, solid in solids.items() if solid is not None],
         [contact],
         supports,
@@ -78,26 +77,15 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     )
 
 
-def _block_mesh(scene: Scene, comm: MPI.Comm, partitioner) -> TaggedMesh:
+def _mesh(scene: Scene, comm: MPI.Comm, partitioner, ring: bool) -> TaggedMesh:
     g = scene.joint
-    edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
-    return quarter_joint(comm, *_sizes(scene), edge=edge, rigid_pin=scene.pin.rigid, **_options(scene, partitioner))
-
-
-def _ring_mesh(scene: Scene, comm: MPI.Comm, partitioner) -> TaggedMesh:
-    core = scene.load.core_radius * scene.joint.radius
-    return half_ring(comm, *_sizes(scene), core, **_options(scene, partitioner))
-
-
-def _sizes(scene: Scene) -> tuple[float, ...]:
-    g = scene.joint
-    return g.radius, g.dR, g.W, g.h, g.growth
-
-
-def _options(scene: Scene, partitioner) -> dict:
-    g = scene.joint
+    sizes = g.radius, g.dR, g.W, g.h, g.growth
     options = {"size_ratio": g.size_ratio, "degree": scene.analysis.degree, "partitioner": partitioner}
-    return options | {"refinements": refinements(g.expected_cells)}
+    options["refinements"] = refinements(g.expected_cells)
+    if ring:
+        return half_ring(comm, *sizes, scene.load.core_radius * g.radius, **options)
+    edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
+    return quarter_joint(comm, *sizes, edge=edge, rigid_pin=scene.pin.rigid, **options)
 
 
 def _coarser(scene: Scene) -> Scene:

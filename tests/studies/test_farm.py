@@ -106,14 +106,14 @@ def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
     """Whichever rank has them."""
     from archord.presets import joint
 
-    true_mesh = joint._block_mesh
+    true_mesh = joint._mesh
 
-    def broken(scene, comm, partitioner):
+    def broken(scene, *rest):
         if scene.pin.E < 0.75:
             raise ValueError("broken")
-        return true_mesh(scene, comm, partitioner)
+        return true_mesh(scene, *rest)
 
-    monkeypatch.setattr(joint, "_block_mesh", broken)
+    monkeypatch.setattr(joint, "_mesh", broken)
     _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 0.6, 0.7, 0.8, 1.0, 1.82]\n")
     results = []
     assert Farm(comm).run(jobs, results.append) == 0

@@ -146,14 +146,14 @@ def test_an_error_is_kept_with_its_traceback(tmp_path, monkeypatch, capsys):
     """What nobody foresaw is the case's own: failure.txt has it, the table its sentence, and a retry removes it."""
     from archord.presets import joint
 
-    true_mesh = joint._block_mesh
+    true_mesh = joint._mesh
 
-    def broken(scene, comm, partitioner):
+    def broken(scene, *rest):
         if scene.pin.E == 1.0:
             raise ValueError("two\nlines")
-        return true_mesh(scene, comm, partitioner)
+        return true_mesh(scene, *rest)
 
-    monkeypatch.setattr(joint, "_block_mesh", broken)
+    monkeypatch.setattr(joint, "_mesh", broken)
     file = written(tmp_path, "[grid]\npin.E = [0.5, 1.0, 1.82]\n")
     assert sweep(file, "-o", tmp_path / "out") == 3
     assert "2 done, 1 failed" in capsys.readouterr().out
