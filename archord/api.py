@@ -70,7 +70,7 @@ def solve(
 
     from archord.output.folder import claim_folder
     from archord.output.ranks import agreed
-    from archord.progress import reporting
+    from archord.progress import solve_and_report
 
     comm = MPI.COMM_WORLD if comm is None else comm
 
@@ -85,13 +85,8 @@ def solve(
     checked, target = agreed(comm, claimed)
     if folder is None and comm.rank == 0 and comm.size > 1:
         atexit.register(shutil.rmtree, target, ignore_errors=True)
-    from archord.studies.accuracy import solve_as_asked
-
-    report, options = reporting(checked, silent=not progress or comm.rank != 0)
     try:
-        with report:
-            outcome = solve_as_asked(checked, target, comm, **options)
-        report.finish(outcome)
+        outcome = solve_and_report(checked, target, comm, silent=not progress)
         run = _read(target, outcome.message)
     except BaseException:
         if folder is None and comm.rank == 0:

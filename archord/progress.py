@@ -6,6 +6,7 @@ import math
 import os
 import sys
 from contextlib import nullcontext
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,6 +14,9 @@ from archord.ranks import on_terminal
 from archord.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from archord.output.restart import Start
     from archord.output.run import Outcome
     from archord.studies.accuracy import Level
     from archord.studies.case_run import Result
@@ -147,13 +151,37 @@ class _MeshProgress(Progress):
                 self._print_step(m)
 
 
-def reporting(scene: Scene, *, silent: bool, done: int = 0) -> tuple[Progress, dict[str, Any]]:
-    """Who reports a solve of ``scene``, of which ``done`` steps are there, and what the solve has to call."""
-    report = Progress(scene, silent, done) if scene.analysis.accuracy is None else _MeshProgress(scene, silent)
-    calls: dict[str, Any] = {"on_start": report.start, "on_step": report.step, "on_attempt": report.attempt}
-    if isinstance(report, _MeshProgress):
+def solve_and_report(
+    scene: Scene,
+    folder: Path,
+    comm: MPI.Comm,
+    *,
+    silent: bool,
+    start: Start | None = None,
+    begun: float | None = None,
+    **options: Any,
+) -> Outcome:
+    """Solve ``scene`` into ``folder``, or go on from ``start``, and report it on rank 0 unless ``silent``. Collective.
+
+    If this process is for it alone, it has ``begun`` at that time of `perf_counter`.
+    """
+    from archord.solver.timer import Timer
+    from archord.studies.accuracy import solve_as_asked  # with all of dolfinx: bad input is told before
+
+    if begun is not None:
+        options |= {"begun": begun, "timer": Timer({"start-up": perf_counter() - begun})}
+    silent = silent or comm.rank != 0
+    calls: dict[str, Any] = {}
+    if scene.analysis.accuracy is None:
+        report = Progress(scene, silent, start.checkpoint.step if start else 0)
+    else:
+        report = _MeshProgress(scene, silent)
         calls["on_level"] = report.level
-    return report, calls
+    calls |= {"on_start": report.start, "on_step": report.step, "on_attempt": report.attempt}
+    with report:
+        outcome = solve_as_asked(scene, folder, comm, start=start, **calls, **options)
+    report.finish(outcome)
+    return outcome
 
 
 class SweepProgress(_Bar):

@@ -102,7 +102,7 @@ def _solve(
 
     from archord.output.folder import claim_folder
     from archord.output.ranks import agreed
-    from archord.progress import reporting
+    from archord.progress import solve_and_report
 
     def claimed() -> Scene:
         scene = load()
@@ -111,18 +111,12 @@ def _solve(
 
     comm = MPI.COMM_WORLD
     scene = agreed(comm, claimed)
-    from archord.postprocess.tables import first_of_each_kind
-    from archord.solver.timer import Timer
-    from archord.studies.accuracy import solve_as_asked  # with all of dolfinx: bad input is told before
+    outcome = solve_and_report(scene, folder, comm, silent=quiet, start=start, debug=debug, begun=begun)
+    if outcome.warnings:
+        from archord.postprocess.tables import first_of_each_kind
 
-    timer = Timer()
-    timer.seconds["start-up"] = perf_counter() - begun
-    report, options = reporting(scene, silent=quiet or comm.rank != 0, done=start.checkpoint.step if start else 0)
-    with report:
-        outcome = solve_as_asked(scene, folder, comm, start=start, debug=debug, timer=timer, begun=begun, **options)
-    report.finish(outcome)
-    for warning in first_of_each_kind(outcome.warnings):
-        print(f"archord: warning: {warning}.", file=sys.stderr)
+        for warning in first_of_each_kind(outcome.warnings):
+            print(f"archord: warning: {warning}.", file=sys.stderr)
     if comm.rank == 0 and outcome.status != "done":
         print(f"archord: {outcome.message}.", file=sys.stderr)
         print(f"archord: {outcome.status}; {len(outcome.steps)} accepted steps are in {folder}.", file=sys.stderr)
