@@ -77,13 +77,6 @@ class Curve:
         outward = np.stack([step[:, 1], -step[:, 0]], axis=1)
         return x, outward / np.linalg.norm(outward, axis=1)[:, None]
 
-    def neighbours(self, facets: Index, rings: int) -> tuple[Index, Index]:
-        """Facets that fewer than ``rings`` others separate from one of ``facets`` ``(m,)``, these included: the places
-        ``(k,)`` in ``facets`` and the neighbours ``(k,)``."""
-        near = facets[:, None] + np.arange(-rings, rings + 1)
-        which, _ = inside = np.nonzero((near >= 0) & (near < self.n_facets))
-        return which, near[inside]
-
     def arc_length(self, xi: Array) -> Array:
         """Length ``(n, m)`` along the curve from its start to ``xi`` ``(m,)``, or ``(n, m)``, of each facet."""
         xi = np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1]))
@@ -182,7 +175,3 @@ class RigidCircle:
         )
 
     continued = closest_point
-
-    def neighbours(self, facets: Index, rings: int) -> tuple[Index, Index]:
-        """See `Curve.neighbours`."""
-        return np.arange(len(facets)), facets

@@ -62,7 +62,7 @@ class Contact:
     def search(self) -> None:
         """Forget where the pairs were: the next evaluation searches them over whole surfaces."""
         for pair in self.pairs:
-            pair.search()
+            pair.start = "anywhere"
 
     def use_gamma_factor(self, factor: float) -> None:
         """Limit the gamma factor of all interactions to ``factor``, for the time being."""
@@ -72,7 +72,7 @@ class Contact:
     def hold(self) -> None:
         """Keep all points on the facets they were last paired with, until `search`: the forces become smooth."""
         for pair in self.pairs:
-            pair.hold()
+            pair.start = "held"
 
     def evaluate(self, u: Array) -> bool:
         """Gaps, tractions and trial history at the nodal displacements ``u`` ``(n, 2)`` of this rank.

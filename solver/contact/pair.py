@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from archord.geometry.basis import Array
 from archord.materials.points import Points
 from archord.solver.contact.law import ContactLaw
 from archord.solver.contact.surface import RigidSurface, Surface
+
+Start = Literal["anywhere", "near", "held"]
 
 
 class Pair:
@@ -21,7 +24,8 @@ class Pair:
     ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)`` normal and tangent
     and ``opening`` ``(m, 2)`` gap and slip; ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` are those of the
     own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active``
-    ``(m,)`` points touch, and ``changes`` are how many opened or closed.
+    ``(m,)`` points touch, and ``changes`` are how many opened or closed. The next evaluation searches partners from
+    ``start`` on: anywhere, near the last ones, or on their facets alone, where points are held until it is set again.
     """
 
     def __init__(
@@ -34,7 +38,7 @@ class Pair:
         self.separation = x - self.projection.point
         self.points = Points(law, len(x))
         self.traction, self.active = np.zeros((len(x), 2)), np.zeros(len(x), dtype=bool)
-        self.search()
+        self.start: Start = "anywhere"
 
     def use_gamma(self, factor: float) -> None:
         """Nitsche's gamma ``(m,)`` is ``factor`` times the share and the trace constant of the point's cell."""
@@ -43,14 +47,6 @@ class Pair:
     def use_own_normals(self) -> None:
         """Measure the gap along this surface's normals, reversed, for good."""
         self.projection = replace(self.projection, normal=-self._outward)
-
-    def search(self) -> None:
-        """Forget where the pairs were: the next evaluation searches them over the whole surface."""
-        self._search, self._hold = True, False
-
-    def hold(self) -> None:
-        """Keep every point on the facet it was last paired with, until `search`."""
-        self._search, self._hold = False, True
 
     def evaluate(self, u: Array, motion: Array) -> None:
         """Pairs, gaps, tractions and trial history at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``.
@@ -76,12 +72,10 @@ class Pair:
         self.traction = self._answer(self.trial)
 
     def _pair(self, x: Array, motion: Array) -> None:
-        curve, facet = self.opposite.curve, self.projection.facet
-        if self._hold:
-            self.projection = curve.continued(x, self._outward, motion, facet)
-        else:
-            self.projection = curve.closest_point(x, self._outward, motion, None if self._search else facet)
-        self._search = False
+        curve, facet = self.opposite.curve, None if self.start == "anywhere" else self.projection.facet
+        project = curve.continued if self.start == "held" else curve.closest_point
+        self.projection = project(x, self._outward, motion, facet)
+        self.start = "held" if self.start == "held" else "near"
         self.separation = x - self.projection.point
 
     def _answer(self, trial: Array) -> Array:

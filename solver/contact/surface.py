@@ -27,7 +27,7 @@ class Surface:
     q)`` (measure of the curved edge), ``point`` and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own
     cell's basis, ``shape`` ``(n, q, a)`` and of it ``trace_shape`` ``(n, q, k)`` of the nodes on the facet, ``gamma``
     ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve, ``trace`` their nodes within the cell. The
-    ``curve`` and ``curve_dofs``, the global dofs of its nodes, are those of all ranks.
+    ``curve``, its ``n_facets`` and ``curve_dofs``, the global dofs of its nodes, are those of all ranks.
     """
 
     rigid = False
@@ -60,7 +60,7 @@ class Surface:
         chain_x = np.concatenate([g[1] for g in gathered])
         order = _chain(chain_dofs[:, 0], chain_dofs[:, -1])
         chain_dofs, chain_x = chain_dofs[order], chain_x[order]
-        self.curve = Curve(_join(chain_x), self.degree)
+        self.curve, self.n_facets = Curve(_join(chain_x), self.degree), len(order)
         self.curve_dofs = _join(chain_dofs[..., None])[:, 0]
         position = np.empty(len(order), dtype=np.int64)
         position[order] = np.arange(len(order))
@@ -78,17 +78,14 @@ class Surface:
         self._owned = np.flatnonzero((owned >= 0) & (owned < index_map.size_local))
         self._owned_local = owned[self._owned]
         xi, w = basix.make_quadrature(basix.CellType.interval, 2 * CONTACT_POINTS - 1)
-        self.place_points(np.tile(xi[:, 0], (self.curve.n_facets, 1)), np.tile(w, (self.curve.n_facets, 1)))
+        self.place_points(np.tile(xi[:, 0], (self.n_facets, 1)), np.tile(w, (self.n_facets, 1)))
         self.gamma = self._trace_inequality()
 
-    @property
-    def n_facets(self) -> int:
-        """Number of facets, over all ranks."""
-        return self.curve.n_facets
-
     def neighbours(self, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
-        """Facets within some ``rings`` around ``facets`` ``(m,)``: places ``(k,)`` in ``facets`` and neighbours."""
-        return self.curve.neighbours(facets, rings)
+        """``facets`` ``(m,)`` and those within some ``rings`` around: places ``(k,)`` in ``facets`` and neighbours."""
+        near = facets[:, None] + np.arange(-rings, rings + 1)
+        which, _ = inside = np.nonzero((near >= 0) & (near < self.n_facets))
+        return which, near[inside]
 
     def facet_lengths(self) -> Array:
         """Arc length ``(n_facets,)`` of every facet, over all ranks."""
@@ -174,8 +171,11 @@ class RigidSurface:
 
     def __init__(self, circle: RigidCircle, rate: Sequence[float] = (0.0, 0.0)) -> None:
         self.curve, self.rate = circle, np.array(rate, dtype=float)
-        self.neighbours = circle.neighbours
         self.motion, self.curve_dofs = np.zeros((1, 2)), np.zeros(1, dtype=np.int64)
+
+    def neighbours(self, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
+        """As those of a `Surface`: there are none."""
+        return np.arange(len(facets)), facets
 
     def curve_displacement(self, u: Array) -> Array:
         """The displacement of the disc ``(1, 2)``, whatever that of the bodies."""
