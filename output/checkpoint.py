@@ -23,7 +23,6 @@ from archord.geometry.basis import Array
 from archord.output.disk import replace_file
 from archord.presets.measures import Measures, Work
 from archord.scene.errors import InputError
-from archord.scene.file import resolved
 from archord.solver.load_path import Position
 from archord.solver.mesh_order import Arrays, MeshOrder
 from archord.solver.newton import Newton
@@ -63,7 +62,10 @@ class RunState:
 
 
 def collect(order: MeshOrder, step: int, scene: str, fields: dict[str, Array], scalars: dict[str, Any]) -> Checkpoint:
-    """The joint's history, nodal ``fields`` ``(n_local, 2)`` and ``scalars`` after ``step``; on rank 0. Collective."""
+    """The history of all points, nodal ``fields`` ``(n_local, 2)`` and ``scalars`` after ``step``, on rank 0.
+
+    Collective.
+    """
     whole = {name: order.collect(values) for name, values in fields.items()}
     history = order.collect_history()
     mesh = order.mesh_digest() if order.system.comm.rank == 0 else ""
@@ -71,7 +73,7 @@ def collect(order: MeshOrder, step: int, scene: str, fields: dict[str, Array], s
 
 
 def restore(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Give the joint the history of ``checkpoint`` (known on rank 0, read from ``path``); returns this rank's nodal
+    """Give the points the history of ``checkpoint`` (known on rank 0, read from ``path``); returns this rank's nodal
     fields ``(n_local, 2)`` and the scalars. Collective. Raises `InputError` on every rank if it is of another mesh."""
     comm = order.system.comm
     fault = None
@@ -89,28 +91,28 @@ def restore(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tupl
     return fields, scalars
 
 
-def halt(order: MeshOrder, at: RunState) -> Checkpoint:
-    """The checkpoint (on rank 0) from which `resume` goes on. Collective."""
-    joint, position = order.system, at.position
-    state = joint.equilibrium.state()
+def halt(order: MeshOrder, scene: str, at: RunState) -> Checkpoint:
+    """The checkpoint (on rank 0) of a run of ``scene``, from which `resume` goes on. Collective."""
+    system, position = order.system, at.position
+    state = system.equilibrium.state()
     fields = {"displacement": _nodal(state)}
     scalars = {
         "measures": asdict(at.measures),
         "step": asdict(at.step),
         "work": vars(at.work),
         "position": {name: value for name, value in vars(position).items() if name != "increment"},
-        "largest_reaction": joint.equilibrium.largest_reaction,
-        "gamma_by_and_by": joint.solver.continues_gamma,
+        "largest_reaction": system.equilibrium.largest_reaction,
+        "gamma_by_and_by": system.solver.continues_gamma,
         "level": float(state[-1]),
     }
     if position.increment is not None:
         fields["increment"] = _nodal(position.increment)
         scalars["level_increment"] = float(position.increment[-1])
-    return collect(order, at.measures.step, resolved(joint.scene), fields, scalars)
+    return collect(order, at.measures.step, scene, fields, scalars)
 
 
 def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> RunState:
-    """Give the joint the state of ``checkpoint`` (needed on rank 0 only, read from ``path``). Collective.
+    """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``). Collective.
 
     Raises `InputError` if it is of another mesh.
     """

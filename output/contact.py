@@ -1,6 +1,6 @@
 """contact.h5: the contact along the arcs at every output step.
 
-Per side ("pin", "hole"; a side whose edge is not integrated is absent): ``s`` and ``angle`` from the contact axis and
+Per surface, by name (one that is not integrated is absent): ``s`` and ``angle`` from the contact axis and
 ``weight`` (measure), each ``(n facets, q points)``; per step ``coordinates`` ``(n, q, 2)`` (deformed), ``pressure``
 (linear on each facet, with the facet's force), ``raw_pressure`` (as the solver integrates it) and ``gap`` (positive
 when open).

@@ -1,5 +1,5 @@
-"""fields.xdmf and fields.h5: the joint's fields over the steps, for ParaView and pyvista. debug.xdmf and debug.h5: the
-last state that a solve without success tried, with its residual forces and increments of PEEQ.
+"""fields.xdmf and fields.h5: the fields of all bodies over the steps, for ParaView and pyvista. debug.xdmf and .h5:
+the last state that a solve without success tried, with its residual forces and increments of PEEQ.
 
 Displacements are nodal on curved second-order triangles, whatever the degree of the elements; stress measures, PEEQ and
 the contact are means over cells. The arrays are in the order of the mesh generator, whatever the number of ranks. Rank
@@ -27,22 +27,25 @@ _VTK_ORDER = [0, 1, 2, 5, 3, 4]  # VTK counts edge nodes from the edge between t
 class FieldWriter:
     """Writes ``folder``/fields.xdmf and .h5 (see `StepFile`); goes on ``after`` some steps that are there.
 
-    With ``debug`` the files are debug.xdmf and .h5, and hold what tells why a solve fails. Collective.
-    Raises `WriteError`, and `InputError` if the files that should go on are not this run's.
+    Times are the steps' loads, or with ``numbered`` their numbers. With ``debug`` the files are debug.xdmf and .h5, and
+    hold what tells why a solve fails. Collective. Raises `WriteError`, and `InputError` if the files that should go on
+    are not this run's.
     """
 
-    def __init__(self, folder: Path, order: MeshOrder, *, after: int = 0, debug: bool = False) -> None:
-        joint = order.system
-        self.joint, self.order = joint, order
+    def __init__(
+        self, folder: Path, order: MeshOrder, *, after: int = 0, numbered: bool = False, debug: bool = False
+    ) -> None:
+        system = order.system
+        self.order, self._numbered = order, numbered
         self.path = folder / ("debug.xdmf" if debug else "fields.xdmf")
         self.nodal = ["displacement", "residual"] if debug else ["displacement"]
         body_of = order.bodies()
         self.names = ["von_mises", "mean_stress", "contact_state", "contact_pressure"]
-        if joint.bulk.plastic:
+        if system.bulk.plastic:
             self.names[1:1] = ["peeq", "peeq_increment"] if debug else ["peeq"]
 
         def make() -> None:
-            self._nodes = SecondOrder(order.nodes_of_cell, joint.problem.degree)
+            self._nodes = SecondOrder(order.nodes_of_cell, system.problem.degree)
             cells, points = self._nodes.cells[:, _VTK_ORDER], self._nodes(order.coordinates)
             self._n_nodes, self._n_cells = len(points), len(cells)
             fixed = {"mesh/coordinates": points, "mesh/cells": cells, "mesh/body": body_of}
@@ -51,16 +54,16 @@ class FieldWriter:
             if not after:
                 self._write_xdmf()
 
-        agreed(joint.comm, make, asleep=False)
+        agreed(system.comm, make, asleep=False)
 
     def write(self, load: float) -> None:
         """Add the last accepted state as a step, reached at ``load``. Collective. Raises `WriteError`."""
-        joint = self.joint
-        u = joint.equilibrium.displacement()
-        values = joint.bulk.cell_fields(u)
+        system = self.order.system
+        u = system.equilibrium.displacement()
+        values = system.bulk.cell_fields(u)
         values["contact_state"], values["contact_pressure"] = self._contact_on_cells()
         arrays = {name: self.order.cells(values[name]) for name in self.names}
-        on_nodes = {"displacement": u, "residual": joint.equilibrium.residual()}
+        on_nodes = {"displacement": u, "residual": system.equilibrium.residual()}
         nodal = {name: self.order.collect(on_nodes[name]) for name in self.nodal}
 
         def write() -> None:
@@ -68,12 +71,13 @@ class FieldWriter:
             self._file.write(load, arrays | vectors)
             self._write_xdmf()
 
-        agreed(joint.comm, write, asleep=False)
+        agreed(system.comm, write, asleep=False)
 
     def _contact_on_cells(self) -> tuple[Array, Array]:
         """Share of each cell's contact facet in contact, and the mean pressure on it; zero elsewhere."""
         share, pressure = np.zeros(self.order.n_cells), np.zeros(self.order.n_cells)
-        for pair in self.joint.contact.pairs:
+        contact = self.order.system.contact
+        for pair in contact.pairs if contact else ():
             side = pair.surface
             w = side.weight / side.weight.sum(axis=1, keepdims=True)
             share[side.cells] = (w * (pair.pressure > 0)).sum(axis=1)
@@ -81,9 +85,8 @@ class FieldWriter:
         return share, pressure
 
     def _write_xdmf(self) -> None:
-        scene, file = self.joint.scene, self._file
-        times = file.loads if scene.monotonic and not scene.force_controlled else range(1, len(file.loads) + 1)
-        grids = [self._grid(k, float(time)) for k, time in enumerate(times, start=1)]
+        loads = enumerate(self._file.loads, start=1)
+        grids = [self._grid(k, float(k if self._numbered else load)) for k, load in loads]
         text = (
             '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
             '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'

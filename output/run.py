@@ -150,11 +150,12 @@ class _Output:
             if joint.scene.output.fields:
                 from archord.output.fields import FieldWriter
 
-                self._fields = FieldWriter(self.folder, self._order, after=len(self.steps))
+                numbered = joint.scene.force_controlled or not joint.scene.monotonic
+                self._fields = FieldWriter(self.folder, self._order, after=len(self.steps), numbered=numbered)
             self._on_root(self._write_scene)
         self._last = perf_counter()
         if not comm.bcast(start is not None):
-            self._on_root(lambda: (self._history.write(), self._report.write()))
+            self._on_root(self._write_tables)
             return None, Work()
         with joint.timer("checkpoint"):
             at = resume(self._order, self.folder / CHECKPOINT, start.checkpoint if start else None)
@@ -174,6 +175,11 @@ class _Output:
     def _write_scene(self) -> None:
         replace_file(self.folder / "scene.toml", resolved(self.joint.scene))
 
+    def _write_tables(self) -> None:
+        assert self._report is not None
+        self._history.write()
+        self._report.write()
+
     def add(self, step: Step, position: Position, work: Work) -> Measures:
         """Write an accepted output step, and return its measures. Collective."""
         joint = self.joint
@@ -183,7 +189,7 @@ class _Output:
             largest = max((abs(m.P) for m in self.steps), default=0.0)
             m = measure(joint, len(self.steps) + 1, step, profiles, work, seconds, largest)
         with joint.timer("checkpoint"):
-            checkpoint = halt(self._order, RunState(m, step, position, work))
+            checkpoint = halt(self._order, resolved(joint.scene), RunState(m, step, position, work))
             self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
         self._write(m, step, profiles)
         return m
@@ -193,6 +199,7 @@ class _Output:
         warnings = step_warnings(self.joint, profiles, m, step.residual)
 
         def add() -> None:
+            assert self._report is not None
             self._contact.write(m.step, m.delta, profiles)
             self._history.add(m)
             self._report.add(m, step, warnings)

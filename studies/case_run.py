@@ -131,7 +131,7 @@ def _attempt(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], 
     plan = agreed(comm, lambda: _plan(scene, folder, anew or scene.analysis.accuracy is not None))
     if plan is not None and plan.finished:
         return Result(folder.name, "done")
-    outcome = solve_as_asked(scene, folder, comm, start=plan and plan.start, on_start=check, on_step=check)
+    outcome = solve_as_asked(scene, folder, comm, start=plan.start if plan else None, on_start=check, on_step=check)
     return Result(folder.name, outcome.status, outcome.message, signal=outcome.signal)
 
 
