@@ -154,18 +154,17 @@ def fit_curve(
     for run in (run for g in groups for run in g.runs):
         if not ((run.P > 0) & (run.p0 > 0)).any():
             raise InputError(f"{run.name}: the bodies never touch in this run, so there is no law to fit to it.")
-    runs = tuple(g.run for g in groups)
-    chosen = tuple(selected(run, load_range) for run in runs)
-    yielded = tuple(rows & (run.peeq_max > 0) for run, rows in zip(runs, chosen, strict=True))
-    plateau_alone = (
-        hold_k is None and quantity == "p0" and any(map(np.any, yielded)) and _count(chosen) - _count(yielded) < 2
-    )
+    runs = [g.run for g in groups]
+    chosen = [selected(run, load_range) for run in runs]
+    yielded = [rows & (run.peeq_max > 0) for run, rows in zip(runs, chosen, strict=True)]
+    steps, plastic = (np.concatenate(rows).sum() for rows in (chosen, yielded))
+    plateau_alone = hold_k is None and quantity == "p0" and plastic > 0 and steps - plastic < 2
     problem = _Problem(quantity, runs, yielded if plateau_alone else chosen, hold_k)
-    data = [getattr(g.run, quantity) for g in groups]
+    curves = [[getattr(run, quantity) for run in g.runs] for g in groups]
+    data = [y[0] for y in curves]
     free, best = (("c",), problem.solve(("c",), data)) if plateau_alone else problem.solve_best(data)
     mesh: dict[str, float] = {}
     refined = sum(bool(g.coarser) for g in groups)
-    curves = [[getattr(run, quantity) for run in g.runs] for g in groups]
     if refined and free:
         finer = [y[0] + g.shift(y) if g.coarser else y[0] for g, y in zip(groups, curves, strict=True)]
         moved = problem.solve(free, finer).parameters - best.parameters
@@ -184,10 +183,6 @@ def fit_curve(
     return CurveFit(quantity, k, c, best.r2, best.dof, residuals, refined, None, orders, hold_k is not None)
 
 
-def _count(rows: tuple[Array, ...]) -> int:
-    return sum(int(r.sum()) for r in rows)
-
-
 @dataclass(frozen=True)
 class _Problem:
     """A curve of some runs at their chosen steps, and the law's fit to it with some parameters free.
@@ -196,8 +191,8 @@ class _Problem:
     """
 
     quantity: str
-    runs: tuple[RunCurve, ...]
-    chosen: tuple[Array, ...]
+    runs: list[RunCurve]
+    chosen: list[Array]
     held: float | None = None
 
     def dimensionless(self, data: list[Array]) -> list[Array]:
@@ -215,13 +210,10 @@ class _Problem:
     def solve(self, free: tuple[str, ...], data: list[Array]) -> LeastSquares:
         """Fit the ``free`` parameters. Raises `InputError` where the steps do not determine them."""
         parts = self.dimensionless(data)
-        slopes: list[float] = [
-            y[0] / unit[0] for y, unit in zip(parts, self.predict(("k",), np.ones(1)), strict=True) if len(y)
-        ]
-        starts = [
-            [{"k": float(np.median(slopes)), "c": c}[name] for name in free]
-            for c in (_STARTS_OF_C if "c" in free else _STARTS_OF_C[:1])
-        ]
+        units = self.predict(("k",), np.ones(1))
+        slope = float(np.median([y[0] / unit[0] for y, unit in zip(parts, units, strict=True) if len(y)]))
+        starts_of_c = _STARTS_OF_C if "c" in free else _STARTS_OF_C[:1]
+        starts = [[{"k": slope, "c": c}[name] for name in free] for c in starts_of_c]
         try:
             return fit(lambda v: np.concatenate(self.predict(free, v)), starts, np.concatenate(parts))
         except ValueError as error:

@@ -187,7 +187,8 @@ def persson_pressure(joint: LawJoint, P: Array, eps: Array, phi: Array) -> Array
 
 
 def persson_load(joint: LawJoint, eps: Array) -> Array:
-    """Load at which the contact has the semi-angle ``eps``; infinite from `largest_angle` on.
+    """Load at which the contact has the semi-angle ``eps``; infinite from the angle on that closes any clearance, 84.83
+    degrees for like bodies.
 
     ``E* dR/P = [ 2 - (1 + alpha) (ln(1 + b^2) + 2 b^4) ] / [ 2 pi b^2 (1 + b^2) ]`` (Ciavarella and Decuzzi 2001), with
     alpha positive for the stiffer pin.
@@ -218,12 +219,3 @@ def persson_peak(joint: LawJoint, P: Array) -> Array:
     """Pressure on the contact axis under ``P``."""
     eps = np.where(P > 0, persson_angle(joint, P), 1.0)
     return np.where(P > 0, persson_pressure(joint, P, eps, np.zeros_like(eps)), 0.0)
-
-
-def largest_angle(alpha: float = 0.0) -> float:
-    """Contact semi-angle [rad] under any load if there is no clearance; 1.4805 (84.83 degrees) for like bodies."""
-    if alpha <= -1:
-        return math.pi
-    target = np.array([2 / (1 + alpha)])
-    b2 = monotone_root(lambda x: np.log1p(x) + 2 * x**2, lambda x: 1 / (1 + x) + 4 * x, target, 1.0)
-    return float(2 * np.arctan(np.sqrt(b2[0])))

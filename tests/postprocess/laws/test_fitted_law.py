@@ -27,6 +27,16 @@ def test_json_gives_the_law_back(law):
     assert FittedLaw.from_json(json.dumps({"law": json.loads(law.to_json()), "each": []})) == law
 
 
+def test_a_file_of_version_0_1_is_read():
+    """As ``archord fit --json`` of that version wrote the law."""
+    text = """{"law": {"k": 0.8559703192031349, "E_star": 105000.0, "R": 10.0, "dR": 0.05, "k_error": 0.00815,
+    "c": 0.9390129955486293, "sigY": 230.76923076923077, "c_error": 0.00247, "fitted_range": [0.1, 2.0],
+    "plane": "stress", "length_unit": "mm", "force_unit": "N/mm", "fitted_to": ["runs/steel_stress"]}, "laws": []}"""
+    law = FittedLaw.from_json(text)
+    assert (law.k, law.c, law.fitted_range) == (0.8559703192031349, 0.9390129955486293, (0.1, 2.0))
+    assert law.force(0.1) == pytest.approx(4674.72, rel=5e-3)  # P of the run that it is fitted to
+
+
 @pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
 def test_the_python_module_needs_only_math_and_gives_the_same(law, tmp_path):
     """In an interpreter without site packages, to the last digits, whatever runs are called."""
