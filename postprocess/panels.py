@@ -117,11 +117,7 @@ def field_panel(figure: Any, axes: Any, run: Run, step: int | None = None) -> No
     drawn = axes.tripcolor(*x.T, triangles, facecolors=colours, cmap=cmap, vmin=0, vmax=_largest(scene, fields, values))
     cut = "max" if colours.max() > drawn.norm.vmax else "neither"
     figure.colorbar(drawn, ax=axes, label=label, shrink=0.85, extend=cut)
-    before = magnified(scene, fields, factor, displaced=False)
-    _outline(axes, fields, before, color="0.35", lw=0.9, ls=(0, (4, 3)))
-    _outline(axes, fields, x, color="black", lw=1.1)
-    if scene.pin.rigid:
-        _rigid_pin(axes, scene, fields.delta, factor)
+    _outline(axes, scene, fields, factor)
     length = scene.units.length
     axes.set(xlim=(left, right), ylim=(low, high), aspect="equal", xlabel=f"x [{length}]", ylabel=f"y [{length}]")
     what = "not magnified" if factor == 1 else f"displacement and clearance × {factor:g}"
@@ -148,21 +144,22 @@ def _window(scene: Scene, factor: float) -> tuple[float, float, float, float]:
     return 0.0, reach, -min(1.9 * R + gap, scene.joint.W), reach if scene.joint.model == "ring" else 0.06 * R
 
 
-def _outline(axes: Any, fields: Fields, x: np.ndarray, **style: Any) -> None:
-    """Draw the boundary through the points ``x`` ``(n, 2)`` of the nodes, edges as the parabolas that they are."""
+def _outline(axes: Any, scene: Scene, fields: Fields, factor: float) -> None:
+    """Draw the boundary before and after, edges as the parabolas that they are, and a rigid pin."""
     from matplotlib.collections import LineCollection
 
-    t = np.linspace(0, 1, _EDGE_POINTS)
+    t, R = np.linspace(0, 1, _EDGE_POINTS), scene.joint.radius
     shape = np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
-    axes.add_collection(LineCollection(list(shape @ x[fields.outline()]), **style), autolim=False)
-
-
-def _rigid_pin(axes: Any, scene: Scene, delta: float, factor: float) -> None:
-    for load, style in ((0.0, {"color": "0.35", "lw": 0.9, "ls": (0, (4, 3))}), (delta, {"color": "black", "lw": 1.1})):
-        arc = rigid_arc(scene, load, factor)
-        axes.plot(*arc.T, **style)
-    axes.fill(*np.concatenate([arc, [[0.0, arc[-1, 1]]]]).T, color="0.85", zorder=0)
-    axes.text(0.35 * scene.joint.radius, arc[-1, 1] - 0.35 * scene.joint.radius, "rigid pin", ha="center")
+    for displaced, style in (
+        (False, {"color": "0.35", "lw": 0.9, "ls": (0, (4, 3))}),
+        (True, {"color": "0", "lw": 1.1}),
+    ):
+        lines = list(shape @ magnified(scene, fields, factor, displaced)[fields.outline()])
+        arc = rigid_arc(scene, fields.delta if displaced else 0.0, factor)
+        axes.add_collection(LineCollection([*lines, *([arc] if scene.pin.rigid else [])], **style), autolim=False)
+    if scene.pin.rigid:
+        axes.fill(*np.concatenate([arc, [[0.0, arc[-1, 1]]]]).T, color="0.85", zorder=0)
+        axes.text(0.35 * R, arc[-1, 1] - 0.35 * R, "rigid pin", ha="center")
 
 
 def iterations_panel(axes: Any, run: Run) -> None:

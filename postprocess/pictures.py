@@ -20,6 +20,7 @@ from archord.report.figure import new_figure, save
 from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
 _LEGEND_WIDTH = 190  # characters
@@ -79,17 +80,23 @@ def draw_run(run: Run, folder: Path) -> tuple[list[Path], list[str]]:
 
 @dataclass(frozen=True)
 class Shades:
-    """What the colours of many runs mean: a value for each of them."""
+    """What the colours of many runs mean: a value for each of them, and its name, if it is worth a bar of colours."""
 
     label: str
     values: list[float]
 
-    def norm(self) -> Any:
+    def norm(self) -> Normalize:
         """From values to the range of colours; logarithmic where they span decades."""
         from matplotlib.colors import LogNorm, Normalize
 
         low, high = min(self.values), max(self.values)
         return LogNorm(low, high) if low > 0 and high > 30 * low else Normalize(low, high)
+
+    def colours(self) -> list:
+        """A colour for each value."""
+        from matplotlib import colormaps
+
+        return list(colormaps["viridis"](self.norm()(np.array(self.values))))
 
 
 def draw_comparison(
@@ -109,11 +116,13 @@ def draw_comparison(
     curves below each other can be seen. Raises `InputError` if the file cannot be written or a run's contact cannot be
     read.
     """
+    if shades is None and len(runs) > _FEW:
+        shades = Shades("", [float(k) for k in range(len(runs))])
     figure = new_figure(15, 4.6 * (absolute + dimensionless))
     rows = figure.subplots(absolute + dimensionless, 3, squeeze=False)
     for relative, axes in zip([False] * absolute + [True] * dimensionless, rows, strict=True):
         _row(axes, runs, names, relative, shades, dashed)
-    if shades is None and len(runs) <= _FEW:
+    if shades is None:
         columns = max(1, min(len(runs), _LEGEND_WIDTH // (max(map(len, names)) + 8)))
         figure.legend(*rows[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=columns, frameon=False)
     return save_figure(figure, target)
@@ -123,15 +132,15 @@ def _row(
     axes: Sequence[Any], runs: Sequence[Run], names: Sequence[str], relative: bool, shades: Shades | None, dashed: bool
 ) -> None:
     force, pressure, angle = axes
-    units, many = runs[0].scene.units, shades is not None or len(runs) > _FEW
-    colours = _colours(len(runs), shades)
+    units = runs[0].scene.units
+    colours = shades.colours() if shades else [f"C{k}" for k in range(len(runs))]
     curves = [run.curve for run in runs]
     rising = [scaled(curve.first_loading(), "delta", relative) for curve in curves]
     last = min(float(load.max()) for load in rising)
     for k, (run, curve, name) in enumerate(zip(runs, curves, names, strict=True)):
-        style = {"color": colours[k], "lw": 1.3, "ls": "--" if dashed and k > 0 and not many else "-", "label": name}
+        style = {"color": colours[k], "lw": 1.3, "ls": "--" if dashed and k > 0 and not shades else "-", "label": name}
         load, P = (scaled(curve, quantity, relative) for quantity in ("delta", "P"))
-        force.plot([0, *load], [0, *P], marker="" if many else ".", ms=4, **style)
+        force.plot([0, *load], [0, *P], marker="" if shades else ".", ms=4, **style)
         angle.plot(load, np.degrees(curve.eps), **style)
         phi, p = _pressure_at(run, rising[k], last)
         stress = curve.E_star * abs(curve.dR) / curve.R if relative else 1.0
@@ -145,7 +154,7 @@ def _row(
     angle.set(xlabel=x, ylabel="contact semi-angle [°]", title="contact angle", ylim=(0, None))
     for one in axes:
         one.grid(alpha=0.3)
-    if shades is not None:
+    if shades and shades.label:
         from matplotlib.cm import ScalarMappable
 
         angle.get_figure().colorbar(ScalarMappable(shades.norm(), "viridis"), ax=angle, label=shades.label)
@@ -160,15 +169,6 @@ def _pressure_at(run: Run, load: Array, wanted: float) -> tuple[Array, Array]:
     (phi, p), (_, q) = (run.arc(k + 1).facet_means() for k in (above, below))
     share = 0.0 if above == below else np.clip((load[above] - wanted) / (load[above] - load[below]), 0.0, 1.0)
     return phi, p + share * (q - p)
-
-
-def _colours(n: int, shades: Shades | None) -> list:
-    """Colours of ``n`` runs: shades, or one of its own for each."""
-    from matplotlib import colormaps
-
-    if shades is not None:
-        return [colormaps["viridis"](value) for value in shades.norm()(np.array(shades.values))]
-    return [f"C{k}" for k in range(n)] if n <= _FEW else [colormaps["viridis"](k / (n - 1)) for k in range(n)]
 
 
 def draw_sweep(sweep: Sweep, target: Path) -> tuple[Path, str]:
