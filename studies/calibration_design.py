@@ -27,7 +27,7 @@ _DIGITS = 6
 _HEAD = """\
 # The joints to which the law of archord law calibrated is fitted, printed by
 #     python3 -m archord.studies.calibration_design > scenes/calibration.sweep.toml
-# Solve them, and fit the law anew (docs/calibration.md):
+# Solve them, and fit the law again (docs/calibration.md):
 #     mpirun -n 2 archord sweep scenes/calibration.sweep.toml
 #     archord fit runs/calibration --law postprocess/laws/calibrated_law.json --csv postprocess/laws/calibrated_rows.csv
 """

@@ -62,7 +62,7 @@ def report_of(folder: Path) -> dict[str, Any]:
     return report if isinstance(report, dict) else {}
 
 
-def standing(folder: Path, report: dict[str, Any] | None = None) -> Result:
+def result_of(folder: Path, report: dict[str, Any] | None = None) -> Result:
     """What the run folder of a case says about it; ``report`` is its run.json, if it was read already."""
     try:
         first = (folder / FAILURE).read_text(encoding="utf-8").partition("\n")[0]
@@ -95,16 +95,16 @@ def solve_case(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[]
     return replace(
         found,
         seconds=time.perf_counter() - begun,
-        steps=standing(folder).steps if comm.rank == 0 else 0,
+        steps=result_of(folder).steps if comm.rank == 0 else 0,
         meshes=MESHES.made - made,
         reused=MESHES.reused - reused,
     )
 
 
 def _solve(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int]) -> Result:
-    for anew in (False, True):
+    for from_start in (False, True):
         try:
-            return _attempt(scene, folder, comm, received, anew=anew)
+            return _attempt(scene, folder, comm, received, from_start=from_start)
         except Interrupted as interrupted:
             return Result(folder.name, "interrupted", str(interrupted), signal=interrupted.number)
         except InputError as error:
@@ -117,8 +117,8 @@ def _solve(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], in
     return _failed(folder, comm, fault)
 
 
-def _attempt(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int], *, anew: bool) -> Result:
-    """Solve, from the beginning if ``anew``. Raises whatever went wrong."""
+def _attempt(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int], *, from_start: bool) -> Result:
+    """Solve, from the beginning if ``from_start``. Raises whatever went wrong."""
     from archord.output.ranks import agreed
     from archord.studies.accuracy import solve_as_asked
 
@@ -128,20 +128,20 @@ def _attempt(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], 
             raise Interrupted(number)
 
     # what is there of a scene that asks for an accuracy is one of its meshes: it cannot be continued
-    plan = agreed(comm, lambda: _plan(scene, folder, anew or scene.analysis.accuracy is not None))
+    plan = agreed(comm, lambda: _plan(scene, folder, from_start or scene.analysis.accuracy is not None))
     if plan is not None and plan.finished:
         return Result(folder.name, "done")
     outcome = solve_as_asked(scene, folder, comm, start=plan.start if plan else None, on_start=check, on_step=check)
     return Result(folder.name, outcome.status, outcome.message, signal=outcome.signal)
 
 
-def _plan(scene: Scene, folder: Path, anew: bool) -> Plan | None:
+def _plan(scene: Scene, folder: Path, from_start: bool) -> Plan | None:
     """Make the folder ready; how its run goes on, None if from the beginning."""
     from archord.output.restart import plan_restart
 
     claim_folder(folder, force=True)
     (folder / FAILURE).unlink(missing_ok=True)
-    return None if anew else plan_restart(folder, scene)
+    return None if from_start else plan_restart(folder, scene)
 
 
 def _failed(folder: Path, comm: MPI.Comm, error: Exception) -> Result:

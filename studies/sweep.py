@@ -12,7 +12,7 @@ from archord.output.disk import replace_file
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.studies import tables
-from archord.studies.case_run import Result, report_of, standing
+from archord.studies.case_run import Result, report_of, result_of
 from archord.studies.cases import Case, Sweep, read_sweep
 from archord.studies.sweep_file import SweepFile
 from archord.studies.tables import CASES, Tables, of_case
@@ -112,7 +112,7 @@ def open_jobs(sweep: Sweep, folder: Path, share: Share, *, retry: bool) -> tuple
     ended, jobs = [], []
     for case in share.of(sweep.distinct):
         run = of_case(case, folder)
-        result = standing(run)
+        result = result_of(run)
         if case.scene.analysis.accuracy is not None and result.status == "done" and "accuracy" not in report_of(run):
             result = replace(result, status="open", steps=0)  # killed between two meshes
         if result.status == "done" or (result.ended and not retry):

@@ -30,7 +30,7 @@ from archord.postprocess.laws.study import (
 )
 from archord.report.table import Table
 from archord.scene.errors import InputError
-from archord.studies.case_run import report_of, standing
+from archord.studies.case_run import report_of, result_of
 from archord.studies.cases import Case, read_sweep
 from archord.studies.tables import entry, heading, of_case
 
@@ -168,7 +168,7 @@ def _shown(value: Any) -> str:
 def _run(case: Case, folder: Path) -> RunCurve:
     """The curve of a ``case``. Raises `InputError` if it is not solved, or its joint has no such law."""
     run = of_case(case, folder)
-    status = standing(run)
+    status = result_of(run)
     if status.status not in ("done", "stopped") or not status.steps:
         raise InputError(f"{status.status}: {status.message}" if status.message else status.status)
     if case.scene.joint.model != "block":

@@ -18,7 +18,7 @@ import numpy as np
 from archord.output.disk import replace_file
 from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
-from archord.studies.case_run import Result, report_of, standing
+from archord.studies.case_run import Result, report_of, result_of
 from archord.studies.cases import Case, Sweep
 
 CASES = "cases"  # the folder of all run folders
@@ -46,7 +46,7 @@ def gather(sweep: Sweep, folder: Path, failed: Mapping[str, Result] | None = Non
     for case in sweep.distinct:
         run = folder / CASES / case.run
         report = report_of(run)
-        result = standing(run, report)
+        result = result_of(run, report)
         if not result.ended:
             result = (failed or {}).get(case.run, result)
         found[case.run] = result, report, _history(run)

@@ -57,7 +57,7 @@ def crash_after(step: int):
 
 
 def run(problem, folder, comm=MPI.COMM_SELF, *, crash: int = 0, copies=None):
-    """Solve anew, up to a crash; ``copies`` are folders by step: what a kill after that step would leave."""
+    """Solve up to a crash; ``copies`` are folders by step: what a kill after that step would leave."""
 
     def copy(measures) -> None:
         if comm.rank == 0 and measures.step in (copies or {}):
@@ -288,7 +288,7 @@ def test_a_step_that_only_the_checkpoint_has_is_written(tmp_path):
     same_run(tmp_path / "whole", tmp_path / "before", 1e-12)
 
 
-def test_lost_tables_are_written_anew(halted, tmp_path):
+def test_lost_tables_are_written_again(halted, tmp_path):
     """history.csv and fields.xdmf follow from the other files."""
     run(scene(0.25, 3), tmp_path / "whole")
     folder = halted

@@ -12,7 +12,7 @@ from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.ranks import agreed
 from archord.output.run import solve_scene
-from archord.studies.case_run import report_of, solve_case, standing
+from archord.studies.case_run import report_of, result_of, solve_case
 from archord.studies.cases import read_sweep
 from archord.studies.farm import Farm, Job, suited
 from archord.studies.sweep import Share, open_jobs
@@ -94,11 +94,11 @@ def test_a_signal_ends_the_batch_on_all_ranks(comm, tmp_path):
     assert signal.getsignal(signal.SIGTERM) == before
     if comm.rank == 0:
         assert "interrupted" in {result.status for result in results} or len(results) < len(jobs)
-        assert any(standing(job.folder).status != "done" for job in jobs)
-    rest = agreed(comm, lambda: [job for job in jobs if standing(job.folder).status != "done"])
+        assert any(result_of(job.folder).status != "done" for job in jobs)
+    rest = agreed(comm, lambda: [job for job in jobs if result_of(job.folder).status != "done"])
     assert Farm(comm).run(rest, lambda result: None) == 0
     if comm.rank == 0:
-        assert {standing(job.folder).status for job in jobs} == {"done"}
+        assert {result_of(job.folder).status for job in jobs} == {"done"}
 
 
 @pytest.mark.mpi
@@ -120,7 +120,7 @@ def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
     if comm.rank == 0:
         by_run = {result.run: result for result in results}
         assert [by_run[job.folder.name].status for job in jobs] == 3 * ["failed"] + 3 * ["done"]
-        assert [standing(job.folder).message for job in jobs] == 3 * ["ValueError: broken"] + 3 * [""]
+        assert [result_of(job.folder).message for job in jobs] == 3 * ["ValueError: broken"] + 3 * [""]
 
 
 def test_a_farm_keeps_meshes_only_while_it_works(comm, tmp_path):

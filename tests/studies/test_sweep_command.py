@@ -10,7 +10,7 @@ import pytest
 from archord.cli import run
 from archord.output.history import read_history
 from archord.postprocess.curve import read_run
-from archord.studies.case_run import standing
+from archord.studies.case_run import result_of
 from archord.studies.cases import read_sweep
 from tests.studies.parts import SOFT, STUCK, numbers, sweep, table, times, written
 
@@ -163,7 +163,7 @@ def test_an_error_is_kept_with_its_traceback(tmp_path, monkeypatch, capsys):
     assert "in broken" in (run_folder / "failure.txt").read_text()
     monkeypatch.undo()
     assert sweep(file, "-o", tmp_path / "out", "--retry", "-q") == 0
-    assert standing(run_folder).status == "done"
+    assert result_of(run_folder).status == "done"
     assert not (run_folder / "failure.txt").exists()
 
 
