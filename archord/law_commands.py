@@ -219,7 +219,8 @@ def fit(
     from archord.output.user_file import check_target, writing
     from archord.postprocess.curve import read_run
     from archord.postprocess.laws import fit_report
-    from archord.postprocess.laws.calibration import PYTHON_BEGINS, calibrate
+    from archord.postprocess.laws.calibration import calibrate
+    from archord.postprocess.laws.fitted_law import PYTHON_BEGINS
 
     runs = [read_run(folder).loading() for folder in folders]
     calibration = calibrate(runs, deltas, confidence, hold_k)

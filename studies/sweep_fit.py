@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import archord
 from archord.output.user_file import check_target, writing
-from archord.postprocess.convergence import group
+from archord.postprocess.convergence import Refined, group
 from archord.postprocess.curve import RunCurve, read_run
 from archord.postprocess.laws import study_report
 from archord.postprocess.laws.calibrated import JSON_BEGINS, CalibratedModel, shipped_model
+from archord.postprocess.laws.calibration import fit_plateau
+from archord.postprocess.laws.curve_fit import fit_curve
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.study import (
     CSV_BEGINS,
     Cases,
     Study,
     TooFewError,
-    fit_case,
     read_cases,
     rounded,
     shipped_rows,
@@ -159,6 +161,40 @@ def _solved(
               for key in design.keys}  # fmt: skip
     table = study_report.case_table([case.number for case, _ in fitted], cases, varied)
     return cases, table, _notes(folder, design.distinct, cases), left_out
+
+
+def fit_case(refined: Refined, load_range: tuple[float, float], confidence: float, name: str) -> dict[str, Any]:
+    """Fit k and c to P(delta) of a joint, over ``load_range`` in clearances: a case called ``name``.
+
+    Raises `InputError` where the range or the steps do not allow a fit.
+    """
+    run = refined.run
+    force = fit_curve("P", [refined], load_range, confidence)
+    plateau = fit_plateau(force, [refined], load_range, confidence)
+    pin, block, k, c = run.scene.pin, run.scene.block, force.k, force.c
+    case = {
+        "run": name,
+        "plane": run.plane,
+        "yielding": "none" if run.sigY is None else LawJoint.from_scene(run.scene).yielding,
+        "ratio": math.inf if pin.E is None else pin.E / block.E,
+        "pin_nu": pin.nu,
+        "nu": block.nu,
+        "clearance": run.dR / run.R,
+        "strength": math.inf if run.sigY is None else run.sigY / run.E_star,
+        "mesh": run.scene.joint.h / run.R,
+        "k": k and k.value,
+        "k_error": k and k.standard_error,
+        "k_mesh": k and k.discretisation_error,
+        "c": c and c.value,
+        "c_error": c and c.standard_error,
+        "c_mesh": c and c.discretisation_error,
+        "plateau": plateau and plateau.c and plateau.c.value,
+        "rms": force.rms,
+        "largest": force.largest,
+        "load": force.residuals[0].load,
+        "P": force.residuals[0].data,
+    }
+    return {column: math.nan if value is None else value for column, value in case.items()}
 
 
 def _shown(value: Any) -> str:

@@ -1,23 +1,19 @@
-"""Calibration of the plastic-Winkler law on runs, each alone and all together, and the law of a joint that it gives:
-P(delta) for use elsewhere, as an object, as JSON and as plain Python."""
+"""Calibration of the plastic-Winkler law on runs, each alone and all together: fits to P and p0, and the plateau of the
+contact pressure, which is measured."""
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
-from string import Template
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from archord.postprocess.arc import plateau_pressure
 from archord.postprocess.convergence import Refined, group
 from archord.postprocess.curve import RunCurve
-from archord.postprocess.laws.chord_laws import plastic_force, plastic_stiffness
-from archord.postprocess.laws.curve_fit import CurveFit, fit_curve, fit_plateau
-from archord.postprocess.laws.joint import Array, LawJoint
-from archord.postprocess.laws.law import monotone_root
+from archord.postprocess.laws.curve_fit import CurveFit, Residual, fit, fit_curve, joint_of, selected
+from archord.postprocess.laws.fitted_law import FittedLaw
+from archord.postprocess.laws.joint import LawJoint
 from archord.scene.errors import InputError
 
 _LIKE = 0.01  # share of P by which the blocks of runs of one fit may change it
@@ -147,6 +143,45 @@ def _fits(
     return Fits(tuple(g.run for g in groups), force, peak, plateau, finer)
 
 
+def fit_plateau(
+    force: CurveFit, groups: list[Refined], load_range: tuple[float, float], confidence: float
+) -> CurveFit | None:
+    """Mean of (median pressure)/sigY over the steps whose plateau, by the fit to P, covers half of the chord.
+
+    That is where ``s = sqrt(1 - delta0/delta) > 1/2``, ``delta > 4/3 delta0``. None with fewer than two such steps.
+    """
+    if force.k is None or force.c is None:
+        return None
+    residuals, shifted, flat, orders = [], [], [], []
+    for g in groups:
+        run = g.run
+        if run.sigY is None or run.folder is None:
+            continue
+        wide = run.delta > 4 / 3 * joint_of(run, force.k.value, force.c.value).first_yield
+        rows = selected(run, load_range) & wide
+        if not rows.any():
+            continue
+        median, flatness = plateau_pressure(run)
+        values = median[rows] / run.sigY
+        shift = np.zeros(len(values))
+        if g.coarser:
+            curves = [median, *(plateau_pressure(coarse)[0] for coarse in g.coarser)]
+            shift = g.shift(curves)[rows] / run.sigY
+            orders.append((run.name, g.order(curves)))
+        residuals.append(Residual(run.name, run.delta[rows] / run.dR, values, values))
+        shifted.append(values + shift)
+        flat.append(flatness[rows])
+    if sum(len(r.data) for r in residuals) < 2:
+        return None
+    data = np.concatenate([r.data for r in residuals])
+    mean = fit(lambda v: np.full(len(data), v[0]), [[float(data.mean())]], data)
+    error = abs(float(np.concatenate(shifted).mean() - data.mean())) if orders else None
+    residuals = [Residual(r.name, r.load, r.data, np.full(len(r.data), mean.parameters[0])) for r in residuals]
+    flats = np.concatenate(flat)
+    c, limits = mean.estimate(0, confidence, error), (float(flats.min()), float(flats.max()))
+    return CurveFit("plateau", None, c, mean.r2, mean.dof, tuple(residuals), len(orders), limits, tuple(orders))
+
+
 def winkler_coefficients(runs: Iterable[RunCurve]) -> dict[str, float]:
     """Winkler's k from P(delta) by the name of the run folder, of runs that have not yielded: the fit of those takes
     milliseconds."""
@@ -160,150 +195,3 @@ def winkler_coefficients(runs: Iterable[RunCurve]) -> dict[str, float]:
             if k is not None:
                 found[run.folder.name] = k.value
     return found
-
-
-@dataclass(frozen=True)
-class FittedLaw:
-    """Plastic-Winkler law of one joint (Hu et al., eqs. 9 to 12 with the threshold ``c sigY``).
-
-    ``c`` and ``sigY`` are None for an elastic law. ``k_error`` and ``c_error`` are standard errors with the mesh's
-    error in quadrature (``c_error`` may be None). ``fitted_range`` is the range of ``delta/dR`` of the fit; outside it
-    the law extrapolates. Lengths, stresses and forces per unit thickness in the named units. Raises ValueError for
-    values that no joint has.
-    """
-
-    k: float
-    E_star: float
-    R: float
-    dR: float
-    k_error: float
-    c: float | None = None
-    sigY: float | None = None
-    c_error: float | None = None
-    fitted_range: tuple[float, float] = (0.0, 0.0)
-    plane: str = "strain"
-    length_unit: str = "mm"
-    force_unit: str = "N/mm"
-    fitted_to: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        for name in ("k", "E_star", "R", "dR", "c", "sigY"):
-            value = getattr(self, name)
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not (number and 0 < value < math.inf) and not (value is None and name in ("c", "sigY")):
-                raise ValueError(f"law: {name} = {value!r} must be a number greater than 0.")
-        if (self.c is None) != (self.sigY is None):
-            raise ValueError("law: c and sigY belong together; give both or none.")
-
-    @property
-    def onset(self) -> float | None:
-        """Displacement ``delta0 = c sigY R/(k E*)`` at which the plateau begins; None for an elastic law."""
-        return None if self.c is None else self.joint.first_yield
-
-    @property
-    def joint(self) -> LawJoint:
-        """The joint with the law's coefficients, as the closed-form laws take it."""
-        return LawJoint(self.R, self.dR, self.E_star, self.sigY, k=self.k, c=self.c or 1.0)
-
-    def force(self, delta: ArrayLike) -> Array:
-        """Force per unit thickness of the whole joint at ``delta`` (any shape); 0 where ``delta <= 0``."""
-        return plastic_force(self.joint, np.maximum(delta, 0.0))
-
-    def stiffness(self, delta: ArrayLike) -> Array:
-        """``dP/d(delta)`` of `force` (any shape); 0 where ``delta <= 0``."""
-        return plastic_stiffness(self.joint, np.maximum(delta, 0.0))
-
-    def displacement(self, force: ArrayLike) -> Array:
-        """The inverse of `force` (any shape): 0 where ``force <= 0``, nan where no displacement brings so much.
-
-        The plastic law's force stays below ``2 sqrt(2) c sigY R``, twice the threshold on the longest chord.
-        """
-        joint = self.joint
-        return monotone_root(
-            lambda x: plastic_force(joint, x), lambda x: plastic_stiffness(joint, x), np.asarray(force, float), self.dR
-        )
-
-    def to_json(self) -> str:
-        """The law as a JSON object; `from_json` gives it back, digit for digit."""
-        return json.dumps(asdict(self), indent=2, ensure_ascii=False)
-
-    @classmethod
-    def from_json(cls, text: str) -> FittedLaw:
-        """The law in ``text``, written by `to_json` or by ``archord fit --json``. Raises ValueError."""
-        try:
-            data = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise ValueError(f"law: is not valid JSON: {error}.") from None
-        if isinstance(data, dict) and isinstance(data.get("law"), dict):
-            data = data["law"]
-        known = {field.name for field in fields(cls)}
-        if not isinstance(data, dict) or not {"k", "E_star", "R", "dR", "k_error"} <= data.keys() <= known:
-            raise ValueError(f"law: must be a JSON object with keys out of {', '.join(sorted(known))}.")
-        for name in ("fitted_range", "fitted_to"):
-            if name in data:
-                data[name] = tuple(data[name])
-        return cls(**data)
-
-    def to_python(self) -> str:
-        """Source of a Python module with ``force(delta)`` and ``stiffness(delta)``, which needs only ``math``."""
-        low, high = self.fitted_range
-        numbers = {name: getattr(self, name) for name in ("k", "c", "sigY", "E_star", "R", "dR")}
-        values = {name: "math.inf" if value is None else repr(float(value)) for name, value in numbers.items()}
-        values |= {
-            "note": "plastic-Winkler law" if self.c is not None else "Winkler law",
-            "k_error": f"{self.k_error:.2g}",
-            "c_comment": "no yield" if self.c is None else f"standard error {self.c_error or 0.0:.2g}",
-            "range": f"{low:g} to {high:g}",
-            "units": json.dumps(f"{self.length_unit}; force per unit thickness: {self.force_unit}"),
-            "sources": json.dumps(", ".join(self.fitted_to)),
-            "plane": self.plane,
-        }
-        return _MODULE.substitute(values)
-
-
-PYTHON_BEGINS = '"""Force of a pin joint over its displacement: '  # by which a module of `to_python` is known
-
-_MODULE = Template('''"""Force of a pin joint over its displacement: $note, calibrated by archord fit."""
-
-# runs: $sources, plane $plane
-# valid for delta from $range clearances dR
-# length: $units
-
-import math
-
-K = $k  # foundation stiffness, standard error $k_error
-C = $c  # plateau pressure over yield stress, $c_comment
-E_STAR = $E_star  # contact modulus
-R = $R  # radius of the pin
-DR = $dR  # clearance
-SIG_Y = $sigY  # yield stress
-
-
-def force(delta, k=K, c=C, e_star=E_STAR, r=R, dr=DR, sig_y=SIG_Y):
-    """Force per unit thickness at the displacement delta from first touch; 0 while the joint is open."""
-    if delta <= 0.0:
-        return 0.0
-    chord = r * math.sqrt(2.0 * delta / (dr + delta))
-    peak, threshold = k * e_star * delta / r, c * sig_y
-    if peak <= threshold:
-        return 4.0 / 3.0 * peak * chord
-    u = threshold / peak
-    s = math.sqrt(1.0 - u)
-    return 2.0 * threshold * chord * (s + u * (2.0 + s) / (3.0 * (1.0 + s) ** 2))
-
-
-def stiffness(delta, k=K, c=C, e_star=E_STAR, r=R, dr=DR, sig_y=SIG_Y):
-    """Derivative of force; 0 while the joint is open."""
-    if delta <= 0.0:
-        return 0.0
-    chord = r * math.sqrt(2.0 * delta / (dr + delta))
-    peak, threshold = k * e_star * delta / r, c * sig_y
-    longer = dr / (2.0 * (dr + delta))
-    if peak <= threshold:
-        return 4.0 / 3.0 * k * e_star / r * chord * (1.0 + longer)
-    u = threshold / peak
-    s = math.sqrt(1.0 - u)
-    flank = u * (2.0 + s) / (3.0 * (1.0 + s) ** 2)
-    return 2.0 * threshold * chord / delta * (flank + (flank + s) * longer)
-''')

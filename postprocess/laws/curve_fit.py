@@ -1,8 +1,7 @@
 """Least-squares fits of the plastic-Winkler law to P(delta) or p0(delta) of one or more runs, with errors of k and c.
 
 Every curve is fitted in the form that depends on ``delta/dR`` alone where the joint is elastic, ``P/(E* dR)`` and ``p0
-R/(E* dR)``, so runs of different clearance weigh alike and units do not matter. The plateau of a yielding joint's
-pressure is measured, not fitted.
+R/(E* dR)``, so runs of different clearance weigh alike and units do not matter.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from archord.postprocess.arc import plateau_pressure
 from archord.postprocess.convergence import Order, Refined
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.chord_laws import plastic_force, plastic_peak
@@ -275,42 +273,3 @@ def selected(run: RunCurve, load_range: tuple[float, float]) -> Array:
 def _scale(quantity: str, run: RunCurve) -> float:
     """What makes a quantity dimensionless."""
     return {"P": run.E_star * run.dR, "p0": run.E_star * run.dR / run.R}[quantity]
-
-
-def fit_plateau(
-    force: CurveFit, groups: list[Refined], load_range: tuple[float, float], confidence: float
-) -> CurveFit | None:
-    """Mean of (median pressure)/sigY over the steps whose plateau, by the fit to P, covers half of the chord.
-
-    That is where ``s = sqrt(1 - delta0/delta) > 1/2``, ``delta > 4/3 delta0``. None with fewer than two such steps.
-    """
-    if force.k is None or force.c is None:
-        return None
-    residuals, shifted, flat, orders = [], [], [], []
-    for g in groups:
-        run = g.run
-        if run.sigY is None or run.folder is None:
-            continue
-        wide = run.delta > 4 / 3 * joint_of(run, force.k.value, force.c.value).first_yield
-        rows = selected(run, load_range) & wide
-        if not rows.any():
-            continue
-        median, flatness = plateau_pressure(run)
-        values = median[rows] / run.sigY
-        shift = np.zeros(len(values))
-        if g.coarser:
-            curves = [median, *(plateau_pressure(coarse)[0] for coarse in g.coarser)]
-            shift = g.shift(curves)[rows] / run.sigY
-            orders.append((run.name, g.order(curves)))
-        residuals.append(Residual(run.name, run.delta[rows] / run.dR, values, values))
-        shifted.append(values + shift)
-        flat.append(flatness[rows])
-    if sum(len(r.data) for r in residuals) < 2:
-        return None
-    data = np.concatenate([r.data for r in residuals])
-    mean = fit(lambda v: np.full(len(data), v[0]), [[float(data.mean())]], data)
-    error = abs(float(np.concatenate(shifted).mean() - data.mean())) if orders else None
-    residuals = [Residual(r.name, r.load, r.data, np.full(len(r.data), mean.parameters[0])) for r in residuals]
-    flats = np.concatenate(flat)
-    c, limits = mean.estimate(0, confidence, error), (float(flats.min()), float(flats.max()))
-    return CurveFit("plateau", None, c, mean.r2, mean.dof, tuple(residuals), len(orders), limits, tuple(orders))

@@ -19,7 +19,6 @@ import pandas as pd
 from scipy.optimize import least_squares
 
 from archord.output.user_file import writing
-from archord.postprocess.convergence import Refined
 from archord.postprocess.laws.calibrated import (
     SOFT,
     SOFT_WORDS,
@@ -31,7 +30,6 @@ from archord.postprocess.laws.calibrated import (
     joint_calibrated,
 )
 from archord.postprocess.laws.chord_laws import plastic_force
-from archord.postprocess.laws.curve_fit import fit_curve, fit_plateau
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.scene.errors import InputError
 
@@ -86,42 +84,6 @@ SIMPLER = (  # to compare with
     form("and k by nu and s", "p q pm qn", "1", "1 x", "1 x"),
     form("and c by alpha and nu", "p q pm qn", "1", "1 x p pm qn", "1 pm n"),
 )
-
-
-def fit_case(
-    refined: Refined, load_range: tuple[float, float] = (0.0, np.inf), confidence: float = 0.95, name: str = ""
-) -> dict[str, Any]:
-    """Fit k and c to P(delta) of a joint, over ``load_range`` in clearances: a case called ``name`` [the run folder's].
-
-    Raises `InputError` where the range or the steps do not allow a fit.
-    """
-    run = refined.run
-    force = fit_curve("P", [refined], load_range, confidence)
-    plateau = fit_plateau(force, [refined], load_range, confidence)
-    pin, block, k, c = run.scene.pin, run.scene.block, force.k, force.c
-    case = {
-        "run": name or run.name,
-        "plane": run.plane,
-        "yielding": "none" if run.sigY is None else LawJoint.from_scene(run.scene).yielding,
-        "ratio": math.inf if pin.E is None else pin.E / block.E,
-        "pin_nu": pin.nu,
-        "nu": block.nu,
-        "clearance": run.dR / run.R,
-        "strength": math.inf if run.sigY is None else run.sigY / run.E_star,
-        "mesh": run.scene.joint.h / run.R,
-        "k": k and k.value,
-        "k_error": k and k.standard_error,
-        "k_mesh": k and k.discretisation_error,
-        "c": c and c.value,
-        "c_error": c and c.standard_error,
-        "c_mesh": c and c.discretisation_error,
-        "plateau": plateau and plateau.c and plateau.c.value,
-        "rms": force.rms,
-        "largest": force.largest,
-        "load": force.residuals[0].load,
-        "P": force.residuals[0].data,
-    }
-    return {column: math.nan if value is None else value for column, value in case.items()}
 
 
 def table_of(cases: Iterable[dict[str, Any]]) -> Cases:

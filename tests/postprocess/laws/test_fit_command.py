@@ -8,7 +8,7 @@ import pytest
 
 from archord.cli import run
 from archord.postprocess.curve import read_run
-from archord.postprocess.laws.calibration import FittedLaw
+from archord.postprocess.laws.fitted_law import FittedLaw
 from tests.postprocess.synthetic import curve
 
 

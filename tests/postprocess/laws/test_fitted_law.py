@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from archord.postprocess.laws.calibration import FittedLaw
 from archord.postprocess.laws.chord_laws import plastic_force
+from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.joint import LawJoint
 
 ELASTIC = FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, fitted_range=(0.1, 2.0))
