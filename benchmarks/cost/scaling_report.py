@@ -149,7 +149,7 @@ def _cost(series: list[Cost]) -> str:
                 "power of N since the line before")  # fmt: skip
     text, dofs = _table(headings, rows), [c.dofs for c in series]
     if len(series) > 1:
-        grown = {
+        grown: dict[str, Sequence[float]] = {
             "time": [c.total for c in series],
             "linear solve": [c.seconds["linear solve"] for c in series],
             "one factorisation": [c.each_factor for c in series],

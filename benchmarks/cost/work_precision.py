@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import cast
 
 import numpy as np
 
-from archord.benchmarks.case import Case, paper_joint
-from archord.benchmarks.cost.work_precision_cases import edged
+from archord.benchmarks.case import Case
+from archord.benchmarks.cost.work_precision_cases import CASES, edged
 from archord.benchmarks.cost.work_precision_codes import CALCULIX, Task, Values
 from archord.benchmarks.cost.work_precision_reference import Reference, profile_error, read_reference
 from archord.benchmarks.timing import Timing
@@ -135,8 +135,8 @@ def warm_curves() -> list[Case]:
     """Curves up to 2 dR, on the meshes that are good for 1e-4 (elastic) and 3e-4 (plastic) in P."""
     elastic, plastic = edged("elastic", 0.16, growth=0.5, degree=3)[0], edged("plastic", 0.1, growth=0.3)[0]
     return [
-        Case("elastic, 8 steps", paper_joint(steps=8, **elastic)),
-        Case("elasto-plastic, sigY/E* = 0.2 %, 20 steps", paper_joint(steps=20, yield_stress=0.002, **plastic)),
+        Case("elastic, 8 steps", replace(CASES["elastic"], steps=8).scene(elastic)),
+        Case("elasto-plastic, sigY/E* = 0.2 %, 20 steps", CASES["plastic"].scene(plastic)),
     ]
 
 

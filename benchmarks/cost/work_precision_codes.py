@@ -107,8 +107,11 @@ def _task(case: JointCase, code: str, series: str, size: float, folder: Path) ->
     label = f"{size:g} R"
     place = (folder / slug(f"{case.name} {code} {series} {label}")).resolve()
     place.mkdir(parents=True, exist_ok=True)
-    named = {"case": case.name, "code": code, "series": series, "label": label, "size": size, "steps": case.steps}
-    return Task((), place, core=last_core(), kind=(code, case.name, series), **named)
+    kind = (code, case.name, series)
+    return Task(
+        (), place, core=last_core(), kind=kind, case=case.name, code=code, series=series, label=label, size=size,
+        steps=case.steps,
+    )  # fmt: skip
 
 
 def _archord_task(case: JointCase, series: Series, mesh: Mesh, folder: Path, limit: float) -> Task:

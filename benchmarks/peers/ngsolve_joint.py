@@ -30,7 +30,8 @@ TOLERANCE, FAR = 1e-8, 1e3  # residuals over the reaction
 def mesh_joint(size: float, growth: float, order: int):
     """Pin and block, their edges named "arc", "top" and "axis" behind the body's name."""
 
-    def body(name: str, y: float, radius: float, outer: list):
+    def body(name: str, circle: tuple[float, float], outer: list):
+        y, radius = circle
         place = [occ.gp_Pnt(*p, 0) for p in ((0, y - radius), (radius, y), *outer)]
         half = occ.gp_Pnt(radius * math.sqrt(0.5), y - radius * math.sqrt(0.5), 0)
         lines = [occ.Segment(a, b) for a, b in zip(place[1:], place[2:] + place[:1], strict=True)]
@@ -46,8 +47,8 @@ def mesh_joint(size: float, growth: float, order: int):
                 edge.name = f"{name}_axis"
         return face
 
-    pin = body("pin", *PIN, [(0, -DR)])
-    block = body("block", *BLOCK, [(WIDTH, 0), (WIDTH, -WIDTH), (0, -WIDTH)])
+    pin = body("pin", PIN, [(0, -DR)])
+    block = body("block", BLOCK, [(WIDTH, 0), (WIDTH, -WIDTH), (0, -WIDTH)])
     geometry = occ.OCCGeometry(occ.Compound([pin, block]), dim=2)
     grading = growth if order > 2 else 0.6 * growth
     mesh = ng.Mesh(geometry.GenerateMesh(maxh=WIDTH, grading=grading, segmentsperedge=1, curvaturesafety=0.1))
