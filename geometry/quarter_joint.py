@@ -40,7 +40,8 @@ def quarter_joint(
     hole, width, size = 1.0 + clearance / radius, block_size / radius, coarsening * element_size / radius
 
     def draw(geo) -> tuple[dict, dict, dict]:
-        faces, curves = {}, {facet: [] for facet in Facets}
+        faces: dict[Cells, int] = {}
+        curves: dict[Facets, list[int]] = {facet: [] for facet in Facets}
 
         def arc_with(line: int, size: float) -> int:
             if edge is None:

@@ -16,12 +16,9 @@ from archord.materials.return_map import PlasticState, radial_return, return_map
 class J2Material(Elastic):
     """Elastic-plastic solid: `Elastic` below the von Mises stress that its ``hardening`` gives."""
 
-    hardening: Hardening
+    yields = True
 
-    @property
-    def yields(self) -> bool:
-        """Yes."""
-        return True
+    hardening: Hardening
 
     def elastic(self) -> Material:
         """The solid with a yield stress out of reach."""

@@ -7,7 +7,7 @@ whose first axis is that of the points, which is how checkpoints store it.
 
 from __future__ import annotations
 
-from typing import Any, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,12 @@ State = Any
 
 class Material(Protocol):
     """A constitutive law in the plane; every method is a pure function. What it does not define is that of a material
-    without history, to inherit."""
+    without history, to inherit.
+
+    One that ``yields`` can leave its elastic tangent; a body that cannot is assembled once.
+    """
+
+    yields: ClassVar[bool] = False
 
     @property
     def elastic_tangent(self) -> Array:
@@ -37,11 +42,6 @@ class Material(Protocol):
     def energy(self, stress: Array) -> Array:
         """Elastic energy density ``(n,)`` of stresses ``(n, 4)``."""
         ...
-
-    @property
-    def yields(self) -> bool:
-        """Whether it can ever leave its elastic tangent; a body that cannot is assembled once."""
-        return False
 
     def elastic(self) -> Material:
         """A material with the same states that answers from each as if it could not yield (further)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from archord.materials.material import Array, Material
+from archord.materials.material import Array
 
 
 class Points:
@@ -15,7 +15,7 @@ class Points:
     With ``elastic_only`` set, `update` answers as if the points could not yield (further).
     """
 
-    def __init__(self, material: Material | Any, n: int) -> None:
+    def __init__(self, material: Any, n: int) -> None:
         self.material, self.n = material, n
         self.state = self.trial = material.state(n)
         self.elastic_only = False

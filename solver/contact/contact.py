@@ -115,7 +115,8 @@ class Contact:
 
     def add_force(self, force: Array) -> None:
         """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, 2)`` of owned nodes."""
-        on = {id(surface): np.zeros((len(surface.curve_dofs), 2)) for surface in (*self.surfaces, *self.rigid)}
+        both = [surface for i in self.interactions for surface in i.surfaces]
+        on = {id(surface): np.zeros((len(surface.curve_dofs), 2)) for surface in both}
         for pair in self.pairs:
             pair.add_forces(on[id(pair.surface)], on[id(pair.opposite)])
         for surface in self.surfaces:

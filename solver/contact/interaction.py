@@ -54,25 +54,25 @@ class Interaction:
         slide: float = 0.0,
     ) -> None:
         self.name, self.surfaces, self.gamma_factor = name, list(surfaces), gamma_factor
-        self.bodies = [surface for surface in surfaces if not surface.rigid]
-        self.rigid = [surface for surface in surfaces if surface.rigid]
+        self.bodies = [surface for surface in surfaces if isinstance(surface, Surface)]
+        self.rigid = [surface for surface in surfaces if isinstance(surface, RigidSurface)]
         moves = law.slides and kinematics == "current"
         self.slide = slide if moves else 0.0
-        chosen = [i for i in (0, 1) if not surfaces[i].rigid and integrated in (None, i)]
-        compliance = np.array([1 / surfaces[i].material.elastic_tangent[0, 0] for i in chosen])
+        chosen = [own for own in self.bodies if integrated is None or own is surfaces[integrated]]
+        compliance = np.array([1 / own.material.elastic_tangent[0, 0] for own in chosen])
         self.pairs: list[Pair] = []
         failure = None
-        for i, share in zip(chosen, compliance / compliance.sum(), strict=True):
-            own, opposite = surfaces[i], surfaces[1 - i]
+        for own, share in zip(chosen, compliance / compliance.sum(), strict=True):
+            opposite = surfaces[1] if own is surfaces[0] else surfaces[0]
             try:
-                if not opposite.rigid:
+                if isinstance(opposite, Surface):
                     own.place_points(*segment_rule(own.curve, opposite.curve))
                 self.pairs.append(Pair(own, opposite, law, float(share), moves=moves))
             except ProjectionError as error:
                 failure = str(error)
         if failure := first_failure(self.bodies[0].comm, failure):
             raise ProjectionError(failure)
-        if not moves and not self.rigid and chosen[0] == 0:
+        if not moves and not self.rigid and chosen[0] is surfaces[0]:
             self.pairs[0].use_own_normals()
         self.limit_gamma(gamma_factor)
 

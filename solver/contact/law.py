@@ -9,7 +9,7 @@ where the normal turns to contact_tangent.c.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -19,13 +19,13 @@ State = Any
 
 
 class ContactLaw(Protocol):
-    """A law by its `update`, a pure function; without a history and without friction as it stands."""
+    """A law by its `update`, a pure function; without a history and without friction as it stands.
 
-    @property
-    def slides(self) -> bool:
-        """Whether points slide along the opposite surface. If not, they keep the partners and the distance that they
-        have undeformed, where gap and slip count as zero."""
-        return True
+    Points of a law that ``slides`` move along the opposite surface. Those of others keep the partners and the distance
+    that they have undeformed, where gap and slip count as zero.
+    """
+
+    slides: ClassVar[bool] = True
 
     def state(self, n: int) -> State:
         """History of ``n`` points at the beginning: None, or a dataclass of arrays, as that of a material."""
@@ -56,10 +56,7 @@ class Frictionless(ContactLaw):
 class Tied(ContactLaw):
     """The whole trial traction, whatever its sign: the surfaces stay as they are to each other."""
 
-    @property
-    def slides(self) -> bool:
-        """No."""
-        return False
+    slides = False
 
     def update(self, gap: Array, slip: Array, trial: Array, state: State) -> tuple[Array, Array, State]:
         """The trial traction."""

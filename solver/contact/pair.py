@@ -72,10 +72,12 @@ class Pair:
         self.traction = self._answer(self.trial)
 
     def _pair(self, x: Array, motion: Array) -> None:
-        curve, facet = self.opposite.curve, None if self.start == "anywhere" else self.projection.facet
-        project = curve.continued if self.start == "held" else curve.closest_point
-        self.projection = project(x, self._outward, motion, facet)
-        self.start = "held" if self.start == "held" else "near"
+        curve, facet = self.opposite.curve, self.projection.facet
+        if self.start == "held":
+            self.projection = curve.continued(x, self._outward, motion, facet)
+        else:
+            known = None if self.start == "anywhere" else facet
+            self.projection, self.start = curve.closest_point(x, self._outward, motion, known), "near"
         self.separation = x - self.projection.point
 
     def _answer(self, trial: Array) -> Array:

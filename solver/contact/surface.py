@@ -30,8 +30,6 @@ class Surface:
     ``curve``, its ``n_facets`` and ``curve_dofs``, the global dofs of its nodes, are those of all ranks.
     """
 
-    rigid = False
-
     def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material: Material, name: str = "") -> None:
         mesh = V.mesh
         self.comm = mesh.comm
@@ -166,12 +164,12 @@ class RigidSurface:
     those of the displacement.
     """
 
-    rigid = True
     n_facets = 1
 
     def __init__(self, circle: RigidCircle, rate: Sequence[float] = (0.0, 0.0)) -> None:
         self.curve, self.rate = circle, np.array(rate, dtype=float)
-        self.motion, self.curve_dofs = np.zeros((1, 2)), np.zeros(1, dtype=np.int64)
+        self.motion: Array = np.zeros((1, 2))
+        self.curve_dofs = np.zeros(1, dtype=np.int64)
 
     def neighbours(self, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
         """As those of a `Surface`: there are none."""

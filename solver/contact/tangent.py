@@ -15,6 +15,7 @@ from archord.geometry.basis import Array
 from archord.kernels.compiled import library, pointer, structure
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.sparsity import Reach
+from archord.solver.contact.surface import Surface
 
 _SOURCE = Path(__file__).with_name("contact_tangent.c")
 
@@ -62,7 +63,7 @@ def trial_rate(pair: Pair, u: Array) -> Array:
 
     Points keep their partners, and a rigid opposite stands still. Collective.
     """
-    motion = np.zeros((1, 2)) if pair.opposite.rigid else pair.opposite.curve_displacement(u)
+    motion = pair.opposite.curve_displacement(u) if isinstance(pair.opposite, Surface) else np.zeros((1, 2))
     own, opposite = u[pair.surface.cell_dofs], motion[pair.projection.nodes]
     rate = np.empty_like(pair.trial)
     library(_SOURCE).trial_rate(_points(pair), *map(pointer, (own, opposite, rate)))
