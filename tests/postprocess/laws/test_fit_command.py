@@ -35,7 +35,7 @@ def test_fit_prints_a_table_and_writes_what_is_asked_for(runs, tmp_path, capsys)
 
 
 def test_files_of_others_and_of_runs_stay(runs, tmp_path, capsys):
-    """What fit wrote it writes anew; another file needs --force, and no force touches what a run is made of."""
+    """What fit wrote it overwrites; another file needs --force, and no force touches what a run is made of."""
     law, module, picture = files = [tmp_path / name for name in ("law.json", "law.py", "law.png")]
     words = ["fit", str(runs["elastic"]), "--json", str(law), "--python", str(module), "--picture", str(picture)]
     assert run(words) == 0

@@ -82,7 +82,7 @@ def test_small_blocks_are_named(solved, tmp_path, capsys):
 
 
 def test_files_of_others_and_inputs_stay(tmp_path, capsys):
-    """Stored rows are not written over themselves; what fit wrote is written anew, another file needs --force."""
+    """Stored rows are not written over themselves; what fit wrote is overwritten, another file needs --force."""
     rows, link = tmp_path / "rows.csv", tmp_path / "link.json"
     rows.write_text(ROWS.read_text())
     link.symlink_to(rows)
