@@ -9,7 +9,8 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.persson import persson_joint
-from archord.output.folder import claim_folder, occupied
+from archord.output import checkpoint
+from archord.output.folder import CHECKPOINT, claim_folder, occupied
 from archord.output.history import read_history
 from archord.output.restart import plan_extension, plan_restart
 from archord.output.run import solve_scene
@@ -101,6 +102,18 @@ def test_a_restarted_run_remembers_the_continuation_in_gamma(tmp_path):
     assert whole["iterations"] == halted["iterations"]
     assert whole["iterations"][-1] > 25  # more than one solve's: it was raised
     assert halted["P"] == pytest.approx(whole["P"], rel=1e-9)
+
+
+def test_a_checkpoint_of_version_0_1_goes_on(tmp_path):
+    """It calls active-set changes flips."""
+    problem, step = CASES["plastic"]
+    run(problem, tmp_path / "whole", copies={step: tmp_path / "halted"})
+    old = checkpoint.read(tmp_path / "halted" / CHECKPOINT)
+    for attempt in old.scalars["step"]["attempts"]:
+        attempt["flips"] = attempt.pop("active_set_changes")
+    checkpoint.write(tmp_path / "halted" / CHECKPOINT, old)
+    go_on(problem, tmp_path / "halted")
+    same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
 
 
 def test_a_run_may_be_halted_after_every_step(tmp_path):
