@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from archord.materials.material import Array
 
 
@@ -27,12 +29,12 @@ class Points:
         return stress, tangent
 
     @property
-    def peeq(self) -> Array | float:
+    def peeq(self) -> Array:
         """PEEQ ``(n,)`` at the last strain seen."""
-        return self.material.peeq(self.trial)
+        return np.broadcast_to(self.material.peeq(self.trial), self.n)
 
     @property
-    def increment(self) -> Array | float:
+    def increment(self) -> Array:
         """Increment of PEEQ ``(n,)`` from the committed state to the last strain seen."""
         return self.peeq - self.material.peeq(self.state)
 

@@ -84,7 +84,7 @@ class _PlasticBody:
         self.gradient = basis.gradient
         self.weight = basis.measure * w
         self.points = Points(material, self.weight.size)
-        self.stress = np.zeros((self.weight.size, 4))
+        self.stress: Array = np.zeros((self.weight.size, 4))
         self.yielding = cells[:0]  # cells that had a point off its elastic tangent at the last update
 
 
@@ -248,7 +248,7 @@ class Bulk:
         fields = {name: np.zeros(self.V.mesh.topology.index_map(2).size_local) for name in names}
         X, w = bulk_quadrature(self.degree)
         for tag, cells in self.cells.items():
-            values = {}
+            values: dict[str, Array] = {}
             if tag in self._plastic:
                 data = self._plastic[tag]
                 weight, stress = data.weight, data.stress

@@ -82,9 +82,9 @@ class MeshOrder:
     def spread(self, whole: Array | None) -> Array:
         """The inverse of `collect`: this rank's nodal values ``(n_local, k)``, ghosts included. Collective."""
         comm = self.system.comm
-        index, whole = comm.bcast((self._nodes.unique, whole) if comm.rank == 0 else None)
-        u = np.zeros((self._n_local, whole.shape[1]))
-        u[self._dof] = whole[np.searchsorted(index, self._index)]
+        index, values = comm.bcast((self._nodes.unique, whole) if comm.rank == 0 else None)
+        u = np.zeros((self._n_local, values.shape[1]))
+        u[self._dof] = values[np.searchsorted(index, self._index)]
         return u
 
     def collect_history(self) -> dict[str, Arrays]:

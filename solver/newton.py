@@ -223,7 +223,7 @@ class NewtonSolver:
             pressed = at.load > 0 and at.contact.n_active() > 0
             cause = "no stiffness is left" if pressed else "nothing resists the force"
             reason = f"{cause} (singular mode)"
-        increment = max((float(np.max(p.increment, initial=0.0)) for p in at.plastic_points()), default=0.0)
+        increment = max((float(p.increment.max(initial=0.0)) for p in at.plastic_points()), default=0.0)
         increment = self.comm.allreduce(increment, op=MPI.MAX)
         return replace(result, reason=reason, worst=at.worst_place(), plastic_increment=increment)
 

@@ -56,7 +56,7 @@ class System:
         return contact.Interaction(
             given.name,
             [self._surface(surface, given.name) for surface in given.surfaces],
-            law=LAWS.get(given.law, given.law),
+            law=LAWS[given.law] if isinstance(given.law, str) else given.law,
             kinematics=given.kinematics,
             gamma_factor=given.gamma_factor,
             integrated=integrated,

@@ -39,7 +39,7 @@ class TangentMatrix:
         self.comm, self._index_map = V.mesh.comm, V.dofmap.index_map
         self._fixed, self._rate = fixed, rate
         self._bcs = _scalar_bcs(V, fixed)
-        self._contact_blocks = np.zeros((0, 2, 2))
+        self._contact_blocks: Array = np.zeros((0, 2, 2))
         self.factorisations = 0  # of sparse matrices, asked for by `update`
         self.condensed: Condensed | None = None
         self._condense = condense
