@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from archord.output.restart import Start
     from archord.output.run import Outcome
     from archord.studies.accuracy import Level
-    from archord.studies.case_run import Result
-    from archord.studies.farm import Job
+    from archord.studies.sweep import Job
+    from archord.studies.tables import Result
 
 
 def say(text: str) -> None:

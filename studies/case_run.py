@@ -1,4 +1,4 @@
-"""One case of a sweep in its run folder: what is there already, and solving or continuing it.
+"""One case of a sweep: solved in its run folder, or continued. Imports PETSc, which all ranks must do together.
 
 Nothing that goes wrong in a case leaves `solve_case` as an exception: it is the case's result.
 """
@@ -6,75 +6,27 @@ Nothing that goes wrong in a case leaves `solve_case` as an exception: it is the
 from __future__ import annotations
 
 import gc
-import json
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from mpi4py import MPI
+
+from archord.geometry.mesh_cache import MESHES
 from archord.output.disk import replace_file
 from archord.output.folder import claim_folder
+from archord.output.ranks import agreed, arrived_before
+from archord.output.restart import Plan, plan_restart
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupted
+from archord.studies.accuracy import solve_as_asked
+from archord.studies.tables import FAILURE, Result, result_of
 
-if TYPE_CHECKING:
-    from mpi4py import MPI
-
-    from archord.output.restart import Plan
-
-FAILURE = "failure.txt"  # what raised in a case that failed: a sentence, and the traceback
-ENDED = ("done", "stopped", "failed")
 _PATIENCE = 20.0  # seconds that the ranks of a group wait for each other after an error
-
-
-@dataclass(frozen=True)
-class Result:
-    """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be written), "failed"
-    (an error), "interrupted", "busy" (another process solves it) or "open" (not solved to its end).
-
-    ``seconds``, ``meshes`` made and meshes ``reused`` are those of this process.
-    """
-
-    run: str
-    status: str
-    message: str = ""
-    seconds: float = 0.0
-    steps: int = 0
-    signal: int = 0
-    meshes: int = 0
-    reused: int = 0
-
-    @property
-    def ended(self) -> bool:
-        """Whether solving it again would give the same."""
-        return self.status in ENDED
-
-
-def report_of(folder: Path) -> dict[str, Any]:
-    """The run.json of a case; empty if it has none that can be read."""
-    try:
-        report = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return report if isinstance(report, dict) else {}
-
-
-def result_of(folder: Path, report: dict[str, Any] | None = None) -> Result:
-    """What the run folder of a case says about it; ``report`` is its run.json, if it was read already."""
-    try:
-        first = (folder / FAILURE).read_text(encoding="utf-8").partition("\n")[0]
-        return Result(folder.name, "failed", first)
-    except OSError:
-        pass
-    report = report_of(folder) if report is None else report
-    status = report.get("status")
-    steps = len(report.get("steps", []))
-    if status in ("done", "stopped", "interrupted"):
-        return Result(folder.name, status, report.get("message", ""), steps=steps)
-    return Result(folder.name, "open", steps=steps)
 
 
 def solve_case(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int] = lambda: 0) -> Result:
@@ -82,8 +34,6 @@ def solve_case(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[]
 
     ``received`` tells a signal that came while no run took it.
     """
-    from archord.geometry.mesh_cache import MESHES
-
     begun, made, reused = time.perf_counter(), MESHES.made, MESHES.reused
     if comm.size > 1:
         gc.disable()  # destructors of PETSc and dolfinx are collective: all ranks collect at one place, below
@@ -119,8 +69,6 @@ def _solve(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], in
 
 def _attempt(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], int], *, from_start: bool) -> Result:
     """Solve, from the beginning if ``from_start``. Raises whatever went wrong."""
-    from archord.output.ranks import agreed
-    from archord.studies.accuracy import solve_as_asked
 
     def check(_: Any) -> None:
         number = max(comm.allgather(received()))
@@ -137,8 +85,6 @@ def _attempt(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[], 
 
 def _plan(scene: Scene, folder: Path, from_start: bool) -> Plan | None:
     """Make the folder ready; how its run goes on, None if from the beginning."""
-    from archord.output.restart import plan_restart
-
     claim_folder(folder, force=True)
     (folder / FAILURE).unlink(missing_ok=True)
     return None if from_start else plan_restart(folder, scene)
@@ -148,17 +94,12 @@ def _failed(folder: Path, comm: MPI.Comm, error: Exception) -> Result:
     """Note the error in the run folder. In a group all ranks must have it, or none of them could go on."""
     sentence = " ".join(f"{type(error).__name__}: {error}".split())
     text = "".join(traceback.format_exception(error))
-    if comm.size == 1 or comm.rank == 0:
+    if comm.rank == 0:
         try:
             replace_file(folder / FAILURE, f"{sentence}\n\n{text}")
         except OSError as unwritten:
             sentence += f" ({folder / FAILURE} cannot be written: {unwritten.strerror})"
-    if comm.size > 1:
-        from mpi4py import MPI
-
-        from archord.output.ranks import arrived_before
-
-        if not arrived_before(comm, _PATIENCE):
-            print(f"archord: {folder.name}: {sentence}, on one rank of several.", flush=True)
-            MPI.COMM_WORLD.Abort(1)
+    if not arrived_before(comm, _PATIENCE):
+        print(f"archord: {folder.name}: {sentence}, on one rank of several.", flush=True)
+        MPI.COMM_WORLD.Abort(1)
     return Result(folder.name, "failed", sentence)

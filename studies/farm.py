@@ -2,7 +2,7 @@
 
 Rank 0 hands out the cases through mpi4py.futures, whose manager runs in a thread, and solves cases itself: it takes the
 longest one that has not been handed out by cancelling its future. (`MPICommExecutor` alone would leave rank 0 idle,
-half of two ranks.)
+half of two ranks.) All ranks must import this file together: it imports PETSc.
 """
 
 from __future__ import annotations
@@ -12,36 +12,21 @@ import signal
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
-from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, cast
 
 from mpi4py import MPI
 
 from archord.geometry.mesh_cache import MESHES
 from archord.output.ranks import arrived_before
-from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupt
-from archord.studies.case_run import Result, solve_case
+from archord.studies.case_run import solve_case
+from archord.studies.sweep import Job
+from archord.studies.tables import Result
 
 _MESHES_KEPT = 4
 _LONG_ENOUGH = 0.5  # over the longest case that waits, for one that suits better
 _BACKOFF = 0.005  # seconds between two looks of idle ranks and of the manager
-
-
-@dataclass(frozen=True)
-class Job:
-    """A scene to solve into ``folder``, expected to take ``cost`` seconds."""
-
-    scene: Scene
-    folder: Path
-    cost: float
-
-    @property
-    def mesh(self) -> str:
-        """The same for scenes whose meshes are the same."""
-        return f"{self.scene.joint!r} {self.scene.analysis.degree} {self.scene.pin.rigid}"
 
 
 class Farm:
@@ -49,8 +34,6 @@ class Farm:
     Collective."""
 
     def __init__(self, comm: MPI.Intracomm, ranks_per_case: int = 1) -> None:
-        import archord.output.run  # noqa: F401  PETSc starts here, on all ranks together and before any signal is set
-
         self.comm = comm
         self.crew = MPI.COMM_SELF if ranks_per_case == 1 else comm.Split(comm.rank // ranks_per_case)
         self.leaders = cast(MPI.Intracomm, comm.Split(0 if self.crew.rank == 0 else MPI.UNDEFINED))

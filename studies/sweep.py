@@ -6,19 +6,14 @@ import os
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from archord.output.disk import replace_file
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.studies import tables
-from archord.studies.case_run import Result, report_of, result_of
 from archord.studies.cases import Case, Sweep, read_sweep
 from archord.studies.sweep_file import SweepFile
-from archord.studies.tables import CASES, Tables, of_case
-
-if TYPE_CHECKING:
-    from archord.studies.farm import Job
+from archord.studies.tables import CASES, Result, Tables, of_case, report_of, result_of
 
 FILE = "sweep.toml"
 _DOFS_PER_CELL = {2: 4.3, 3: 9.5}
@@ -48,6 +43,20 @@ class Share:
         """Every ``total``-th of ``cases``, the longest first, so that all parts take about as long."""
         longest = sorted(cases, key=lambda case: -expected_seconds(case.scene))
         return longest[self.index - 1 :: self.total]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A scene to solve into ``folder``, expected to take ``cost`` seconds."""
+
+    scene: Scene
+    folder: Path
+    cost: float
+
+    @property
+    def mesh(self) -> str:
+        """The same for scenes whose meshes are the same."""
+        return f"{self.scene.joint!r} {self.scene.analysis.degree} {self.scene.pin.rigid}"
 
 
 def check_ranks(ranks: int, ranks_per_case: int) -> None:
@@ -107,8 +116,6 @@ def resolved(file: SweepFile) -> str:
 
 def open_jobs(sweep: Sweep, folder: Path, share: Share, *, retry: bool) -> tuple[list[Result], list[Job]]:
     """What of this ``share`` has ended already, and the jobs that are left; with ``retry`` also those that failed."""
-    from archord.studies.farm import Job
-
     ended, jobs = [], []
     for case in share.of(sweep.distinct):
         run = of_case(case, folder)

@@ -32,9 +32,8 @@ from archord.postprocess.laws.study import (
 )
 from archord.report.table import Table
 from archord.scene.errors import InputError
-from archord.studies.case_run import report_of, result_of
 from archord.studies.cases import Case, read_sweep
-from archord.studies.tables import entry, heading, of_case
+from archord.studies.tables import entry, heading, of_case, report_of, result_of
 
 FILE, TABLE = "sweep.toml", "fit.csv"
 BLOCKS = "small blocks"

@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import fcntl
 import io
+import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -18,12 +19,60 @@ import numpy as np
 from archord.output.disk import replace_file
 from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
-from archord.studies.case_run import Result, report_of, result_of
 from archord.studies.cases import Case, Sweep
 
 CASES = "cases"  # the folder of all run folders
+FAILURE = "failure.txt"  # what raised in a case that failed: a sentence, and the traceback
+ENDED = ("done", "stopped", "failed")
 _PER_STEP = ("step", "iterations", "cutbacks", "seconds [s]")  # of history.csv; cases.csv has sums of them
 Row = list[Any]
+
+
+@dataclass(frozen=True)
+class Result:
+    """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be written), "failed"
+    (an error), "interrupted", "busy" (another process solves it) or "open" (not solved to its end).
+
+    ``seconds``, ``meshes`` made and meshes ``reused`` are those of this process.
+    """
+
+    run: str
+    status: str
+    message: str = ""
+    seconds: float = 0.0
+    steps: int = 0
+    signal: int = 0
+    meshes: int = 0
+    reused: int = 0
+
+    @property
+    def ended(self) -> bool:
+        """Whether solving it again would give the same."""
+        return self.status in ENDED
+
+
+def report_of(folder: Path) -> dict[str, Any]:
+    """The run.json of a case; empty if it has none that can be read."""
+    try:
+        report = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return report if isinstance(report, dict) else {}
+
+
+def result_of(folder: Path, report: dict[str, Any] | None = None) -> Result:
+    """What the run folder of a case says about it; ``report`` is its run.json, if it was read already."""
+    try:
+        first = (folder / FAILURE).read_text(encoding="utf-8").partition("\n")[0]
+        return Result(folder.name, "failed", first)
+    except OSError:
+        pass
+    report = report_of(folder) if report is None else report
+    status = report.get("status")
+    steps = len(report.get("steps", []))
+    if status in ("done", "stopped", "interrupted"):
+        return Result(folder.name, status, report.get("message", ""), steps=steps)
+    return Result(folder.name, "open", steps=steps)
 
 
 @dataclass

@@ -12,11 +12,11 @@ from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.ranks import agreed
 from archord.output.run import solve_scene
-from archord.studies.case_run import report_of, result_of, solve_case
+from archord.studies.case_run import solve_case
 from archord.studies.cases import read_sweep
-from archord.studies.farm import Farm, Job, suited
-from archord.studies.sweep import Share, open_jobs
-from archord.studies.tables import of_case
+from archord.studies.farm import Farm, suited
+from archord.studies.sweep import Job, Share, open_jobs
+from archord.studies.tables import of_case, report_of, result_of
 from tests.studies.parts import SOFT, written
 
 CLOCK = {"seconds", "force_balance"}

@@ -10,8 +10,8 @@ import pytest
 from archord.cli import run
 from archord.output.history import read_history
 from archord.postprocess.curve import read_run
-from archord.studies.case_run import result_of
 from archord.studies.cases import read_sweep
+from archord.studies.tables import result_of
 from tests.studies.parts import SOFT, STUCK, numbers, sweep, table, times, written
 
 

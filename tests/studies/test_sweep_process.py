@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from archord.studies.case_run import report_of
 from archord.studies.cases import read_sweep
+from archord.studies.tables import report_of
 from tests.studies.parts import numbers, sweep, table, times, written
 from tests.test_cli import ENVIRONMENT, archord
 
