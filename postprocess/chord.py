@@ -46,7 +46,7 @@ class ChordPressure:
     @property
     def x_over_l(self) -> Array:
         """Chord coordinate ``x/l`` ``(n,)``."""
-        return self.x / self.length
+        return np.divide(self.x, self.length)
 
     @property
     def resultant(self) -> float:

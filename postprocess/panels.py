@@ -150,10 +150,8 @@ def _outline(axes: Any, scene: Scene, fields: Fields, factor: float) -> None:
 
     t, R = np.linspace(0, 1, _EDGE_POINTS), scene.joint.radius
     shape = np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
-    for displaced, style in (
-        (False, {"color": "0.35", "lw": 0.9, "ls": (0, (4, 3))}),
-        (True, {"color": "0", "lw": 1.1}),
-    ):
+    before: dict[str, Any] = {"color": "0.35", "lw": 0.9, "ls": (0, (4, 3))}
+    for displaced, style in ((False, before), (True, {"color": "black", "lw": 1.1})):
         lines = list(shape @ magnified(scene, fields, factor, displaced)[fields.outline()])
         arc = rigid_arc(scene, fields.delta if displaced else 0.0, factor)
         axes.add_collection(LineCollection([*lines, *([arc] if scene.pin.rigid else [])], **style), autolim=False)

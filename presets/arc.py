@@ -45,7 +45,7 @@ class ArcProfile:
     @property
     def angle(self) -> Array:
         """Angle ``(n, q)`` from the contact axis."""
-        return self.s / self.radius
+        return np.divide(self.s, self.radius)
 
     @property
     def in_contact(self) -> Array:
