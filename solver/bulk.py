@@ -100,9 +100,9 @@ class Bulk:
         n_owned = V.mesh.topology.index_map(2).size_local
         cells = {tag: tags.find(tag) for tag in materials}
         self.cells = {tag: c[c < n_owned] for tag, c in cells.items()}
-        v = ufl.TestFunction(V)
+        u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
         self._plastic = {tag: _PlasticBody(V, self.cells[tag], m) for tag, m in materials.items() if m.yields}
-        self._elastic_of = {tag: self._elastic_form(tag, ufl.TrialFunction(V)) for tag in materials}
+        self._elastic_of = {tag: self._elastic_form(tag, u, v) for tag in materials}
         self._elastic_forms = [fem.form(form) for form in self._elastic_of.values()]
         self._force_forms = []
         if self._plastic:
@@ -113,7 +113,7 @@ class Bulk:
             domain = [(1, np.sort(np.concatenate([p.cells for p in self._plastic.values()])))]
             dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
             self._force_forms.append(fem.form(ufl.inner(self._sigma, _voigt(v)) * dx))
-            self._corrected = self._correction_form(ufl.TrialFunction(V), dx)
+            self._corrected = ufl.inner(ufl.dot(self._correction, _voigt(u)), _voigt(v)) * dx
             self._correction_kernel = fem.compile_form(V.mesh.comm, self._corrected)
         self._corrected_cells: np.ndarray | None = None  # those of the form that was made last
         self._correction_forms: list[fem.Form] = []
@@ -125,13 +125,13 @@ class Bulk:
             assemble(self.stiffness, elastic)
             self.stiffness.assemble()
 
-    def _elastic_form(self, tag: int, u) -> ufl.Form:
-        """Virtual work of the elastic stresses of ``u`` in the body with this ``tag``."""
+    def _elastic_form(self, tag: int, u, v) -> ufl.Form:
+        """Virtual work on ``v`` of the elastic stresses of ``u`` in the body with this ``tag``."""
         mesh, moduli = self.V.mesh, self.materials[tag].elastic_tangent
         c11, c12, c33 = (fem.Constant(mesh, float(value)) for value in moduli[[0, 0, 2], [0, 1, 2]])
         domain, rule = [(1, self.cells[tag])], bulk_quadrature_degree(self.degree)
         dx = ufl.Measure("dx", mesh, subdomain_data=domain, metadata={"quadrature_degree": rule})
-        eu, ev = _voigt(u), _voigt(ufl.TestFunction(self.V))
+        eu, ev = _voigt(u), _voigt(v)
         sigma = ufl.as_vector([c11 * eu[0] + c12 * eu[1], c12 * eu[0] + c11 * eu[1], c33 * eu[2]])
         return ufl.inner(sigma, ev) * dx(1)
 
@@ -190,10 +190,6 @@ class Bulk:
             with out.localForm() as local:
                 fem_petsc.assemble_vector(local, form)
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-
-    def _correction_form(self, u, dx: ufl.Measure) -> ufl.Form:
-        v = ufl.TestFunction(self.V)
-        return ufl.inner(ufl.dot(self._correction, _voigt(u)), _voigt(v)) * dx
 
     def assemble_elastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
         """Add the elastic stiffness of all bodies to ``A``."""

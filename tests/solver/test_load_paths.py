@@ -1,4 +1,4 @@
-"""Load histories: force and displacement control, unloading, separation and contact anew."""
+"""Load histories: force and displacement control, unloading, separation and new contact."""
 
 import re
 
