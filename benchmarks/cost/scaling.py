@@ -54,14 +54,12 @@ REST = "rest"  # what no timer covers
 class Setting:
     """The joint with about ``dofs`` unknowns, elastic or ``plastic``, on ``ranks`` ranks.
 
-    ``weak``: only to compare with a mesh smaller by the number of ranks; not ``guided``: to show what a coarse start
-    saves.
+    Not ``guided``: to show what a coarse start saves.
     """
 
     dofs: int
     ranks: int
     plastic: bool = False
-    weak: bool = False
     guided: bool = True
 
     @property
@@ -108,7 +106,7 @@ def settings(largest: float, ranks: Sequence[int]) -> list[Setting]:
             "is compared with one rank."
         )
     found = [Setting(n, r) for n in ELASTIC for r in ranks]
-    found += [Setting(n * r, r, weak=True) for n in WEAK for r in ranks[1:] if n * r not in ELASTIC and n in ELASTIC]
+    found += [Setting(n * r, r) for n in WEAK for r in ranks[1:] if n * r not in ELASTIC and n in ELASTIC]
     found += [Setting(n, 1, plastic=True) for n in PLASTIC]
     found += [Setting(n, 1, plastic, guided=False) for plastic, sizes in UNGUIDED.items() for n in sizes]
     small = [setting for setting in found if setting.dofs <= largest]
@@ -229,10 +227,10 @@ class Costs:
     all: list[Cost]
 
     def series(self, ranks: int, *, plastic: bool = False) -> list[Cost]:
-        """Finished runs on ``ranks`` ranks by size, without those of the weak series alone."""
-        wanted = [c for c in self.all if not c.fault and c.setting.guided and not c.setting.weak]
-        found = [c for c in wanted if (c.setting.ranks, c.setting.plastic) == (ranks, plastic)]
-        return sorted(found, key=lambda cost: cost.dofs)
+        """Finished runs on ``ranks`` ranks by size, of those sizes that were solved on one rank, too."""
+        sizes = {c.setting.dofs for c in self.all if c.setting.ranks == 1}
+        wanted = {Setting(dofs, ranks, plastic) for dofs in sizes}
+        return sorted((c for c in self.all if not c.fault and c.setting in wanted), key=lambda cost: cost.dofs)
 
     @property
     def ranks(self) -> list[int]:
@@ -241,7 +239,7 @@ class Costs:
 
     def _beside(self, costs: list[Cost], others: Callable[[Setting], Iterable[Setting]]) -> list[tuple[Cost, Cost]]:
         """Pairs of each of ``costs`` and the finished run of each of its ``others``."""
-        done = {replace(c.setting, weak=False): c for c in self.all if not c.fault}
+        done = {c.setting: c for c in self.all if not c.fault}
         return [(cost, done[setting]) for cost in costs for setting in others(cost.setting) if setting in done]
 
     def strong(self) -> list[tuple[Cost, Cost]]:

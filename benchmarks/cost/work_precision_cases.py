@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 from archord.benchmarks.case import paper_joint
 from archord.postprocess.deck import Elements
-from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
 Kinematics = Literal["current", "reference"]
@@ -109,23 +108,14 @@ DECKS = (
     _deck("CPE3", "linear", 0.06, 0.03),
 )
 
-_FINE = {
-    "elastic": ((0.02, 0.014, 0.01, 0.007, 0.005), (0.014, 0.01, 0.007, 0.005, 0.0035)),
-    "plastic": ((0.02, 0.014, 0.01, 0.007), (0.014, 0.01, 0.007, 0.005)),
-}
+_FAMILIES = (  # growth over element size, and element sizes, the finest of the elastic case alone
+    (6.25, (0.02, 0.014, 0.01, 0.007, 0.005)),
+    (12.5, (0.014, 0.01, 0.007, 0.005, 0.0035)),
+)
 
 
-def families(case: JointCase) -> tuple[Series, ...]:
+def families(case: JointCase) -> list[Series]:
     """What the reference is extrapolated from: two families that are refined everywhere, near and far elements in
     different shares."""
-    first, second = _FINE[case.name]
-    return Series("growth = 6.25 h", scaled(*first, ratio=6.25)), Series("growth = 12.5 h", scaled(*second, ratio=12.5))
-
-
-def chosen_cases(name: str) -> list[JointCase]:
-    """The case ``name``, or both. Raises `InputError` if there is none of that name."""
-    if name == "both":
-        return list(CASES.values())
-    if name not in CASES:
-        raise InputError(f"--case {name}: must be {', '.join(CASES)} or both.")
-    return [CASES[name]]
+    count = 4 if case.yield_stress else 5
+    return [Series(f"growth = {ratio:g} h", scaled(*sizes[:count], ratio=ratio)) for ratio, sizes in _FAMILIES]
