@@ -172,7 +172,7 @@ def accuracy(output: Path, only: str, quiet: bool) -> int:
 
 @benchmark.command("work-precision")
 @output("folder for runs, tables and diagrams", "runs/work_precision")
-@click.option("--case", type=click.Choice(["elastic", "plastic", "both"]), default="both", help="joints to solve")
+@click.option("--case", default="both", help="elastic, plastic or both")
 @click.option("--only", multiple=True, metavar="PATTERN", help='codes, series or "code, series, mesh"; may be repeated')
 @_repeats("timed runs of every point", 3)
 @click.option("--peers/--no-peers", default=True, help="CalculiX and other codes that are here")
@@ -190,6 +190,8 @@ def work_precision(output: Path, case: str, reference: bool, quiet: bool, **opti
     from archord.benchmarks.cost.work_precision_cases import CASES
 
     say, cases = _telling(quiet), [known for known in CASES.values() if case in (known.name, "both")]
+    if not cases:
+        raise InputError(f"--case {case}: must be {', '.join(CASES)} or both.")
     try:
         if reference:
             return _store_reference(cases, output / "reference", say)

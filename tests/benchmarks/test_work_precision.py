@@ -293,7 +293,7 @@ def test_a_quick_run_through_the_command(tmp_path, capsys):
 
 def test_wrong_options(tmp_path, refused):
     for options, said in (
-        (["--case", "soft"], "'soft' is not one of 'elastic', 'plastic', 'both'."),
+        (["--case", "soft"], "--case soft: must be elastic, plastic or both."),
         (["--only", "nothing", "--no-peers"], "--only nothing: no code or series has such a name; there are archord"),
     ):
         assert said in refused(["benchmark", "work-precision", "-o", str(tmp_path), *options])
