@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,19 +15,8 @@ if TYPE_CHECKING:
     from archord.presets.measures import Measures
 
 
-@dataclass(frozen=True)
-class _Column:
-    heading: str
-    attribute: str
-    divisor: float | int = 1
-
-    def of(self, m: Measures) -> str:
-        """The entry of a step; whole numbers stay whole."""
-        value = getattr(m, self.attribute)
-        return str(value) if isinstance(value, int) else f"{value / self.divisor:.12g}"
-
-
-def _columns(scene: Scene) -> list[_Column]:
+def _columns(scene: Scene) -> list[tuple[str, str, float]]:
+    """Heading, attribute of `Measures` and divisor of every column."""
     units, R, dR, E = scene.units, scene.joint.radius, scene.joint.dR, scene.E_star
     table: list[tuple[str, str, str, float]] = [
         # name, unit, dimensionless form, its divisor
@@ -47,11 +35,11 @@ def _columns(scene: Scene) -> list[_Column]:
         ("cutbacks", "", "", 1.0),
         ("seconds", "s", "", 1.0),
     ]
-    columns = [_Column("step", "step")]
+    columns = [("step", "step", 1.0)]
     for name, unit, dimensionless, divisor in table:
-        columns.append(_Column(f"{name} [{unit}]" if unit else name, name))
+        columns.append((f"{name} [{unit}]" if unit else name, name, 1.0))
         if dimensionless:
-            columns.append(_Column(dimensionless, name, divisor))
+            columns.append((dimensionless, name, divisor))
     return columns
 
 
@@ -61,12 +49,17 @@ class History:
     def __init__(self, path: Path, scene: Scene, done: Sequence[Measures] = ()) -> None:
         self.path = path
         self._columns = _columns(scene)
-        self._rows = [[c.heading for c in self._columns]] + [[c.of(m) for c in self._columns] for m in done]
+        self._rows = [[heading for heading, _, _ in self._columns], *map(self._row, done)]
 
     def add(self, m: Measures) -> None:
         """Append one step. Raises `OSError`."""
-        self._rows.append([c.of(m) for c in self._columns])
+        self._rows.append(self._row(m))
         self.write()
+
+    def _row(self, m: Measures) -> list[str]:
+        """The entries of a step; whole numbers stay whole."""
+        values = ((getattr(m, name), divisor) for _, name, divisor in self._columns)
+        return [str(v) if isinstance(v, int) else f"{v / divisor:.12g}" for v, divisor in values]
 
     def write(self) -> None:
         """Replace the file in one move, so that a reader never sees half a row. Raises `OSError`."""

@@ -14,9 +14,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import dolfinx
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 
+import archord
 from archord.output.disk import replace_file
 from archord.presets.joint import Joint
 from archord.presets.joint_report import APART, mesh_facts, model_facts, rough_arcs
@@ -172,11 +175,6 @@ def _finite(value: Any) -> Any:
 
 
 def _versions() -> dict[str, str]:
-    import dolfinx
-    from petsc4py import PETSc
-
-    import archord
-
     return {
         "archord": archord.__version__,
         "dolfinx": dolfinx.__version__,
