@@ -63,9 +63,8 @@ class Pair:
             opening = displacement - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
             if self.law.slides:
                 opening += self.separation
-        N, n = self._outward, self.projection.normal
-        s_x, s_y = stress[:, [0, 3]], stress[:, [3, 1]]
-        self.stress_vector = np.stack([(s_x * N).sum(1), (s_y * N).sum(1)], axis=1)
+        (xx, yy, _, xy), (N_x, N_y), n = stress.T, self._outward.T, self.projection.normal
+        self.stress_vector = np.stack([xx * N_x + xy * N_y, xy * N_x + yy * N_y], axis=1)
         self.frame = np.stack([n[:, 0], n[:, 1], -n[:, 1], n[:, 0]], axis=1).reshape(-1, 2, 2)
         self.opening = np.einsum("mij,mj->mi", self.frame, opening)
         self.trial = np.einsum("mij,mj->mi", self.frame, self.stress_vector) - self.gamma[:, None] * self.opening
@@ -110,13 +109,13 @@ class Pair:
     @property
     def forces(self) -> Array:
         """Weighted contact force ``(m, 2)`` of each point on its own body."""
-        w = self.share * self.surface.weight.ravel()
-        return np.einsum("m,mi,mij->mj", w, self.traction, self.frame)
+        weighted = self.share * self.surface.weight.reshape(-1, 1) * self.traction
+        return np.einsum("mij,mi->mj", self.frame, weighted)
 
     def add_forces(self, own: Array, opposite: Array) -> None:
         """Add the forces on the nodes of the own surface to ``own`` ``(nodes, 2)``, their reactions to ``opposite``."""
         surface, P, forces = self.surface, self.projection, self.forces
-        on_facets = np.einsum("nqk,nqi->nki", surface.trace_shape, forces.reshape(*surface.weight.shape, 2))
+        on_facets = surface.trace_shape.swapaxes(1, 2) @ forces.reshape(*surface.weight.shape, 2)
         nodes = surface.curve.connectivity[surface.facet]
         for i in range(2):
             own[:, i] += np.bincount(nodes.ravel(), on_facets[..., i].ravel(), len(own))
