@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.geometry.curve import RigidCircle
+from archord.geometry.joint_mesh import Facets
 from archord.materials.elasticity import contact_modulus
+from archord.solver.contact import interaction as contact
+from archord.solver.contact.contact import Contact
 from archord.solver.contact.law import ContactLaw
+from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Body, Interaction, Problem, Support
 from tests.solver.contact.test_tangent import matrix
-from tests.solver.parts import ELASTIC, NU, E, blocks, contact_force, coordinates, solve
+from tests.solver.parts import DR, ELASTIC, NU, E, R, blocks, contact_force, coordinates, joint_parts, solve
 
 DEPTH = 0.01
 PRESSED = [Support("base", "base", 1), Support("lid", "lid", 1, -1.0), Support("left", "left", 0)]  # free to widen
@@ -98,3 +103,32 @@ def test_a_law_from_outside_pulls_and_slides(kinematics):
     supports += [Support("lid", "lid", k, 1.0 - k) for k in (0, 1)]
     u = solve(Problem(mesh, bodies, [interaction], supports), [DEPTH]).equilibrium.displacement()
     assert np.abs(u[coordinates(system.V)[:, 1] < -0.1]).max() < 1e-10 * DEPTH
+
+
+def test_every_rigid_disc_moves_by_itself():
+    """One in the hole, one on the block's upper edge: forces follow the motion of each, and the load factor moves both
+    by their rates."""
+    parts = joint_parts(pin=None)
+    edge = Surface(parts.V, parts.facets, Facets.BLOCK_HELD, ELASTIC)
+    pin = RigidSurface(RigidCircle(np.array([0.0, -DR]), R), (0.0, -1.0))
+    disc = RigidSurface(RigidCircle(np.array([2.5, R]), R), (0.1, -2.0))
+    interactions = [contact.Interaction("pin", [pin, parts.sides[0]]), contact.Interaction("disc", [disc, edge])]
+    both, u, depth, h = Contact(parts.V, interactions), np.zeros((len(coordinates(parts.V)), 2)), 1.5 * DR, 1e-6 * DR
+    both.move(depth)
+    np.testing.assert_array_equal([pin.motion[0], disc.motion[0]], depth * both.rigid_rates)
+    contact_force(both, u)
+    assert all(pair.active.any() for pair in both.pairs)
+    along = sum(rate @ both.resultant(name) for rate, name in ((pin.rate, "pin"), (disc.rate, "disc")))
+    assert both.force_on_factor() == pytest.approx(along, rel=1e-14)
+    rows, columns, blocks_ = both.tangent.rows, both.tangent.columns, both.tangent.blocks()
+    for number, surface in enumerate((pin, disc)):
+        for axis, direction in enumerate(np.eye(2)):
+            forces = []
+            for sign in (1, -1):
+                surface.motion = surface.motion + sign * h * direction
+                forces.append(contact_force(both, u))
+                surface.motion = surface.motion - sign * h * direction
+            expected = (forces[0] - forces[1]) / (2 * h)
+            found, here = np.zeros_like(u), (columns == len(u) + number) & (rows < len(u))
+            np.add.at(found, rows[here], blocks_[here, :, axis])
+            assert np.linalg.norm(found - expected) < 1e-6 * np.linalg.norm(expected)
