@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import basix
 import numpy as np
@@ -15,7 +15,7 @@ from archord.kernels.compiled import library, pointer
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
 
-Array = npt.NDArray[np.float64]
+Array = npt.NDArray[np.floating]
 
 CONTACT_POINTS = 4  # Gauss points a contact facet
 
@@ -92,6 +92,6 @@ def strain(gradient: Array, dofs: npt.NDArray[np.int32], u: Array) -> Array:
     """Strain ``(n, q, 3)`` from gradients ``(n, q, a, 2)``, nodes ``(n, a)`` and nodal displacements ``(nodes, 2)``."""
     n, q, a, _ = gradient.shape
     result = np.empty((n, q, 3))
-    arguments = map(pointer, (gradient, dofs, u, result))
-    library(Path(__file__).with_name("strain.c")).strains(n, q, a, *arguments)
+    arrays: tuple[npt.NDArray[Any], ...] = (gradient, dofs, u, result)
+    library(Path(__file__).with_name("strain.c")).strains(n, q, a, *map(pointer, arrays))
     return result

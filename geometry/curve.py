@@ -131,8 +131,8 @@ class Curve:
         point, normal, tangent = (np.empty((m, 2)) for _ in range(3))
         slides, found = np.empty(m, dtype=bool), np.empty(m, dtype=bool)
         x, outward, home = np.ascontiguousarray(x), np.ascontiguousarray(outward), home.astype(np.int32, copy=False)
-        curve = (displaced, self._coefficients, home)
-        results = (facet, xi, point, normal, tangent, bend, shape, slope, slides, found, lost)
+        curve: tuple[np.ndarray, ...] = (displaced, self._coefficients, home)
+        results: tuple[np.ndarray, ...] = (facet, xi, point, normal, tangent, bend, shape, slope, slides, found, lost)
         n_lost = library(Path(__file__).with_name("closest_point.c")).closest_points(
             m, pointer(x), pointer(outward), self.n_facets, self.degree, *map(pointer, curve), reach, margin,
             _END_MARGIN, _NEWTON_STEPS, *map(pointer, results),

@@ -19,6 +19,7 @@ from typing import Any
 
 import cffi
 import numpy as np
+import numpy.typing as npt
 
 _FLAGS = ["-std=c11", "-O3", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off"]
 _ffi = cffi.FFI()
@@ -55,7 +56,7 @@ def _loaded(source: Path, libraries: tuple[str, ...]) -> tuple[cffi.FFI, Any]:
     return ffi, ffi.dlopen(str(path))
 
 
-def pointer(array: np.ndarray) -> Any:
+def pointer(array: npt.NDArray[Any]) -> Any:
     """The C-contiguous ``array`` of float64, int32 or bool for a C function."""
     return _ffi.from_buffer(_TYPES[array.dtype], array)
 

@@ -20,7 +20,7 @@ from archord.postprocess.curve import RunCurve
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
-Curve = Sequence[float]
+Curve = Sequence[float] | np.ndarray
 Real = TypeVar("Real", float, Array)
 
 _ASSUMED = 1.0  # P converges faster, but peak pressures and perfect plasticity do not for certain

@@ -221,7 +221,7 @@ def _quantity(compared: Compared, names: list[str]) -> Table:
     for k in rows:
         row = [f"{compared.load[k]:.6g}"]
         for r, value in enumerate(compared.values[:, k]):
-            row.append(("~" if compared.interpolated[r, k] else "") + _number(value, largest))
+            row.append(("~" if compared.interpolated[r, k] else "") + _number(float(value), largest))
             row += [_percent(relative[r, k], "+")] if r else []
         table.add(*row)
     shown = "" if len(rows) == len(compared.load) else f"{len(rows)} of {len(compared.load)}"

@@ -122,7 +122,7 @@ class Joint(System):
         cells, points = self.bulk.histories()[self.problem.mesh.cell_tag("pin")]
         x = cell_basis(self.V.mesh, self.bulk.degree, cells, bulk_quadrature(self.bulk.degree)[0]).point
         core = np.linalg.norm(x, axis=-1).ravel() < self.scene.load.core_radius * self.scene.joint.radius
-        return self.comm.allreduce(float(points.peeq[core].max(initial=0.0)), op=MPI.MAX)
+        return self.comm.allreduce(float(np.asarray(points.peeq)[core].max(initial=0.0)), op=MPI.MAX)
 
     def forces(self) -> dict[str, float]:
         """Downward force of the whole joint at pin, contact and block's support, per unit thickness."""

@@ -232,7 +232,7 @@ class Bulk:
         """Largest PEEQ at a quadrature point, and the integral of PEEQ over this rank's cells."""
         largest = integral = 0.0
         for data in self._plastic.values():
-            peeq = data.points.peeq
+            peeq = np.asarray(data.points.peeq)
             largest = max(largest, float(peeq.max(initial=0.0)))
             integral += float(data.weight.ravel() @ peeq)
         return largest, integral
@@ -248,7 +248,7 @@ class Bulk:
             if tag in self._plastic:
                 data = self._plastic[tag]
                 weight, stress = data.weight, data.stress
-                values = {"peeq": data.points.peeq, "peeq_increment": data.points.increment}
+                values = {"peeq": np.asarray(data.points.peeq), "peeq_increment": np.asarray(data.points.increment)}
             else:
                 material, basis = self.materials[tag], cell_basis(self.V.mesh, self.degree, cells, X)
                 eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)

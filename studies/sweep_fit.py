@@ -117,7 +117,8 @@ def fit_sweep(path: Path, load_range: tuple[float, float], confidence: float, he
         cases, notes = read_cases(path)
         if not len(cases):
             raise InputError(f"{path}: holds no case.")
-        numbers, left_out = range(1, len(cases) + 1), []
+        numbers = range(1, len(cases) + 1)
+        left_out: list[tuple[str, str]] = []
         table = study_report.case_table(numbers, cases, study_report.numbers_of(cases))
     else:
         cases, table, notes, left_out = _solved(path, load_range, confidence)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from scipy.optimize import brentq
 
@@ -21,7 +22,8 @@ from archord.benchmarks.timing import Process, Timing, time_all
 from archord.output.folder import claim_folder
 from archord.scene.errors import InputError
 from archord.scene.file import resolved
-from archord.scene.scene import JointGeometry, Scene
+from archord.scene.geometry import JointGeometry
+from archord.scene.scene import Scene
 
 ELASTIC = (5_000, 30_000, 100_000, 300_000, 1_000_000)  # dofs
 PLASTIC = (5_000, 30_000, 100_000)
@@ -83,7 +85,7 @@ def refined(dofs: float) -> tuple[float, float]:
     """Element size on the arcs, over R, and growth of a mesh with about ``dofs`` unknowns."""
 
     def excess(scale: float) -> float:
-        sizes = {name: scale * value for name, value in _COARSEST.items()}
+        sizes: dict[str, Any] = {name: scale * value for name, value in _COARSEST.items()}
         # without its checks, which refuse meshes beyond the wanted one
         cells = JointGeometry.model_construct(radius=1.0, clearance=0.005, **sizes).expected_cells
         return _DOFS_PER_CELL * cells - dofs

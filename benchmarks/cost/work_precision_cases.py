@@ -14,7 +14,7 @@ from archord.postprocess.deck import Elements
 from archord.scene.scene import Scene
 
 Kinematics = Literal["current", "reference"]
-Mesh = Mapping[str, Mapping[str, Any]]  # keys of a scene by section
+Mesh = Mapping[str, Any]  # keys of a scene by section
 QUANTITIES = ("P", "p0", "eps", "profile", "dissipation")
 
 
@@ -34,7 +34,7 @@ class JointCase:
 
     def scene(self, mesh: Mesh, kinematics: Kinematics = "current") -> Scene:
         """The case with the sections of ``mesh``. Raises `InputError` if they do not make a scene."""
-        sections = {name: dict(keys) for name, keys in mesh.items()}
+        sections: dict[str, Any] = {name: dict(keys) for name, keys in mesh.items()}
         sections["analysis"] = sections.get("analysis", {}) | {"kinematics": kinematics}
         return paper_joint(steps=self.steps, yield_stress=self.yield_stress, **sections)
 

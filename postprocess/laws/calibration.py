@@ -120,8 +120,8 @@ def _check_compatible(runs: list[RunCurve]) -> None:
         if own.plane != other.plane:
             raise InputError(f"{run.name}: analysis.plane = {run.plane!r} does not fit: {first.name} is in plane "
                              f"{first.plane}; fit the planes separately.")  # fmt: skip
-        numbers = ([joint.dundurs_alpha, joint.nu, joint.pin_nu or 0.0] for joint in (own, other))
-        if not np.allclose(*numbers, rtol=1e-6, atol=1e-9):
+        ours, theirs = ((joint.dundurs_alpha, joint.nu or 0.0, joint.pin_nu or 0.0) for joint in (own, other))
+        if not np.allclose(ours, theirs, rtol=1e-6, atol=1e-9):
             raise InputError(f"{run.name}: the Poisson's ratios or the ratio of the moduli are not those of "
                              f"{first.name}; one k is for one pair of materials, fit them separately.")  # fmt: skip
         softer = abs(own.softer[0] - other.softer[0])
@@ -163,7 +163,7 @@ def fit_plateau(
             continue
         median, flatness = plateau_pressure(run)
         values = median[rows] / run.sigY
-        shift = np.zeros(len(values))
+        shift: np.ndarray = np.zeros(len(values))
         if g.coarser:
             curves = [median, *(plateau_pressure(coarse)[0] for coarse in g.coarser)]
             shift = g.shift(curves)[rows] / run.sigY

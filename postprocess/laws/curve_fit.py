@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -166,7 +167,7 @@ def fit_curve(
     if refined and free:
         finer = [y[0] + g.shift(y) if g.coarser else y[0] for g, y in zip(groups, curves, strict=True)]
         moved = problem.solve(free, finer).parameters - best.parameters
-        mesh = dict(zip(free, np.abs(moved).tolist(), strict=True))
+        mesh = dict(zip(free, map(float, np.abs(moved)), strict=True))
     found = {name: best.estimate(i, confidence, mesh.get(name)) for i, name in enumerate(free)}
     if hold_k is not None:
         found["k"] = Estimate(hold_k, 0.0, 0.0, 0.0, hold_k, hold_k)
@@ -190,7 +191,7 @@ class _Problem:
 
     quantity: str
     runs: list[RunCurve]
-    chosen: list[Array]
+    chosen: list[npt.NDArray[np.bool_]]
     held: float | None = None
 
     def dimensionless(self, data: list[Array]) -> list[Array]:
@@ -200,7 +201,7 @@ class _Problem:
 
     def predict(self, free: tuple[str, ...], values: Array) -> list[Array]:
         """The law for each run; without ``c`` it is elastic, without ``k`` rigid up to the plateau."""
-        given = dict(zip(free, values, strict=True))
+        given: dict[str, float] = dict(zip(free, map(float, values), strict=True))
         k, c = given.get("k", self.held), given.get("c")
         parts = zip(self.runs, self.chosen, strict=True)
         return [dimensionless_law(self.quantity, run, run.delta[rows], k, c) for run, rows in parts]
@@ -257,7 +258,7 @@ def joint_of(run: RunCurve, k: float, c: float | None = None) -> LawJoint:
     return LawJoint(run.R, run.dR, run.E_star, run.sigY if c else None, k=k, c=c or 1.0)
 
 
-def selected(run: RunCurve, load_range: tuple[float, float]) -> Array:
+def selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.bool_]:
     """Which steps ``(n,)`` of ``run`` lie in the range of ``delta/dR``, ends included. Raises `InputError` if none."""
     load, slack = run.delta / run.dR, 1e-9
     chosen = (load >= load_range[0] * (1 - slack)) & (load <= load_range[1] * (1 + slack))

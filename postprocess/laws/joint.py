@@ -13,7 +13,7 @@ from archord.materials.material import Plane
 from archord.scene.geometry import Model
 from archord.scene.scene import Scene
 
-Array = npt.NDArray[np.float64]
+Array = npt.NDArray[np.floating]
 YIELDING = ("both", "block", "pin", "unlike")
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are
 _SOFTER, _SOFTEST = 1.4, 2.5  # fall of P in a block of W, times (W/R)^2: of like elastic bodies, and of any

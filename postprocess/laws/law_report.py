@@ -87,8 +87,8 @@ def _comparison() -> Table:
         warnings.simplefilter("ignore", LawRangeWarning)
         for law in LAWS.values():
             if law.gives_displacement:
-                inside, formula = (law.force(joint, loads * joint.clearance, how) / joint.clearance
-                                   for how in ("nan", "extrapolate"))  # fmt: skip
+                inside = law.force(joint, loads * joint.clearance, "nan") / joint.clearance
+                formula = law.force(joint, loads * joint.clearance, "extrapolate") / joint.clearance
                 cells = (f"{p:.4f}" if np.isfinite(q) else "" if np.isnan(p) else f"({p:.4f})"
                          for p, q in zip(formula, inside, strict=True))  # fmt: skip
                 table.add(law.name, *cells)

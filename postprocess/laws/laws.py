@@ -83,7 +83,7 @@ def _logarithmic(make: Callable[[LawJoint], elastic.Logarithm], hertz: bool = Tr
 
 def _slender(joint: LawJoint) -> float:
     law = elastic.dubowsky_freudenstein(joint)
-    return float(law.displacement(min(elastic.slender_load(joint), law.load_limit)))
+    return float(law.displacement(np.asarray(min(elastic.slender_load(joint), law.load_limit))))
 
 
 def _of_load(peak: _Function, angle: _Function, **more: Any) -> dict[str, Any]:

@@ -287,8 +287,11 @@ def errors(cases: Cases, k: Array, c: Array) -> pd.DataFrame:
     """
     rows = cases[["run", "plane", "yielding"]]
     forces = [
-        plastic_force(joint_of_case(case, *kc), case.load * case.clearance) / case.clearance / case.P - 1
-        for case, *kc in zip(cases.itertuples(), k.tolist(), c.tolist(), strict=True)
+        plastic_force(joint_of_case(case, float(one), float(other)), case.load * case.clearance)
+        / case.clearance
+        / case.P
+        - 1
+        for case, one, other in zip(cases.itertuples(), k, c, strict=True)
     ]
     steps = rows.loc[cases.index.repeat([len(part) for part in forces])]
     load = np.concatenate(list(cases.load))

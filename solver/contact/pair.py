@@ -37,7 +37,8 @@ class Pair:
         self.projection = opposite.curve.closest_point(x, self._outward, np.zeros_like(opposite.curve.X))
         self.separation = x - self.projection.point
         self.points = Points(law, len(x))
-        self.traction, self.active = np.zeros((len(x), 2)), np.zeros(len(x), dtype=bool)
+        self.traction: Array = np.zeros((len(x), 2))
+        self.active = np.zeros(len(x), dtype=bool)
         self.start: Start = "anywhere"
 
     def use_gamma(self, factor: float) -> None:

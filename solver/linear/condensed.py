@@ -128,7 +128,7 @@ class Condensed:
         self._at = 2 * self._row[:, None, None] + axis[:, None], 2 * column[:, None, None] + axis
         self._near_Z = self._on_all(self._columns, self._Z)
         m = self._Z.shape[1]
-        self._blocks = np.zeros((len(rows), 2, 2))
+        self._blocks: Array = np.zeros((len(rows), 2, 2))
         self._own_D, self._DZ = np.zeros((m, len(self._columns))), np.zeros((m, m))
         self._D = self._own_D if self.comm.size == 1 else self._own_D.copy()
         self._filled = np.zeros(m, dtype=bool)  # rows of D
