@@ -11,6 +11,7 @@ from pathlib import Path
 import meshio
 import pytest
 
+from archord.cli import COMMANDS, run
 from archord.output.history import read_history
 from tests import forked
 
@@ -31,12 +32,27 @@ def archord(*arguments: str, cwd: Path, ranks: int = 0) -> subprocess.CompletedP
 
 
 def test_what_petsc_prints_at_its_end_is_not_lost(tmp_path):
-    """The process leaves without Python's own way out, which would flush it."""
+    """PETSc is finalized, and its output flushed, before the process ends."""
     environment = ENVIRONMENT | {"PETSC_OPTIONS": "-log_view"}
     command = [*SOLVE, *COARSE, "--quiet"]
     log = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
     assert log.returncode == 0, log.stderr
     assert "SNESSolve" in log.stdout
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_a_help_page(capsys, command):
+    """Found in its file by its name; what arguments and options are stands beside them."""
+    assert run([command, "--help"]) == 0
+    page = capsys.readouterr().out
+    assert page.startswith(f"Usage: archord {command} ")
+    assert "Commands:" in page or "  -" in page
+
+
+def test_an_unknown_command_is_bad_input(capsys):
+    """One sentence, exit code 2."""
+    assert run(["slove", "--help"]) == 2
+    assert "No such command 'slove'." in capsys.readouterr().err
 
 
 def test_solve_prints_steps_and_writes_the_run(tmp_path):
