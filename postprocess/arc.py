@@ -48,7 +48,7 @@ def undeformed(arc: ArcProfile, side: str, scene: Scene) -> Array:
     The hole's centre is the origin. So is the pin's in a ring; in a block it touches the hole, ``(0, -dR)``.
     """
     g = scene.joint
-    centre = -g.dR if side == "pin" and g.model == "block" else 0.0
+    centre = -g.pin_depth if side == "pin" else 0.0
     return np.stack([arc.radius * np.sin(arc.angle), centre - arc.radius * np.cos(arc.angle)], axis=-1)
 
 

@@ -125,7 +125,7 @@ def magnification(scene: Scene, fields: Fields) -> float:
 def pin_centre(scene: Scene, delta: float = 0.0) -> float:
     """Height of the centre of a rigid pin pressed by ``delta``, or of an elastic one before it is pressed; that of the
     hole is 0."""
-    return -delta - (scene.joint.dR if scene.joint.model == "block" else 0.0)
+    return -delta - scene.joint.pin_depth
 
 
 def nominal(scene: Scene, fields: Fields) -> Array:

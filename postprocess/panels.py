@@ -68,7 +68,7 @@ def arc_panel(axes: Any, run: Run) -> None:
             axes.plot(np.degrees(angle), p, **style | {"label": None, "ls": "--"})
         angle, p = last.facet_means()
         axes.plot(np.degrees(angle), p, **style)
-    reach = 180 if scene.joint.model == "ring" else 90
+    reach = round(np.degrees(scene.joint.arc_end))
     axes.set(xlabel="angle from the contact axis [°]", ylabel=f"p [{scene.units.stress}]", xlim=(0, reach))
     axes.set(ylim=(0, None), title=f"contact pressure on the arc{' (hole solid, pin dashed)' if first else ''}")
     axes.set_xticks(np.arange(0, reach + 1, reach / 6))

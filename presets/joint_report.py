@@ -67,7 +67,7 @@ def rough_arcs(joint: Joint) -> list[str]:
 def step_warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
     """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
     said, core_peeq = [], joint.core_peeq()
-    if joint.scene.joint.model == "block" and any(p.in_contact[-1] > 0 for p in profiles.values()):
+    if joint.scene.joint.arc_end < np.pi and any(p.in_contact[-1] > 0 for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
     touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
     if m.contact_area and touching < _FEW_FACETS:

@@ -99,8 +99,17 @@ class JointGeometry(Section):
             t = h + g * depth
             return (1 - sign * h / g) / g * (1 / h - 1 / t) + sign * math.log(t / h) / g**2
 
-        angle = math.pi if self.model == "ring" else math.pi / 2
-        return angle * (ring(-1, 1.0) + ring(1, width - 1)) / (math.sqrt(3) / 4)
+        return self.arc_end * (ring(-1, 1.0) + ring(1, width - 1)) / (math.sqrt(3) / 4)
+
+    @property
+    def arc_end(self) -> float:
+        """Angle [rad] from the contact axis to which the arcs are modelled: a quarter of a circle, in a ring half."""
+        return math.pi if self.model == "ring" else math.pi / 2
+
+    @property
+    def pin_depth(self) -> float:
+        """How far below the hole's centre that of the pin lies at first: they touch, in a ring they are concentric."""
+        return 0.0 if self.model == "ring" else self.dR
 
     @property
     def dR(self) -> float:
