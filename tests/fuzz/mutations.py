@@ -11,15 +11,13 @@ import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
-from typing import Any
+from typing import Any, NamedTuple
 
 import tomli_w
 
 from archord.scene.reference import example
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
-Mutation = Callable[[Random, str], bytes]
-Data = dict[str, Any]
 
 _TOKENS = (
     *("0", "-0.0", "-1", "1", "1e308", "-1e308", "1e-308", "5e-324", "1e400", "nan", "-nan", "inf", "-inf", "1e16"),
@@ -28,8 +26,50 @@ _TOKENS = (
     *("[]", "[1.0]", "[[1], [2]]", "{}", "{ a = 1 }", "{ value = 1.0, unit = 'mm' }", "[" * 50 + "]" * 50, "-", "+1"),
     *("1979-05-27", "07:32:00", "1979-05-27T07:32:00Z", "null", "None", "1,5", "10 mm", "''''''", '"""a\nb"""', ""),
 )
+_NAMES = ("", " ", "ключ", "a.b", "__class__", "model_config", "\u202e", "x" * 3000, "mesh", "radius", "E", "force")
+_SECTIONS = ("joint", "pin", "block", "load", "analysis")
+_LENGTHS = ("radius", "clearance", "block_size", "element_size", "displacement_absolute")
+_MODULI = ("E", "yield_stress", "hardening")
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?(?![\w.])")
 _VALUE = re.compile(r"(?<= = )[^#\n]+")
+
+
+class _Power(NamedTuple):
+    """A random number between powers of ten, one in four negative if it is ``signed``."""
+
+    low: float
+    high: float
+    signed: bool = False
+
+    def draw(self, rng: Random) -> float:
+        sign = -1.0 if self.signed and rng.random() < 0.25 else 1.0
+        return sign * float(f"{10 ** rng.uniform(self.low, self.high):.3g}")
+
+
+# Section, keys of which there may be one, and values for it: lengths are times R, moduli times the body's E.
+_KEYS: tuple[tuple[str, tuple[str, ...], tuple[Any, ...]], ...] = (
+    ("joint", ("element_size", "relative_element_size"), (_Power(-12, 1), _Power(-1.5, 0), _Power(-1.5, 0))),
+    ("joint", ("clearance", "relative_clearance"), (_Power(-12, 0, True), _Power(-5, -0.5))),
+    ("joint", ("growth",), (0.0, 0.01, 0.9, 0.999999, 1.0, 1.000001, 1.1, 2.0, _Power(-6, 6))),
+    ("joint", ("block_size",), (2.0, 2.5, _Power(-2, 3, True), _Power(3, 30))),
+    ("joint", ("radius",), (_Power(-40, 40, True),)),
+    ("joint", ("model",), ("block", "ring", "Block", "")),
+    ("load", ("displacement", "displacement_absolute", "force", "relative_force"), (_Power(-12, 3, True),)),
+    ("load", ("steps",), (0, 1, 3, 7, 50, -5, 10**12, 2.0)),
+    ("load", ("max_cutbacks",), (0, 1, 30, 31, -1, 10**9)),
+    ("load", ("core_radius",), (0.0, 0.01, 0.5, 1.0, _Power(-12, 2))),
+    ("body", ("nu",), (0.0, 0.3, -0.9, -1.0, 0.5, 0.49, 0.4999, 0.499999, 0.5 - 1e-12, -1 + 1e-12)),
+    ("body", ("E",), (_Power(-12, 12),)),
+    ("body", ("yield_stress",), (_Power(-4, -1), _Power(-30, 3))),
+    ("body", ("hardening",), (0.0, 1.0, _Power(-3, 0), _Power(-20, 20))),
+    ("pin", ("rigid",), (True,)),
+    ("analysis", ("gamma_factor",), (_Power(-6, 9, True),)),
+    ("analysis", ("tolerance",), (_Power(-16, 0),)),
+    ("analysis", ("max_iterations",), (0, 1, 2, 3, 1000, 10**6, -1)),
+    ("analysis", ("plane",), ("strain", "stress")),
+    ("analysis", ("kinematics",), ("current", "reference")),
+    ("analysis", ("integration",), ("both", "pin", "block")),
+)
 
 
 def base_scenes() -> dict[str, str]:
@@ -58,38 +98,23 @@ def mutate(rng: Random, text: str) -> tuple[str, bytes]:
 
 
 def _bytes(rng: Random, text: str) -> bytes:
-    raw = bytearray(text.encode() or b"\n")
-    at, length = rng.randrange(len(raw) + 1), rng.choice((1, 1, 2, 5, 40))
-    change = rng.randrange(12)
-    if change == 0:
-        for _ in range(length):
-            raw[rng.randrange(len(raw))] = rng.randrange(256)
-    elif change == 1:
-        at = rng.randrange(len(raw))
-        raw[at] ^= 1 << rng.randrange(8)
-    elif change == 2:
-        del raw[at : at + length]
-    elif change == 3:
-        raw[at:at] = rng.randbytes(length)
-    elif change == 4:
-        del raw[at:]
-    elif change == 5:
-        raw[at:at] = rng.choice((b"\0", b"\xff", b"\r", b"\x1b[31m", b"\t", b"\xc3\x28", b"\xe2\x80\xae", b"[", b'"'))
-    elif change == 6:
-        return text.encode(rng.choice(("utf-8-sig", "utf-16", "utf-32", "utf-16-be")))
-    elif change == 7:
-        return f"# Größe\n{text}".encode("latin-1", errors="replace")
-    elif change == 8:
-        return text.replace("\n", rng.choice(("\r\n", "\r", "\n\n", "\0\n"))).encode()
-    elif change == 9:
-        return rng.choice((b"", b"\n", rng.randbytes(2000), b"\x7fELF" + bytes(3000), b"[" * 20000, b"a." * 5000))
-    elif change == 10:
-        many = "".join(f"k{i} = 1\n" for i in range(3000))
-        return (text + rng.choice(("# " + "x" * 2_000_000, "\n" * 500_000, many))).encode()
-    else:
-        start = rng.randrange(len(raw) + 1)
-        raw[at:at] = raw[start : start + 200]
-    return bytes(raw)
+    raw = text.encode() or b"\n"
+    at, other, length = rng.randrange(len(raw)), rng.randrange(len(raw)), rng.choice((1, 1, 2, 5, 40))
+    odd = rng.choice((b"\0", b"\xff", b"\r", b"\x1b[31m", b"\t", b"\xc3\x28", b"\xe2\x80\xae", b"[", b'"'))
+    newline = rng.choice(("\r\n", "\r", "\n\n", "\0\n"))
+    many = "".join(f"k{i} = 1\n" for i in range(3000))
+    changed = (
+        *(raw[:at] + new + raw[at + length :] for new in (b"", rng.randbytes(length))),
+        *(raw[:at] + new + raw[at:] for new in (odd, rng.randbytes(length), raw[other : other + 200])),
+        raw[:at] + bytes([raw[at] ^ 1 << rng.randrange(8)]) + raw[at + 1 :],
+        raw[:at],
+        text.encode(rng.choice(("utf-8-sig", "utf-16", "utf-32", "utf-16-be"))),
+        f"# Größe\n{text}".encode("latin-1", errors="replace"),
+        text.replace("\n", newline).encode(),
+        rng.choice((b"", b"\n", rng.randbytes(2000), b"\x7fELF" + bytes(3000), b"[" * 20000, b"a." * 5000)),
+        raw + rng.choice(("# " + "x" * 2_000_000, "\n" * 500_000, many)).encode(),
+    )
+    return rng.choice(changed)
 
 
 def _tokens(rng: Random, text: str) -> bytes:
@@ -97,156 +122,67 @@ def _tokens(rng: Random, text: str) -> bytes:
     if not places:
         return text.encode()
     place = rng.choice(places)
-    new = rng.choice(_TOKENS)
-    if rng.random() < 0.15:
-        new = rng.choice(places)[0]
-    elif rng.random() < 0.1:
-        new = place[0] + rng.choice(("e5", "e-5", ".", "_", "__0", " ", "e", "x", "0"))
+    appended = place[0] + rng.choice(("e5", "e-5", ".", "_", "__0", " ", "e", "x", "0"))
+    new = rng.choices((rng.choice(_TOKENS), rng.choice(places)[0], appended), weights=(8, 1, 1))[0]
     return (text[: place.start()] + new + text[place.end() :]).encode("utf-8", "surrogatepass")
 
 
 def _structure(rng: Random, text: str) -> bytes:
+    """Keys, sections or lines that are missing, renamed, doubled, moved or of another kind."""
     if rng.random() < 0.3:
-        return _lines(rng, text)
+        lines = text.splitlines(keepends=True) or ["\n"]
+        line = lines.pop(rng.randrange(len(lines)))
+        for _ in range(rng.randrange(3)):
+            lines.insert(rng.randrange(len(lines) + 1), line.lstrip(rng.choice(("", "# "))))
+        return "".join(lines).encode()
     data = tomllib.loads(text)
-    tables = [name for name, value in data.items() if isinstance(value, dict)] or [""]
-    section = rng.choice(tables)
-    table = data.get(section, data)
-    key = rng.choice(list(table)) if table else "radius"
-    change = rng.randrange(10)
+    section = rng.choice([name for name, value in data.items() if isinstance(value, dict)] or [""])
+    table = data.get(section, {})
+    key, copy = rng.choice(list(table) or ["radius"]), dict(table)
+    nested: Any = table.get(key, 1)
+    for _ in range(rng.choice((1, 3, 30, 80))):
+        nested = {key: nested}
+    parent, name = rng.choice(((table, key), (data, section)))
+    change = rng.randrange(5)
     if change == 0:
-        table.pop(key, None)
+        parent.pop(name, None)
     elif change == 1:
-        data.pop(section, None)
+        parent[rng.choice((name + "s", name.upper(), *_NAMES))] = parent.pop(name, 1)
     elif change == 2:
-        table[rng.choice((key + "s", key.upper(), "", " ", "ключ", "a.b", "__class__", "model_config", "x" * 3000))] = (
-            1.0
-        )
+        parent[name] = rng.choice(([copy], [], [copy, copy], "text", 3, True, {}, nested))
     elif change == 3:
-        data[rng.choice((section + "s", section.upper(), "", "mesh", "\u202e", "__init__"))] = data.pop(section, 1)
-    elif change == 4:
-        table[key] = {key: table.get(key, 1)}
-    elif change == 5:
-        data[section] = rng.choice(([table], [], [table, table], "text", 3, True, {}))
-    elif change == 6:
-        data[rng.choice(("joint", "pin", "block", "load", "analysis", "units"))] = table
-    elif change == 7:
-        table[rng.choice(("clearance", "relative_clearance", "element_size", "displacement", "force", "E"))] = 0.01
-    elif change == 8:
-        nested: Any = 1
-        for _ in range(rng.choice((3, 30, 80))):
-            nested = {"a": nested}
-        table[key] = nested
+        data[rng.choice((*_SECTIONS, "units"))] = copy
     else:
         data = {section: data}
     return tomli_w.dumps(data).encode()
 
 
-def _lines(rng: Random, text: str) -> bytes:
-    lines = text.splitlines(keepends=True) or ["\n"]
-    a, b = rng.randrange(len(lines)), rng.randrange(len(lines))
-    change = rng.randrange(4)
-    if change == 0:
-        lines.insert(b, lines[a])
-    elif change == 1:
-        lines[a], lines[b] = lines[b], lines[a]
-    elif change == 2:
-        del lines[a]
-    else:
-        lines[a] = lines[a].lstrip("# ")
-    return "".join(lines).encode()
-
-
 def _values(rng: Random, text: str) -> bytes:
+    """Values of every size for the keys of the scene, or all of its lengths or moduli in another unit."""
     data = tomllib.loads(text)
-    sections = [data.get(name) for name in ("joint", "pin", "block", "analysis", "load")]
-    joint, pin, block, analysis, load = (table if isinstance(table, dict) else {} for table in sections)
-    data |= {"joint": joint, "pin": pin, "block": block, "analysis": analysis, "load": load}
-    R = joint.get("radius", 1.0)
-    R = R if isinstance(R, float) else 1.0
-
-    def power(low: float, high: float) -> float:
-        return float(f"{10 ** rng.uniform(low, high):.3g}")
-
-    def sign() -> float:
-        return rng.choice((1.0, 1.0, 1.0, -1.0))
-
-    def one_of(table: Data, names: tuple[str, ...], name: str, value: Any) -> None:
-        for other in names:
-            table.pop(other, None)
-        table[name] = value
-
-    def size() -> None:
-        value = power(-12, 1) if rng.random() < 0.3 else power(-1.5, 0)
-        absolute = rng.random() < 0.5
-        name = "element_size" if absolute else "relative_element_size"
-        one_of(joint, ("element_size", "relative_element_size"), name, value * R if absolute else value)
-
-    def clearance() -> None:
-        value, absolute = sign() * power(-12, 0), rng.random() < 0.5
-        name = "clearance" if absolute else "relative_clearance"
-        one_of(joint, ("clearance", "relative_clearance"), name, value * R if absolute else value)
-
-    def loading() -> None:
-        names = ("displacement", "displacement_absolute", "force", "relative_force")
-        ring = joint.get("model") == "ring"
-        name = rng.choice(names if rng.random() < 0.2 else names[2:] if ring else names[:2])
-        scale = {"displacement": 1.0, "displacement_absolute": 0.01 * R, "force": R, "relative_force": 1.0}[name]
-        one_of(load, names, name, sign() * scale * power(-12, 3))
-
-    def poisson() -> None:
-        near = rng.choice((0.0, 0.3, -0.9, -1.0, 0.5, 0.49, 0.4999, 0.499999, 0.5 - 1e-12, -1 + 1e-12))
-        rng.choice((pin, block))["nu"] = near
-
-    def stiffness() -> None:
-        body = rng.choice((pin, block))
-        body["E"] = float(body["E"] if isinstance(body.get("E"), float) else 1.0) * power(-12, 12)
-
-    def strength() -> None:
-        body = rng.choice((pin, block))
-        E = body["E"] if isinstance(body.get("E"), float) else 1.0
-        body["yield_stress"] = E * power(*rng.choice(((-4, -1), (-30, 3))))
-        if rng.random() < 0.6:
-            body["hardening"] = E * rng.choice((0.0, 1.0, power(-3, 0), power(-20, 20)))
-
-    def units() -> None:
-        scale = power(-40, 40) if rng.random() < 0.5 else rng.choice((1e-9, 1e9))
-        for table in (joint, load):
-            for name in ("radius", "clearance", "block_size", "element_size", "displacement_absolute"):
-                if isinstance(table.get(name), float):
-                    table[name] *= scale
-
-    def modulus_units() -> None:
-        scale = power(-40, 40)
-        for table in (pin, block):
-            for name in ("E", "yield_stress", "hardening"):
-                if isinstance(table.get(name), float):
-                    table[name] *= scale
-
-    def rigid() -> None:
-        pin.clear()
-        pin["rigid"] = True
-
-    changes: list[Callable[[], Any]] = [
-        *(size, clearance, clearance, loading, loading, poisson, stiffness, strength, strength, units, modulus_units),
-        lambda: joint.update(growth=rng.choice((0.0, 0.01, 0.9, 0.999999, 1.0, 1.000001, 1.1, 2.0, power(-6, 6)))),
-        lambda: joint.update(block_size=sign() * R * rng.choice((2.0, 2.5, power(-2, 3), power(3, 30)))),
-        lambda: joint.update(radius=sign() * power(-40, 40)),
-        lambda: joint.update(model=rng.choice(("block", "ring", "Block", ""))),
-        lambda: load.update(steps=rng.choice((0, 1, 3, 7, 50, int(power(0, 9)), -5, 10**12, 2.0))),
-        lambda: load.update(max_cutbacks=rng.choice((0, 1, 30, 31, -1, 10**9))),
-        lambda: load.update(core_radius=rng.choice((0.0, 0.01, 0.5, 1.0, power(-12, 2)))),
-        lambda: analysis.update(gamma_factor=sign() * power(-6, 9)),
-        lambda: analysis.update(tolerance=power(-16, 0)),
-        lambda: analysis.update(max_iterations=rng.choice((0, 1, 2, 3, 1000, int(power(0, 6)), -1))),
-        lambda: analysis.update(plane=rng.choice(("strain", "stress"))),
-        lambda: analysis.update(kinematics=rng.choice(("current", "reference"))),
-        lambda: analysis.update(integration=rng.choice(("both", "pin", "block"))),
-        rigid,
-    ]
-    for _ in range(rng.choice((1, 2, 3))):
-        rng.choice(changes)()
+    data |= {name: {} for name in _SECTIONS if not isinstance(data.get(name), dict)}
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        if rng.random() < 0.1:
+            names, scale = rng.choice((_LENGTHS, _MODULI)), _Power(-40, 40).draw(rng)
+            for table in (data[name] for name in _SECTIONS):
+                table.update({key: table[key] * scale for key in names if isinstance(table.get(key), float)})
+            continue
+        section, keys, values = rng.choice(_KEYS)
+        section = rng.choice(("pin", "block")) if section == "body" else section
+        table = data[section]
+        value, key = rng.choice(values), rng.choice(keys)
+        unit = table.get("E") if key in _MODULI else data["joint"].get("radius") if key in _LENGTHS else None
+        if isinstance(value, _Power):
+            value = value.draw(rng)
+        for other in table if key == "rigid" else keys:
+            table = {name: kept for name, kept in table.items() if name != other}
+        data[section] = table | {key: value * unit if isinstance(unit, float) and unit else value}
     return tomli_w.dumps(data).encode()
 
 
-KINDS: dict[str, Mutation] = {"bytes": _bytes, "tokens": _tokens, "structure": _structure, "values": _values}
+KINDS: dict[str, Callable[[Random, str], bytes]] = {
+    "bytes": _bytes,
+    "tokens": _tokens,
+    "structure": _structure,
+    "values": _values,
+}
