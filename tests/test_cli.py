@@ -196,31 +196,6 @@ def test_ranks_stop_together(tmp_path):
     assert report["totals"]["accepted_steps"] == len(read_history(tmp_path / "run" / "history.csv")["P"])
 
 
-@pytest.fixture(scope="module")
-def solved(tmp_path_factory):
-    """A folder with a run and an empty folder."""
-    folder = tmp_path_factory.mktemp("solved")
-    (folder / "empty").mkdir()
-    assert archord("solve", SCENE, *COARSE, "--set", "load.steps=1", "-o", "run", "-q", cwd=folder).returncode == 0
-    return folder
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["empty"], "empty: is not a run folder: scene.toml is missing."),
-        (["run", "-o", "nowhere/picture.png"], "nowhere/picture.png: cannot be written: nowhere is not a folder."),
-        (["run", "-o", "picture.xyz"], "picture.xyz: must end in one of "),
-    ],
-)
-def test_a_picture_that_cannot_be_drawn_is_one_sentence(solved, arguments, said):
-    """No run, no folder, no such format."""
-    result = archord("picture", *arguments, cwd=solved)
-    assert result.returncode == 2
-    assert result.stderr.startswith(said)
-    assert len(result.stderr.splitlines()) == 1
-
-
 def test_scene_prints_schema_and_example(tmp_path):
     """The schema is JSON and names every section; the example solves."""
     schema = json.loads(archord("scene", "--schema", cwd=tmp_path).stdout)

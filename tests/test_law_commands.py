@@ -63,24 +63,6 @@ def test_outside_the_range_rows_are_nan_and_one_warning(capsys):
     assert run(["law", "johnson", *JOINT, "--to", "2", "--strict"]) == 2
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["law", "jonson", *JOINT], "jonson: is not a known law; did you mean johnson?"),
-        (["law", "johnson", "--radius", "1"], "--clearance, --E-star: missing"),
-        (["law", "johnson", *JOINT, "--clearance", "-1"], "clearance = -1 must be a positive number."),
-        (["law", "paper-plastic", *JOINT], "paper-plastic: this law needs yield_stress."),
-        (["law", "paper", *JOINT, "--to", "-2"], "--to -2: must be a positive number."),
-        (["law", "paper", *JOINT, "--points", "0"], "--points 0: must be between 1 and 100000."),
-        (["law", "paper", *JOINT, "--set", "joint.radius=1"], "--set: changes a scene"),
-        (["law", "paper", "--scene", "nowhere.toml"], "nowhere.toml: cannot be read"),
-        (["law", "paper", *JOINT, "--plot", "laws.xyz"], "laws.xyz: must end in one of "),
-    ],
-)
-def test_bad_input_is_one_sentence(refused, arguments, said):
-    assert refused(arguments).startswith(said)
-
-
 def test_a_ring_has_no_law_with_displacements(tmp_path, capsys, refused):
     """One sentence that says how wrong it would be; p0 and eps of a load are a ring's as well."""
     ring = tmp_path / "ring.toml"
@@ -143,8 +125,6 @@ def test_calibrated_law_beside_the_paper_s(capsys):
     assert run(["law", "calibrated", "paper-plastic", *numbers, "--plane", "strain", "--nu", "0.3"]) == 0
     ours, paper = map(table, capsys.readouterr().out.split("\n\n"))
     assert ours["P/E*dR"][-1] > 1.3 * paper["P/E*dR"][-1]
-    assert run(["law", "calibrated", *numbers, "--plane", "strain"]) == 2
-    assert capsys.readouterr().err == "calibrated: this law needs nu.\n"
     assert run(["law", "calibrated", *numbers, "--plane", "strain", "--nu", "0.3", "--yielding", "pin"]) == 0
     out, err = capsys.readouterr()
     assert "only the pin yields" in err

@@ -1,7 +1,6 @@
 """Commands under a launcher: one report, one file, one exit code, and no MPI where there is nothing to share."""
 
 import os
-import shutil
 from pathlib import Path
 
 import pytest
@@ -13,29 +12,21 @@ SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")
 COARSE = ["--set", "joint.relative_element_size=0.3"]
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
-    """A run to fit and draw."""
-    target = tmp_path_factory.mktemp("ranks")
-    assert archord("solve", SCENE, *COARSE, "-o", "run", "-q", cwd=target).returncode == 0
-    return target
-
-
 @pytest.mark.parametrize(
     ("arguments", "written"),
     [
         (["law", "johnson", "--scene", SCENE], None),
-        (["fit", "run", "--json", "FILE"], "fit.json"),
+        (["fit", "{coarse}", "--json", "FILE"], "fit.json"),
         (["export-deck", SCENE, *COARSE, "-o", "FILE"], "deck.inp"),
     ],
 )
-def test_two_ranks_say_and_write_what_one_does(folder, arguments, written):
+def test_two_ranks_say_and_write_what_one_does(runs, tmp_path, arguments, written):
     """stdout, stderr and file to the last byte."""
     found = []
     for n in (0, 2):
-        file = folder / f"{n}" / (written or "none")
+        file = tmp_path / f"{n}" / (written or "none")
         file.parent.mkdir(exist_ok=True)
-        result = archord(*(a.replace("FILE", str(file)) for a in arguments), cwd=folder, ranks=n)
+        result = archord(*(a.replace("FILE", str(file)).format(**runs) for a in arguments), cwd=tmp_path, ranks=n)
         assert result.returncode == 0, result.stderr
         said = result.stdout.replace("\r\n", "\n").replace(str(file), "FILE")
         found.append((said, result.stderr, file.read_bytes() if written else None))
@@ -100,46 +91,3 @@ def test_a_command_of_one_rank_forgets_the_launcher(launched, rank):
         5 if rank == "0" else 0
     )
     assert seen == ([False] if rank == "0" else [])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["picture", "run", "-o", "run/history.csv"], "run/history.csv: cannot be written: it belongs to "),
-        (["fit", "run", "--json", "run/history.csv"], "run/history.csv: cannot be written: it belongs to "),
-        (["fit", "run", "--json", "x", "--python", "./x"], "--json, --python, --picture: must be different files."),
-        (["fit", "run", "--json", "/dev/full"], "/dev/full: cannot be written: No space left on device."),
-        (["picture", "run", "-o", "/proc/x.png"], "/proc/x.png: cannot be written: No such file or directory."),
-        (["law", "paper", "--scene", SCENE, "--plot", "/proc/x.png"], "/proc/x.png: cannot be written: No such file"),
-        (["reproduce", "fig2", "-o", "run/history.csv"], "run/history.csv: is a file, not a run folder."),
-        (["export-deck", SCENE, "-o", "run"], "run: cannot be written: it is a folder."),
-    ],
-)  # fmt: skip
-def test_results_that_cannot_be_written(folder, monkeypatch, refused, arguments, said):
-    """One sentence, and the run stays as it is."""
-    monkeypatch.chdir(folder)
-    before = {p: p.stat().st_mtime_ns for p in folder.rglob("*")}
-    assert refused(arguments).startswith(said)
-    assert {p: p.stat().st_mtime_ns for p in folder.rglob("*")} == before
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "said"),
-    [
-        ("history.csv", "", "run/history.csv: cannot be read as the history of a run."),
-        ("history.csv", "step,delta\n1", "run/history.csv: cannot be read as the history of a run."),
-        ("history.csv", "delta,P,p0,eps,peeq_max\n1,nan,1,1,0\n", "run/history.csv: holds numbers that are not "),
-        ("scene.toml", "[joint", "run/scene.toml: is not valid TOML"),
-        ("fields.h5", "", "run/fields.h5: cannot be read as the fields of a run"),
-        ("contact.h5", None, "run: is not a complete run folder: contact.h5 is missing."),
-    ],
-)  # fmt: skip
-def test_a_broken_run_cannot_be_drawn(folder, tmp_path, monkeypatch, refused, name, text, said):
-    """A sentence that names the file, no picture."""
-    monkeypatch.chdir(tmp_path)
-    shutil.copytree(folder / "run", tmp_path / "run")
-    (tmp_path / "run" / name).unlink()
-    if text is not None:
-        (tmp_path / "run" / name).write_text(text)
-    assert refused(["picture", "run"]).startswith(said)
-    assert not (tmp_path / "run" / "picture.png").exists()

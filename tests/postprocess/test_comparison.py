@@ -120,22 +120,6 @@ def test_compare_draws_and_tells_the_difference(runs, more, tmp_path, capsys):
     assert target.read_bytes()[1:4] == b"PNG"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["{coarse}"], "compare: needs two runs or more."),
-        (["{coarse}", "{coarse}", "-o", "nowhere/x.png"], "nowhere/x.png: cannot be written: nowhere is not a folder."),
-        (["{coarse}", "{coarse}", "-o", "x.abc"], "x.abc: must end in one of "),
-        (["{coarse}", "nowhere"], "nowhere: is not a run folder: scene.toml is missing."),
-    ],
-)
-def test_what_cannot_be_compared_is_one_sentence(runs, tmp_path, monkeypatch, refused, arguments, said):
-    """And nothing is drawn."""
-    monkeypatch.chdir(tmp_path)
-    assert refused(["compare", *(a.format(**runs) for a in arguments)]).startswith(said)
-    assert not list(tmp_path.iterdir())
-
-
 def test_runs_without_a_common_displacement(runs, more):
     """A sentence."""
     run = Run(runs["coarse"])

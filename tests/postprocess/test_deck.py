@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-import os
 
 import numpy as np
 import pytest
 
 from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.calculix import areas
+from archord.cli import run
 from archord.geometry.joint_mesh import Cells, Facets
 from archord.postprocess.deck import contact_stiffness, deck, deck_mesh
-from tests.forked import archord
+from archord.scene.file import resolved
 
 W, DR, STEPS = 4.0, 0.005, 3
 COARSE = {"element_size": 0.2, "block_size": W, "growth": 0.5}
@@ -54,13 +54,14 @@ def read(text):
 
 @pytest.fixture(scope="module", params=KINDS)
 def written(request):
-    return request.param, deck(scene(), deck_mesh(scene(), request.param))
+    """Kind of elements, text, and what `read` makes of it."""
+    text = deck(scene(), deck_mesh(scene(), request.param))
+    return request.param, text, *read(text)
 
 
 def test_counts(written):
     """Two separate discs by Euler's formula: vertices - edges + faces = 1 each, and every node in some element."""
-    kind, text = written
-    nodes, elements, bodies, _, _ = read(text)
+    kind, _, nodes, elements, bodies, _, _ = written
     assert {n for e in elements.values() for n in e} == set(nodes)
     assert {len(e) for e in elements.values()} == {6 if kind == "quadratic" else 3}
     corners = {n for e in elements.values() for n in e[:3]}
@@ -75,18 +76,24 @@ def test_linear_elements_are_quarters_of_the_quadratic_ones():
     quadratic, linear = (deck_mesh(scene(), kind) for kind in KINDS)
     np.testing.assert_array_equal(quadratic.x, linear.x)
     assert len(linear.elements) == 4 * len(quadratic.elements)
+    assert set(quadratic.edges) == set(Facets)  # every condition of docs/theory.md has its edges
+    assert all(len(edges) for edges in quadratic.edges.values())
     for body in Cells:
         a, b = (areas(m)[m.bodies == body].sum() for m in (quadratic, linear))
         assert a == pytest.approx(b, rel=5e-3)
 
 
 def test_elements_turn_counterclockwise_and_fill_the_bodies(written):
-    """Positive corners' area each; with parabolic edges the bodies' exact areas to O(h^4)."""
-    kind, text = written
-    nodes, elements, _, _, _ = read(text)
+    """Positive corners' area each; with parabolic edges the bodies' exact areas to O(h^4). Node 4 is between 1 and 2, 5
+    between 2 and 3, 6 between 3 and 1: nearer to the middle than the arc's height."""
+    kind, _, nodes, elements, *_ = written
     for element in elements.values():
         (x0, y0), (x1, y1), (x2, y2) = (nodes[n] for n in element[:3])
         assert (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0) > 0
+        x = np.array([nodes[n] for n in element])
+        following = np.roll(x[:3], -1, axis=0)
+        apart = np.linalg.norm((x[:3] + following) / 2 - x[3:], axis=1) if kind == "quadratic" else 0
+        assert np.all(apart < 0.05 * np.linalg.norm(following - x[:3], axis=1))
     mesh = deck_mesh(scene(), kind)
     exact = {Cells.PIN: math.pi / 4, Cells.BLOCK: W**2 - math.pi / 4 * (1 + DR) ** 2}
     tolerance = 1e-4 if kind == "quadratic" else 5e-3
@@ -94,28 +101,9 @@ def test_elements_turn_counterclockwise_and_fill_the_bodies(written):
         assert areas(mesh)[mesh.bodies == body].sum() == pytest.approx(area, rel=tolerance)
 
 
-def test_midpoints_belong_to_their_edges():
-    """Node 4 between 1 and 2, 5 between 2 and 3, 6 between 3 and 1: nearer to the middle than the arc's height."""
-    nodes, elements, _, _, _ = read(deck(scene(), deck_mesh(scene(), "quadratic")))
-    for element in elements.values():
-        x = np.array([nodes[n] for n in element])
-        edge = np.linalg.norm(np.roll(x[:3], -1, axis=0) - x[:3], axis=1)
-        apart = np.linalg.norm((x[:3] + np.roll(x[:3], -1, axis=0)) / 2 - x[3:], axis=1)
-        assert np.all(apart < 0.05 * edge)
-
-
-def test_arc_nodes_lie_on_their_circles(written):
-    """All of them, to the digits that the format holds: the clearance is a small difference of large numbers."""
-    nodes, _, _, sets, _ = read(written[1])
-    for name, radius, centre in (("PIN_ARC", 1.0, -DR), ("HOLE_ARC", 1 + DR, 0.0)):
-        x = np.array([nodes[n] for n in sets[name]]) - [0, centre]
-        np.testing.assert_allclose(np.linalg.norm(x, axis=1), radius, rtol=0, atol=2e-14)
-
-
 def test_surfaces_cover_the_arcs(written):
     """Sides chain from the axis to the top without gap, over exactly the arc's nodes, on elements of their body."""
-    kind, text = written
-    nodes, elements, bodies, sets, surfaces = read(text)
+    kind, _, nodes, elements, bodies, sets, surfaces = written
     for name, body, radius in (("PIN_ARC", "PIN", 1.0), ("HOLE_ARC", "BLOCK", 1 + DR)):
         sides, listed = [], set()
         for label, side in surfaces[f"{name}_SURFACE"]:
@@ -132,16 +120,18 @@ def test_surfaces_cover_the_arcs(written):
 
 
 def test_sets_lie_where_their_names_say(written):
-    """Supports and loaded edge, on both bodies where both are cut."""
-    nodes, _, _, sets, _ = read(written[1])
-    assert [nodes[n][1] for n in sets["PIN_TOP"]] == pytest.approx([-DR] * len(sets["PIN_TOP"]), abs=1e-14)
-    assert [nodes[n][1] for n in sets["BLOCK_HELD"]] == pytest.approx([0.0] * len(sets["BLOCK_HELD"]), abs=1e-14)
+    """Supports and loaded edge, on both bodies where both are cut; arcs on their circles, to the digits that the format
+    holds: the clearance is a small difference of large numbers."""
+    nodes, sets = written[2], written[5]
+    x = {name: np.array([nodes[n] for n in labels]) for name, labels in sets.items()}
+    for name, height in (("PIN_TOP", -DR), ("BLOCK_HELD", 0.0)):
+        np.testing.assert_allclose(x[name][:, 1], height, rtol=0, atol=1e-14)
+    for name, radius, centre in (("PIN_ARC", 1.0, -DR), ("HOLE_ARC", 1 + DR, 0.0)):
+        np.testing.assert_allclose(np.linalg.norm(x[name] - [0, centre], axis=1), radius, rtol=0, atol=2e-14)
     assert sets["SYMMETRY"] & sets["PIN_NODES"]
     assert sets["SYMMETRY"] - sets["PIN_NODES"]
-    x = np.array(list(nodes.values()))
-    on_axis = {n for n in nodes if abs(nodes[n][0]) < 1e-12}
-    assert sets["SYMMETRY"] == on_axis
-    assert x[:, 0].max() == pytest.approx(W)
+    assert sets["SYMMETRY"] == {n for n in nodes if abs(nodes[n][0]) < 1e-12}
+    assert max(place[0] for place in nodes.values()) == pytest.approx(W)
 
 
 def test_steps_push_the_pin_down_in_equal_parts(written):
@@ -204,48 +194,24 @@ def test_lines_fit_into_what_calculix_reads(written):
             assert all(len(word.strip()) <= 20 for word in words)
 
 
-def test_the_command_writes_a_deck_and_bad_input_is_one_sentence(tmp_path):
-    """Named after the scene, refused where one is, exit code 2 for what cannot be."""
-    (tmp_path / "joint.toml").write_text(
-        "[joint]\nradius = 10.0\nclearance = 0.05\nrelative_element_size = 0.3\n[pin]\nrigid = true\n"
-        "[block]\nE = 1000.0\nnu = 0.3\n[load]\ndisplacement = 2.0\n"
-    )
-
-    def export(*arguments):
-        return archord("export-deck", *arguments, cwd=tmp_path)
-
-    first = export("joint.toml", "--elements", "linear", "--set", "load.steps=2")
-    assert (first.returncode, first.stdout, first.stderr) == (0, "joint.inp\n", "")
+def test_the_command_writes_a_deck_and_nothing_over_what_is_there(tmp_path, monkeypatch, capsys, refused):
+    """Named after the scene, refused where one is, and never over an input of the command."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "joint.toml").write_text(resolved(paper_joint(0.3, pin={"rigid": True})))
+    (tmp_path / "cycle.csv").write_text("displacement\n2\n")
+    assert run(["export-deck", "joint.toml", "--elements", "linear", "--set", "load.steps=2"]) == 0
+    assert capsys.readouterr() == ("joint.inp\n", "")
     text = (tmp_path / "joint.inp").read_text()
     assert text.count("*STEP") == 2
     assert "TYPE=CPE3" in text
-    faults = [
-        (["joint.toml"], "joint.inp: is there already; choose another file, or overwrite it with --force."),
-        (["joint.toml", "-o", "no/x.inp"], "no/x.inp: cannot be written: no is not a folder."),
-        (["joint.toml", "--set", "block.nu=2", "-o", "x.inp"], "--set block.nu=2: block.nu must be"),
-        (["none.toml"], "none.toml: cannot be read"),
-    ]
-    for arguments, said in faults:
-        result = export(*arguments)
-        assert result.returncode == 2
-        assert said in result.stderr
-        assert len(result.stderr.splitlines()) == 1
-    (tmp_path / "cycle.csv").write_text("displacement\n2\n")
-    from_file = ["joint.toml", "--set", "load.path=cycle.csv", "--force", "-o"]
-    for arguments in (["joint.toml", "--force", "-o", "joint.toml"], [*from_file, "cycle.csv"]):
-        before = (tmp_path / arguments[-1]).read_text()
-        result = export(*arguments)
-        assert (result.returncode, result.stdout) == (2, "")
-        assert result.stderr == f"{arguments[-1]}: cannot be written: it is an input of the command.\n"
-        assert (tmp_path / arguments[-1]).read_text() == before
-    (tmp_path / "cycle.csv").unlink()
-    assert export("joint.toml", "--elements", "cubic").returncode == 2
-    assert sorted(os.listdir(tmp_path)) == ["joint.inp", "joint.toml"]
-    assert (tmp_path / "joint.inp").read_text() == text
-
-
-def test_facets_of_the_deck_are_those_of_the_solver():
-    """Every condition of docs/theory.md has its edges."""
-    mesh = deck_mesh(scene(), "quadratic")
-    assert set(mesh.edges) == set(Facets)
-    assert all(len(edges) for edges in mesh.edges.values())
+    there = "joint.inp: is there already; choose another file, or overwrite it with --force.\n"
+    from_file = ["--set", "load.path=cycle.csv", "--set", "load.steps="]
+    before = {path: path.read_text() for path in tmp_path.iterdir()}
+    for options, said in (
+        ([], there),
+        (["--force", "-o", "joint.toml"], "joint.toml: cannot be written: it is an input of the command.\n"),
+        ([*from_file, "--force", "-o", "cycle.csv"], "cycle.csv: cannot be written: it is an input of the command.\n"),
+    ):
+        assert refused(["export-deck", "joint.toml", *options]) == said
+    assert run(["export-deck", "joint.toml", "--elements", "cubic"]) == 2
+    assert {path: path.read_text() for path in tmp_path.iterdir()} == before

@@ -90,23 +90,3 @@ def test_nothing_is_overwritten_without_force(runs, tmp_path, refused):
     assert [file.read_text() for file in tmp_path.iterdir()] == ["mine"]
     assert command([*arguments, "--force"]) == 0
     assert len(list(tmp_path.iterdir())) == 1 + 2 * 6
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["{coarse}"], "export: give --vtk DIR, --csv DIR or both."),
-        (["{coarse}", "--vtk", "new", "--step", "7"], "{coarse}: has no step 7; its accepted steps are 1 to 6."),
-        (
-            ["{coarse}", "--csv", "{coarse}", "--force"],
-            "{coarse}/history.csv: cannot be written: it belongs to the run",
-        ),
-        (["nowhere", "--csv", "new"], "nowhere: is not a run folder: scene.toml is missing."),
-        (["{coarse}", "--csv", "{coarse}/run.json"], "{coarse}/run.json: cannot be made: File exists."),
-    ],
-)
-def test_what_cannot_be_exported_is_one_sentence(runs, tmp_path, monkeypatch, refused, arguments, said):
-    """And nothing is made."""
-    monkeypatch.chdir(tmp_path)
-    assert refused(["export", *(a.format(**runs) for a in arguments)]).startswith(said.format(**runs))
-    assert not list(tmp_path.iterdir())

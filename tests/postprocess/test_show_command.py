@@ -80,28 +80,3 @@ def test_a_killed_run_is_shown_as_far_as_it_came(copy, capsys):
     assert command(["show", str(copy)]) == 0
     assert capsys.readouterr().out.startswith(f"{copy}: running, or killed (if no archord works there, --restart ")
     assert Run(copy).steps == 3
-
-
-@pytest.mark.parametrize(
-    ("name", "length", "said"),
-    [
-        ("fields.h5", 1000, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
-        ("fields/0006.h5", None, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
-        ("fields.h5", 0, "{}/fields.h5: cannot be read as the fields of a run: it is damaged."),
-        ("fields.h5", None, "{}: is not a complete run folder: fields.h5 is missing."),
-        ("contact.h5", 3000, "{}/contact.h5: cannot be read as the contact of a run."),
-        ("contact.h5", None, "{}: is not a complete run folder: contact.h5 is missing."),
-        ("run.json", 100, "{}/run.json: cannot be read as the report of a run."),
-        ("run.json", None, "{}: is not a run folder: run.json is missing."),
-        ("history.csv", 30, "{}/history.csv: cannot be read as the history of a run."),
-        ("scene.toml", 25, "{}/scene.toml: is not valid TOML: "),
-    ],
-)
-def test_a_broken_run_is_one_sentence(copy, refused, name, length, said):
-    """A file cut short or missing: no table, no picture."""
-    content = (copy / name).read_bytes()
-    (copy / name).unlink()
-    if length is not None:
-        (copy / name).write_bytes(content[:length])
-    assert refused(["show", str(copy)]).startswith(said.format(copy))
-    assert not list(copy.glob("*.png"))

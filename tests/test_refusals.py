@@ -1,0 +1,94 @@
+"""What commands refuse: one sentence, exit code 2, nothing written, and runs that stay as they are."""
+
+import shutil
+
+import pytest
+
+from tests.test_cli import SCENE
+
+JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
+RUN, OTHER = "{coarse}", "{elastic}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["picture", "empty"], "empty: is not a run folder: scene.toml is missing."),
+        (["picture", RUN, "-o", "nowhere/x.png"], "nowhere/x.png: cannot be written: nowhere is not a folder."),
+        (["picture", RUN, "-o", "picture.xyz"], "picture.xyz: must end in one of "),
+        (["picture", RUN, "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be written: it belongs to "),
+        (["picture", RUN, "-o", "/proc/x.png"], "/proc/x.png: cannot be written: No such file or directory."),
+        (["compare", RUN], "compare: needs two runs or more."),
+        (["compare", RUN, RUN, "-o", "nowhere/x.png"], "nowhere/x.png: cannot be written: nowhere is not a folder."),
+        (["compare", RUN, RUN, "-o", "x.abc"], "x.abc: must end in one of "),
+        (["compare", RUN, "nowhere"], "nowhere: is not a run folder: scene.toml is missing."),
+        (["export", RUN], "export: give --vtk DIR, --csv DIR or both."),
+        (["export", RUN, "--vtk", "new", "--step", "7"], f"{RUN}: has no step 7; its accepted steps are 1 to 6."),
+        (["export", RUN, "--csv", RUN, "--force"], f"{RUN}/history.csv: cannot be written: it belongs to the run"),
+        (["export", "nowhere", "--csv", "new"], "nowhere: is not a run folder: scene.toml is missing."),
+        (["export", RUN, "--csv", f"{RUN}/run.json"], f"{RUN}/run.json: cannot be made: File exists."),
+        (["fit", RUN, "--json", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be written: it belongs to "),
+        (["fit", RUN, "--json", "x", "--python", "./x"], "--json, --python, --picture: must be different files."),
+        (["fit", RUN, "--json", "/dev/full"], "/dev/full: cannot be written: No space left on device."),
+        (["reproduce", "fig2", "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: is a file, not a run folder."),
+        (["export-deck", SCENE, "-o", RUN], f"{RUN}: cannot be written: it is a folder."),
+        (["export-deck", SCENE, "-o", "no/x.inp"], "no/x.inp: cannot be written: no is not a folder."),
+        (["export-deck", SCENE, "--set", "block.nu=2"], "--set block.nu=2: block.nu must be"),
+        (["export-deck", "none.toml"], "none.toml: cannot be read"),
+        (["law", "jonson", *JOINT], "jonson: is not a known law; did you mean johnson?"),
+        (["law", "johnson", "--radius", "1"], "--clearance, --E-star: missing"),
+        (["law", "johnson", *JOINT, "--clearance", "-1"], "clearance = -1 must be a positive number."),
+        (["law", "paper-plastic", *JOINT], "paper-plastic: this law needs yield_stress."),
+        (["law", "calibrated", *JOINT, "--yield-stress", "1", "--plane", "strain"], "calibrated: this law needs nu.\n"),
+        (["law", "paper", *JOINT, "--to", "-2"], "--to -2: must be a positive number."),
+        (["law", "paper", *JOINT, "--points", "0"], "--points 0: must be between 1 and 100000."),
+        (["law", "paper", *JOINT, "--set", "joint.radius=1"], "--set: changes a scene"),
+        (["law", "paper", "--scene", "nowhere.toml"], "nowhere.toml: cannot be read"),
+        (["law", "paper", *JOINT, "--plot", "laws.xyz"], "laws.xyz: must end in one of "),
+        (["law", "paper", "--scene", SCENE, "--plot", "/proc/x.png"], "/proc/x.png: cannot be written: No such file"),
+    ],
+)
+def test_bad_input_is_one_sentence(runs, tmp_path, monkeypatch, refused, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    before = {path: path.stat().st_mtime_ns for path in runs["coarse"].rglob("*")}
+    assert refused([argument.format(**runs) for argument in arguments]).startswith(said.format(**runs))
+    assert {path: path.stat().st_mtime_ns for path in runs["coarse"].rglob("*")} == before
+    assert [path.name for path in tmp_path.rglob("*")] == ["empty"]
+
+
+FIELDS = "run/fields.h5: cannot be read as the fields of a run: it is damaged."
+CONTACT = "run/contact.h5: cannot be read as the contact of a run."
+HISTORY = "run/history.csv: cannot be read as the history of a run."
+REPORT = "run/run.json: cannot be read as the report of a run."
+
+
+@pytest.mark.parametrize("command", ["show", "picture"])
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("fields.h5", 1000, FIELDS),
+        ("fields/0006.h5", None, FIELDS),
+        ("fields.h5", 0, FIELDS),
+        ("fields.h5", None, "run: is not a complete run folder: fields.h5 is missing."),
+        ("contact.h5", 3000, CONTACT),
+        ("contact.h5", None, "run: is not a complete run folder: contact.h5 is missing."),
+        ("run.json", 100, REPORT),
+        ("run.json", None, "run: is not a run folder: run.json is missing."),
+        ("history.csv", 0, HISTORY),
+        ("history.csv", 30, HISTORY),
+        ("history.csv", "step,delta\n1", HISTORY),
+        ("history.csv", "delta,P,p0,eps,peeq_max\n1,nan,1,1,0\n", "run/history.csv: holds numbers that are not "),
+        ("scene.toml", 25, "run/scene.toml: is not valid TOML: "),
+    ],
+)
+def test_a_broken_run_is_one_sentence(runs, tmp_path, monkeypatch, refused, command, name, content, said):
+    """A file cut short (to so many bytes), missing or with another text: no table, no picture."""
+    monkeypatch.chdir(tmp_path)
+    file = shutil.copytree(runs["coarse"], tmp_path / "run") / name
+    whole = file.read_bytes()
+    file.unlink()
+    if content is not None:
+        file.write_bytes(content.encode() if isinstance(content, str) else whole[:content])
+    assert refused([command, "run"]).startswith(said)
+    assert not list((tmp_path / "run").glob("*.png"))
