@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -27,8 +27,6 @@ from archord.scene.scene import Scene
 
 ELASTIC = (5_000, 30_000, 100_000, 300_000, 1_000_000)  # dofs
 PLASTIC = (5_000, 30_000, 100_000)
-UNGUIDED = {False: (30_000, 100_000), True: (30_000,)}  # dofs by whether plastic
-WEAK = (30_000, 100_000, 300_000)  # dofs per rank
 ELASTIC_STEPS, PLASTIC_STEPS = 2, 5
 YIELD_STRESS = 0.002  # over E*
 _COARSEST = {"element_size": 0.04, "growth": 0.25}  # both are scaled, so that the meshes are alike
@@ -54,15 +52,11 @@ REST = "rest"  # what no timer covers
 
 @dataclass(frozen=True)
 class Setting:
-    """The joint with about ``dofs`` unknowns, elastic or ``plastic``, on ``ranks`` ranks.
-
-    Not ``guided``: to show what a coarse start saves.
-    """
+    """The joint with about ``dofs`` unknowns, elastic or ``plastic``, on ``ranks`` ranks."""
 
     dofs: int
     ranks: int
     plastic: bool = False
-    guided: bool = True
 
     @property
     def material(self) -> str:
@@ -71,14 +65,14 @@ class Setting:
 
     @property
     def name(self) -> str:
-        """Material, size and ranks, and whether there is no coarse start."""
-        return f"{self.material}_{self.dofs}_on_{self.ranks}{'' if self.guided else '_unguided'}"
+        """Material, size and ranks."""
+        return f"{self.material}_{self.dofs}_on_{self.ranks}"
 
     def scene(self) -> Scene:
         """The joint to solve."""
         size, growth = refined(self.dofs)
         steps, strength = (PLASTIC_STEPS, YIELD_STRESS) if self.plastic else (ELASTIC_STEPS, None)
-        return paper_joint(size, steps, strength, joint={"growth": growth}, analysis={"coarse_start": self.guided})
+        return paper_joint(size, steps, strength, joint={"growth": growth})
 
 
 def refined(dofs: float) -> tuple[float, float]:
@@ -95,10 +89,8 @@ def refined(dofs: float) -> tuple[float, float]:
 
 
 def settings(largest: float, ranks: Sequence[int]) -> list[Setting]:
-    """All runs up to ``largest`` dofs, the smallest first: every size on every number of ``ranks``, the weak series on
-    several, the plastic series and runs without a coarse start on one.
-
-    Raises `InputError` if no size is left, or ``ranks`` do not begin with 1.
+    """All runs up to ``largest`` dofs, the smallest first: the elastic series on every number of ``ranks``, the plastic
+    one on one rank. Raises `InputError` if no size is left, or ``ranks`` do not begin with 1.
     """
     if largest < ELASTIC[0]:
         raise InputError(f"--largest {largest:g}: must be at least {ELASTIC[0]}, the dofs of the smallest mesh.")
@@ -107,10 +99,7 @@ def settings(largest: float, ranks: Sequence[int]) -> list[Setting]:
             f"--ranks {','.join(map(str, ranks))}: must be numbers of ranks that rise from 1, like 1,2, as everything "
             "is compared with one rank."
         )
-    found = [Setting(n, r) for n in ELASTIC for r in ranks]
-    found += [Setting(n * r, r) for n in WEAK for r in ranks[1:] if n * r not in ELASTIC and n in ELASTIC]
-    found += [Setting(n, 1, plastic=True) for n in PLASTIC]
-    found += [Setting(n, 1, plastic, guided=False) for plastic, sizes in UNGUIDED.items() for n in sizes]
+    found = [*(Setting(n, r) for n in ELASTIC for r in ranks), *(Setting(n, 1, plastic=True) for n in PLASTIC)]
     small = [setting for setting in found if setting.dofs <= largest]
     return sorted(small, key=lambda setting: setting.dofs * (PLASTIC_STEPS if setting.plastic else 1))
 
@@ -136,6 +125,11 @@ class Cost:
     force: float = 0.0
 
     @property
+    def linear_solve(self) -> float:
+        """Seconds of all factorisations and solves."""
+        return self.seconds["linear solve"]
+
+    @property
     def contact_share(self) -> float:
         """Part of the time that the contact takes, evaluation and assembly."""
         return self.seconds["contact"] / self.total
@@ -144,12 +138,12 @@ class Cost:
     def share_around_factors(self) -> float:
         """Part of the solve that is not the linear solver's: contact search, assembly, return map."""
         around = self.seconds["contact"] + self.seconds["bulk"]
-        return around / (around + self.seconds["linear solve"])
+        return around / (around + self.linear_solve)
 
     @property
     def each_factor(self) -> float:
         """Seconds of a factorisation and its solves."""
-        return self.seconds["linear solve"] / self.factorisations
+        return self.linear_solve / self.factorisations
 
     @property
     def peak(self) -> int:
@@ -212,7 +206,7 @@ def run(
     folder.mkdir(parents=True, exist_ok=True)
     time_all([process(Setting(3000, 1, plastic), folder) for plastic in (False, True)], 1)
     costs = []
-    for (dofs, _, _), same in groupby(found, key=lambda setting: (setting.dofs, setting.plastic, setting.guided)):
+    for (dofs, _), same in groupby(found, key=lambda setting: (setting.dofs, setting.plastic)):
         of_size = list(same)
         rounds = max(repeats, ROUNDS if dofs == SPEED_UP_AT and len(of_size) > 1 else 1)
         timings = time_all([process(setting, folder) for setting in of_size], rounds)
@@ -228,40 +222,28 @@ class Costs:
 
     all: list[Cost]
 
-    def series(self, ranks: int, *, plastic: bool = False) -> list[Cost]:
-        """Finished runs on ``ranks`` ranks by size, of those sizes that were solved on one rank, too."""
-        sizes = {c.setting.dofs for c in self.all if c.setting.ranks == 1}
-        wanted = {Setting(dofs, ranks, plastic) for dofs in sizes}
-        return sorted((c for c in self.all if not c.fault and c.setting in wanted), key=lambda cost: cost.dofs)
-
     @property
     def ranks(self) -> list[int]:
         """Numbers of ranks, 1 first."""
         return sorted({c.setting.ranks for c in self.all})
 
-    def _beside(self, costs: list[Cost], others: Callable[[Setting], Iterable[Setting]]) -> list[tuple[Cost, Cost]]:
-        """Pairs of each of ``costs`` and the finished run of each of its ``others``."""
-        done = {c.setting: c for c in self.all if not c.fault}
-        return [(cost, done[setting]) for cost in costs for setting in others(cost.setting) if setting in done]
+    def series(self, ranks: int, *, plastic: bool = False) -> list[Cost]:
+        """Finished runs on ``ranks`` ranks by size."""
+        found = (c for c in self.all if not c.fault and (c.setting.ranks, c.setting.plastic) == (ranks, plastic))
+        return sorted(found, key=lambda cost: cost.dofs)
 
-    def strong(self) -> list[tuple[Cost, Cost]]:
-        """Pairs of one size: on one rank, and on several."""
-        return self._beside(self.series(1), lambda setting: (replace(setting, ranks=r) for r in self.ranks[1:]))
-
-    def weak(self) -> list[tuple[Cost, Cost]]:
-        """Pairs of about one size per rank: on one rank, and on several."""
-        return self._beside(self.series(1), lambda s: (replace(s, ranks=r, dofs=r * s.dofs) for r in self.ranks[1:]))
-
-    def unguided(self) -> list[tuple[Cost, Cost]]:
-        """Pairs of runs of one setting: with a coarse start, and without."""
-        guided = [*self.series(1), *self.series(1, plastic=True)]
-        return self._beside(guided, lambda setting: [replace(setting, guided=False)])
+    def strong(self) -> list[tuple[Cost, list[Cost]]]:
+        """Each size that was solved on one rank and on several: that on one, those on several."""
+        several = [cost for ranks in self.ranks[1:] for cost in self.series(ranks)]
+        found = [(one, [c for c in several if c.setting.dofs == one.setting.dofs]) for one in self.series(1)]
+        return [(one, others) for one, others in found if others]
 
     def faults(self) -> list[str]:
         """A sentence for every run that did not finish, and every force that depends on the number of ranks."""
         said = [f"{cost.setting.name}: {cost.fault}" for cost in self.all if cost.fault]
         for one, several in self.strong():
-            difference = abs(several.force / one.force - 1)
-            if not difference <= SAME_FORCE:
-                said.append(f"{several.setting.name}: P differs by {difference:.1e} from that on 1 rank")
+            for cost in several:
+                difference = abs(cost.force / one.force - 1)
+                if not difference <= SAME_FORCE:
+                    said.append(f"{cost.setting.name}: P differs by {difference:.1e} from that on 1 rank")
         return said

@@ -1,7 +1,6 @@
 """The scaling benchmark concludes what its numbers say."""
 
 import csv
-import math
 from dataclasses import replace
 from functools import cache
 
@@ -9,7 +8,7 @@ import pytest
 
 from archord.benchmarks.cost import scaling
 from archord.benchmarks.cost.scaling import ELASTIC, PARTS, Cost, Costs, Setting, cost_of, process, refined, settings
-from archord.benchmarks.cost.scaling_report import exponent, extrapolated, goals, markdown, serial_fraction
+from archord.benchmarks.cost.scaling_report import exponent, goals, markdown
 from archord.benchmarks.timing import Run, Timing, time_all
 from archord.cli import run
 from archord.scene.errors import InputError
@@ -28,26 +27,6 @@ def cost(dofs: int, ranks: int = 1, *, solve: float = 10.0, contact: float = 0.5
 def test_a_power_law_has_its_exponent(power):
     sizes = [5e3, 3e4, 1e6]
     assert exponent(sizes, [3.7 * n**power for n in sizes]) == pytest.approx(power, rel=1e-12)
-    assert math.isnan(exponent([5e3], [1.0]))
-
-
-def test_amdahls_law_is_inverted():
-    """The serial fraction of T(1) (s + (1 - s)/r) is s; what gets slower on more ranks is serial, no more."""
-    for s in (0.0, 0.1, 0.7, 1.0):
-        for ranks in (2, 4):
-            assert serial_fraction(8.0, 8.0 * (s + (1 - s) / ranks), ranks) == pytest.approx(s, abs=1e-12)
-    assert serial_fraction(8.0, 9.0, 2) == 1.0
-    assert serial_fraction(8.0, 3.0, 2) == 0.0
-
-
-def test_an_extrapolation_begins_with_what_was_measured():
-    """On the measured number of ranks it gives that time back; more ranks never take longer, nor less than the parts
-    of rank 0."""
-    one, two = cost(10**6, 1, solve=100.0, contact=2.0), cost(10**6, 2, solve=58.0, contact=1.5)
-    total = [sum(extrapolated(one, two, ranks).values()) for ranks in (2, 4, 16, 64, 10**9)]
-    assert total[0] == pytest.approx(two.total, rel=1e-12)
-    assert total == sorted(total, reverse=True)
-    assert total[-1] > 100.0 * 0.16 + 2.0 * 0.5 + sum(two.seconds[part] for part in ("start-up", "mesh", "output"))
 
 
 @pytest.mark.parametrize("dofs", [20_000, 100_000, 1_000_000])
@@ -58,13 +37,10 @@ def test_meshes_of_the_series_are_alike(dofs):
     assert refined(dofs / 4)[0] / size == pytest.approx(2, rel=0.1)
 
 
-def test_every_size_runs_on_every_number_of_ranks_and_doubled_ones_on_two():
+def test_every_size_runs_on_every_number_of_ranks():
     found = settings(1e6, [1, 2])
-    assert {(c.dofs, c.ranks) for c in found if not c.plastic} >= {(n, r) for n in ELASTIC for r in (1, 2)}
-    doubled = {(c.dofs, c.ranks) for c in found if c.dofs not in ELASTIC}
-    assert doubled == {(60_000, 2), (200_000, 2), (600_000, 2)}
-    assert [c.dofs for c in found if c.plastic and c.guided] == [5_000, 30_000, 100_000]
-    assert {(c.dofs, c.plastic) for c in found if not c.guided} == {(30_000, False), (100_000, False), (30_000, True)}
+    assert {(c.dofs, c.ranks) for c in found if not c.plastic} == {(n, r) for n in ELASTIC for r in (1, 2)}
+    assert [(c.dofs, c.ranks) for c in found if c.plastic] == [(5_000, 1), (30_000, 1), (100_000, 1)]
     assert all(c.scene().joint.expected_cells <= 1e6 for c in found)
     assert max(c.dofs for c in settings(30_000, [1])) == 30_000
 
