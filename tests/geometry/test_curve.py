@@ -9,23 +9,18 @@ from archord.geometry import curve as curve_module
 from archord.geometry.curve import Curve, ProjectionError, RigidCircle, lagrange
 
 
+def ellipse_of(a, b, angle):
+    return np.stack([a * np.cos(angle), b * np.sin(angle)], axis=-1)
+
+
 def ellipse(s):
-    """Lower half of an ellipse, from left to right; the body lies inside. Smallest radius of curvature 0.5."""
-    return np.stack([-2 * np.cos(np.pi * s), -np.sin(np.pi * s)], axis=-1)
+    """Lower half, from left to right; the body lies inside. Smallest radius of curvature 0.5."""
+    return ellipse_of(2.0, 1.0, np.pi * (1 + s))
 
 
 def hole(s):
-    """Quarter circle run through clockwise: the body lies outside."""
+    """Quarter circle run through clockwise: the body lies outside; backwards it is a pin."""
     return ellipse_of(1.0, 1.0, -np.pi / 2 * s)
-
-
-def pin(s):
-    """Quarter circle run through counter-clockwise: the body lies inside."""
-    return ellipse_of(1.0, 1.0, np.pi / 2 * (s - 1))
-
-
-def ellipse_of(a, b, angle):
-    return np.stack([a * np.cos(angle), b * np.sin(angle)], axis=-1)
 
 
 def wave(s):
@@ -37,6 +32,7 @@ def backwards(f):
     return lambda s: f(1 - s)
 
 
+pin = backwards(hole)
 CURVES = {"ellipse": ellipse, "ellipse from outside": backwards(ellipse), "hole": hole, "pin": pin, "wave": wave}
 CURVES["wave from below"] = backwards(wave)
 every_curve = pytest.mark.parametrize("f", CURVES.values(), ids=CURVES.keys())
@@ -76,27 +72,22 @@ def brute_force(c: Curve, x, displacement=0.0, per_facet: int = 200):
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
-def test_lagrange_polynomials_are_one_at_their_own_node(degree):
-    """And zero at the others."""
-    nodes = np.linspace(0, 1, degree + 1)
+def test_shape_functions_are_lagrange_polynomials(degree):
+    """One at their own node, zero at the others; they reproduce every power up to their degree and its derivative."""
+    nodes, xi = np.linspace(0, 1, degree + 1), np.linspace(-0.05, 1.05, 7)
     values = np.vander(nodes, increasing=True) @ lagrange(degree).T
     np.testing.assert_allclose(values, np.eye(degree + 1), atol=1e-14)
-
-
-def test_shape_functions_and_their_derivatives():
-    """They reproduce 1, xi and xi^2 with their derivatives."""
-    c = interpolate(wave, 2)
-    xi = np.linspace(-0.05, 1.05, 7)
-    nodes = np.array([0, 0.5, 1.0])
-    for power in range(3):
-        values = nodes**power
-        expected = [xi**power, power * xi ** max(power - 1, 0)]
+    s = np.linspace(0, 1, 2 * degree + 1)
+    c = Curve(wave(s), degree)
+    for power in range(degree + 1):
+        expected = xi**power, power * xi ** max(power - 1, 0)
         for found, wanted in zip(c.shapes(xi), expected, strict=True):
-            np.testing.assert_allclose(found @ values, wanted, atol=1e-14)
+            np.testing.assert_allclose(found @ nodes**power, wanted, atol=1e-14)
 
 
-def test_arc_length_of_a_circle():
-    """Fourth order, the geometry's own: quarter circles of 4, 8 and 16 facets against pi / 2."""
+def test_arc_length():
+    """Fourth order, the geometry's own: quarter circles of 4, 8 and 16 facets against pi / 2; and the end of a facet is
+    the start of the next, also on a graded wave."""
     errors = []
     for n in (4, 8, 16):
         length = interpolate(pin, n).arc_length(np.array([0.0, 1.0]))
@@ -104,10 +95,6 @@ def test_arc_length_of_a_circle():
         errors.append(abs(length[-1, 1] - np.pi / 2))
     assert errors[-1] < 1e-6
     assert np.all(np.diff(np.log2(errors)) < -3.9)
-
-
-def test_arc_length_is_additive():
-    """The end of a facet is the start of the next, also on a graded wave."""
     length = interpolate(wave, 9, grading=1.5).arc_length(np.array([0.0, 0.4, 1.0]))
     np.testing.assert_allclose(length[1:, 0], length[:-1, 2], rtol=1e-14)
     assert np.all(np.diff(length, axis=1) > 0)
@@ -117,7 +104,8 @@ def test_arc_length_is_additive():
 @pytest.mark.parametrize(("n", "grading"), [(8, 1.0), (30, 1.0), (20, 1.5)])
 @pytest.mark.parametrize("distance", [1e-3, 0.3])
 def test_closest_point_is_the_nearest_of_all(f, n, grading, distance):
-    """No point of the curve is nearer; only a sample next to the closest point comes as near."""
+    """No point of the curve is nearer; only a sample next to the closest point comes as near. Where it slides,
+    (x - y) . tangent = 0 and the distance is the gap; the normal is a unit vector."""
     c = interpolate(f, n, grading)
     x, outward = scatter(c, distance)
     p = c.closest_point(x, outward, np.zeros_like(c.X))
@@ -126,21 +114,10 @@ def test_closest_point_is_the_nearest_of_all(f, n, grading, distance):
     assert np.all(found <= sampled + 1e-14)
     spacing = 1.1 * np.linalg.norm(p.tangent, axis=1).max() / 200
     assert np.all((sampled**2 - found**2)[p.slides] < 1.3 * (spacing / 2) ** 2)  # 1 + distance * curvature of the hump
-
-
-@every_curve
-@pytest.mark.parametrize("n", [8, 30])
-def test_the_separation_is_normal_to_the_curve(f, n):
-    """(x - y) . tangent = 0 where the point slides, and the distance is the gap; the normal is a unit vector."""
-    c = interpolate(f, n)
-    x, outward = scatter(c, 0.3)
-    p = c.closest_point(x, outward, np.zeros_like(c.X))
-    d = (x - p.point)[p.slides]
+    d, t, normal = (part[p.slides] for part in (x - p.point, p.tangent, p.normal))
     assert p.slides.mean() > 0.95
-    assert np.abs((d * p.tangent[p.slides]).sum(1) / np.linalg.norm(p.tangent[p.slides], axis=1)).max() < 1e-13
-    np.testing.assert_allclose(
-        np.abs((d * p.normal[p.slides]).sum(1)), np.linalg.norm(d, axis=1), rtol=1e-12, atol=1e-15
-    )
+    assert np.abs((d * t).sum(1) / np.linalg.norm(t, axis=1)).max() < 1e-13
+    np.testing.assert_allclose(np.abs((d * normal).sum(1)), found[p.slides], rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(np.linalg.norm(p.normal, axis=1), 1, rtol=1e-14)
     np.testing.assert_allclose((p.normal * p.tangent).sum(1), 0, atol=1e-14)
     np.testing.assert_allclose(np.einsum("ma,mai->mi", p.shape, c.X[p.nodes]), p.point, atol=1e-14)
@@ -175,15 +152,6 @@ def test_the_start_does_not_matter(f, shift):
     )
 
 
-def test_a_search_in_the_wrong_place_is_an_error(monkeypatch):
-    """Points whose closest points lie beyond the facets searched are never left at the rim of these."""
-    c = interpolate(ellipse, 24)
-    x, outward = scatter(c, 0.2)
-    monkeypatch.setattr(Curve, "nearest_facet", lambda self, x, displacement: np.full(len(x), 5))
-    with pytest.raises(ProjectionError, match="beyond the facets searched"):
-        c.closest_point(x, outward, np.zeros_like(c.X))
-
-
 def roof():
     """Two straight facets that meet at a right angle at the origin; the body lies below, its corner points up."""
     return Curve(np.array([[1.0, -1], [0.5, -0.5], [0, 0], [-0.5, -0.5], [-1, -1]]), 2)
@@ -205,9 +173,12 @@ def test_a_corner_is_the_closest_point_of_its_cone():
 
 
 @every_curve
-def test_points_beyond_a_free_end_have_no_partner(f):
-    """Points farther out than a twentieth of a facet have no partner; nearer ones use the end's continuation."""
+def test_points_beyond_a_free_end_or_facing_away_have_no_partner(f):
+    """Points farther out than a twentieth of a facet have no partner; nearer ones use the end's continuation. Points
+    that face away see only the far side of a body."""
     c = interpolate(f, 10)
+    x, outward = scatter(c, 0.1)
+    assert not c.closest_point(x, -outward, np.zeros_like(c.X)).found.any()
     y, normal = on_curve(c, np.array([0, 9]), np.array([0.0, 1.0]))
     _, dN = c.shapes(np.array([0.0, 1.0]))
     forward = np.einsum("ma,mai->mi", dN, c.X[c.connectivity[[0, 9]]]) * [[-1.0], [1.0]]
@@ -217,14 +188,6 @@ def test_points_beyond_a_free_end_have_no_partner(f):
     assert near.found.all()
     assert near.slides.all()
     assert c.closest_point(y - 0.02 * forward + 0.01 * normal, -normal, rest).found.all()
-
-
-@every_curve
-def test_points_that_face_away_have_no_partner(f):
-    """Only the far side of a body could see them."""
-    c = interpolate(f, 10)
-    x, outward = scatter(c, 0.1)
-    assert not c.closest_point(x, -outward, np.zeros_like(c.X)).found.any()
 
 
 def linearisation(p, x, dx, du, n_nodes):
@@ -279,12 +242,11 @@ def test_linearisation_at_a_corner():
     angle = rng.uniform(np.radians(50), np.radians(130), 50)
     x = 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     outward, u = np.tile([0.0, -1.0], (50, 1)), np.zeros_like(c.X)
-    assert not c.closest_point(x, outward, u).slides.any()
     p = c.closest_point(x, outward, u)
-    start = p.facet
+    assert not p.slides.any()
 
     def project(x, u):
-        return c.closest_point(x, outward, u, start)
+        return c.closest_point(x, outward, u, p.facet)
 
     assert_derivative(project, x, rng.normal(size=x.shape), u, 0.1 * rng.normal(size=u.shape), len(u))
 
@@ -306,10 +268,22 @@ def test_rigid_circle():
     )
 
 
-def test_a_lost_point_is_an_error(monkeypatch):
-    """A point whose projection does not converge is never taken for one without a partner."""
-    c = interpolate(ellipse, 8)
+def nearest_is_the_fifth(self, x, displacement):
+    return np.full(len(x), 5)
+
+
+@pytest.mark.parametrize(
+    ("broken", "name", "value", "said"),
+    [
+        (curve_module, "_NEWTON_STEPS", 1, "found no closest point"),
+        (Curve, "nearest_facet", nearest_is_the_fifth, "beyond the facets searched"),
+    ],
+)
+def test_a_lost_point_is_an_error(monkeypatch, broken, name, value, said):
+    """A point whose projection does not converge, or is searched in the wrong place, is never taken for one without a
+    partner or left at the rim of the facets searched."""
+    c = interpolate(ellipse, 24)
     x, outward = scatter(c, 0.3)
-    monkeypatch.setattr(curve_module, "_NEWTON_STEPS", 1)
-    with pytest.raises(ProjectionError, match="found no closest point"):
+    monkeypatch.setattr(broken, name, value)
+    with pytest.raises(ProjectionError, match=said):
         c.closest_point(x, outward, np.zeros_like(c.X))

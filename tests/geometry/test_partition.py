@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from dolfinx.mesh import entities_to_geometry
 
 from archord.geometry.half_ring import half_ring
 from archord.geometry.joint_mesh import Facets
@@ -43,20 +44,10 @@ def test_pin_and_hole_are_cut_at_the_same_angle(comm, make):
     else:
         joint = half_ring(comm, 1.0, 0.005, 3.0, size, 0.5, 0.1)
     mesh = joint.mesh
-    mesh.topology.create_connectivity(1, 0)
+    mesh.topology.create_connectivity(1, 2)
     ends = []
     for side in (Facets.PIN_ARC, Facets.HOLE_ARC):
-        facets = joint.facets.find(side)
-        nodes = mesh.topology.connectivity(1, 0)
-        vertices = np.array([nodes.links(f) for f in facets], dtype=np.int32).reshape(-1, 2)
-        geometry = np.asarray(mesh.geometry.dofmap)
-        mesh.topology.create_connectivity(0, 2)
-        cells = mesh.topology.connectivity(0, 2)
-        at = []
-        for v in vertices.ravel():
-            cell = cells.links(v)[0]
-            corner = np.flatnonzero(mesh.topology.connectivity(2, 0).links(cell) == v)[0]
-            at.append(mesh.geometry.x[geometry[cell, corner]])
-        angles = np.array([np.arctan2(y, x) for x, y, _ in at])
-        ends.append((angles.min(), angles.max()) if len(angles) else (np.nan, np.nan))
+        x = mesh.geometry.x[entities_to_geometry(mesh, 1, joint.facets.find(side))]
+        angles = np.arctan2(x[..., 1], x[..., 0])
+        ends.append((angles.min(), angles.max()) if angles.size else (np.nan, np.nan))
     assert np.abs(np.subtract(*ends)).max() < 2 * size

@@ -48,13 +48,6 @@ def sector(radius, n):
     return radius**2 * n * (np.sin(half) * np.cos(half) + 2 / 3 * chord * height)
 
 
-def test_arc_nodes_lie_on_their_radius(joint):
-    """Vertices and midpoints, to the last bit but one: the clearance is a small difference of large numbers."""
-    pin, hole = facet_nodes(joint, Facets.PIN_ARC), facet_nodes(joint, Facets.HOLE_ARC)
-    assert np.abs(np.linalg.norm(pin - np.array([0, -DR]), axis=-1) - R).max() < 1e-15
-    assert np.abs(np.linalg.norm(hole, axis=-1) - R - DR).max() < 1e-15
-
-
 def test_elements_shrink_toward_the_edge_of_the_contact():
     """Edges of both arcs are a quarter as long at the given angle, and elsewhere no longer than without it."""
     angle, fine = 1.1, SIZE / 4
@@ -68,47 +61,37 @@ def test_elements_shrink_toward_the_edge_of_the_contact():
         assert length[away > 0.6].mean() > 2 * fine
 
 
-def test_arcs_reach_from_the_axis_to_the_top(joint):
-    """Both end on the symmetry axis and on the height of their centre, with equal edges (to gmsh's 1e-8)."""
+def test_arcs_are_where_they_belong(joint):
+    """All nodes on their radius to the last bit but one, as the clearance is a small difference of large numbers; from
+    the symmetry axis to the height of the centre, with equal edges (to gmsh's 1e-8); touching at (0, -R - dR) alone."""
     for tag, radius, centre in ((Facets.PIN_ARC, R, -DR), (Facets.HOLE_ARC, R + DR, 0.0)):
         x = facet_nodes(joint, tag) - [0, centre]
+        assert np.abs(np.linalg.norm(x, axis=-1) - radius).max() < 1e-15
         angle = np.arctan2(x[..., 0], -x[..., 1])
         assert angle.min() == pytest.approx(0, abs=1e-15)
         assert angle.max() == pytest.approx(np.pi / 2, abs=1e-14)
         np.testing.assert_allclose(np.abs(angle[:, 1] - angle[:, 0]), np.pi / 2 / len(x), rtol=1e-7)
         np.testing.assert_allclose(angle[:, 2], angle[:, :2].mean(axis=1), atol=1e-8)
-        assert np.linalg.norm(x, axis=-1).max() == pytest.approx(radius)
-
-
-def test_pin_and_hole_touch_at_the_bottom(joint):
-    """At (0, -R - dR), and nowhere else are they nearer."""
-    pin, hole = (facet_nodes(joint, tag).reshape(-1, 2) for tag in (Facets.PIN_ARC, Facets.HOLE_ARC))
-    for x in (pin, hole):
-        np.testing.assert_allclose(x[np.argmin(x[:, 1])], [0, -R - DR], rtol=0, atol=1e-15)
-    assert np.all(np.linalg.norm(pin, axis=1) <= R + DR + 1e-15)
+        lowest = x.reshape(-1, 2)[x[..., 1].argmin()] + np.array([0, centre])
+        np.testing.assert_allclose(lowest, [0, -R - DR], rtol=0, atol=1e-15)
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("size", [0.2, 0.1])
-def test_areas(size, comm):
-    """A quarter disc, and a square without one: exact for parabolic arcs, so in error by O(size^4) only."""
+def test_areas_and_edges(size, comm):
+    """A quarter disc, and a square without one: exact for parabolic arcs, so in error by O(size^4) only. Edges of the
+    arcs are no longer than the element size, and no shorter than a whole number of them asks for."""
     joint = quarter_joint(comm, R, DR, W, size, GROWTH)
     n = int(np.ceil(np.pi / 2 / size))
+    for tag in (Facets.PIN_ARC, Facets.HOLE_ARC):
+        lengths = edge_lengths(joint, tag)
+        assert lengths.max(initial=0) <= size * (1 + DR)
+        assert lengths.min(initial=1) >= size * (1 - 1 / n) * 0.99
     pin, block = area(joint, Cells.PIN, comm), area(joint, Cells.BLOCK, comm)
     assert pin == pytest.approx(sector(R, n), rel=1e-12)
     assert block == pytest.approx(W**2 - sector(R + DR, n), rel=1e-12)
     assert abs(pin - np.pi * R**2 / 4) < 0.01 * size**4
     assert abs(block - W**2 + np.pi * (R + DR) ** 2 / 4) < 0.01 * size**4
-
-
-@pytest.mark.parametrize("size", [0.3, 0.1])
-def test_edges_of_the_arcs_have_the_element_size(size):
-    """Not longer, and no shorter than a whole number of them asks for."""
-    joint = quarter_joint(MPI.COMM_SELF, R, DR, W, size, GROWTH)
-    for tag in (Facets.PIN_ARC, Facets.HOLE_ARC):
-        lengths = edge_lengths(joint, tag)
-        assert lengths.max() <= size * (1 + DR)
-        assert lengths.min() >= size * (1 - 1 / len(lengths)) * 0.99
 
 
 @pytest.mark.parametrize("ring", [False, True], ids=["quarter joint", "half ring"])
@@ -133,8 +116,8 @@ def test_pin_and_block_can_have_elements_of_their_own(ring, size, size_ratio):
 def test_equal_sizes_make_the_same_mesh_as_none(joint):
     """A ratio next to 1 takes the way of two fields: the same triangles up to their places' last digits."""
     other = quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH, size_ratio=1 + 1e-14)
-    assert len(other.cells.values) == len(joint.cells.values)
     np.testing.assert_allclose(other.mesh.geometry.x, joint.mesh.geometry.x, atol=1e-6)
+    np.testing.assert_array_equal(other.cells.values, joint.cells.values)
 
 
 def test_edges_grow_with_the_distance(joint):
