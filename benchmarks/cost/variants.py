@@ -18,8 +18,8 @@ from archord.scene.file import resolved
 PLASTICITY = ("archord.materials.j2", "kernel radial_return")
 FIELDS = ("archord.output.fields",)
 CURVES = ("kernel closest_point",)
-ALWAYS_ABSENT = ("matplotlib", "pyvista", "scipy", "rich", "numba")  # from a solve
-WATCHED = (*ALWAYS_ABSENT, *PLASTICITY, *FIELDS, *CURVES, "dolfinx")
+ABSENT = ("matplotlib", "pyvista", "scipy", "rich", "numba")  # from a solve
+WATCHED = (*ABSENT, *PLASTICITY, *FIELDS, *CURVES, "dolfinx")
 
 # Runs the command line in a process of its own, and leaves a note of what that loaded before the note itself does.
 _PROBE = """
@@ -38,9 +38,10 @@ sys.exit(code)
 
 @dataclass(frozen=True)
 class Variant:
-    """A joint that is solved or, if ``drawn``, the picture of its run."""
+    """A joint that is solved or, if ``drawn``, the picture of its run; what is ``unused`` must not be loaded for it."""
 
     case: Case
+    unused: tuple[str, ...]
     drawn: bool = False
 
     @property
@@ -48,29 +49,21 @@ class Variant:
         """What the tables call it."""
         return f"picture of {self.case.name}" if self.drawn else self.case.name
 
-    @property
-    def unused(self) -> tuple[str, ...]:
-        """What must not be loaded for it."""
-        if self.drawn:
-            return ("dolfinx", "pyvista", *FIELDS, *PLASTICITY, *CURVES)
-        scene = self.case.scene
-        absent = (PLASTICITY, not scene.plastic), (CURVES, scene.pin.rigid), (FIELDS, not scene.output.fields)
-        return ALWAYS_ABSENT + tuple(name for names, missing in absent if missing for name in names)
-
 
 def variants(element_size: float = 0.04, steps: int = 5) -> list[Variant]:
     """The paper's joint, elastic and plastic, deformable, with a rigid pin, without fields; and a picture."""
-    ways: dict[str, dict] = {
-        "": {},
-        ", rigid pin": {"pin": {"rigid": True}},
-        ", no fields": {"output": {"fields": False}},
+    ways: dict[str, tuple[tuple[str, ...], dict]] = {
+        "": ((), {}),
+        ", rigid pin": (CURVES, {"pin": {"rigid": True}}),
+        ", no fields": (FIELDS, {"output": {"fields": False}}),
     }
     found = [
-        Variant(Case(material + way, paper_joint(element_size, steps, yield_stress, **sections)))
-        for material, yield_stress in (("elastic", None), ("plastic", 0.002))
-        for way, sections in ways.items()
+        Variant(Case(material + way, paper_joint(element_size, steps, strength, **keys)), ABSENT + plain + unused)
+        for material, strength, plain in (("elastic", None, PLASTICITY), ("plastic", 0.002, ()))
+        for way, (unused, keys) in ways.items()
     ]
-    return [*found, Variant(found[len(ways)].case, drawn=True)]
+    drawn = Variant(found[len(ways)].case, ("dolfinx", "pyvista", *FIELDS, *PLASTICITY, *CURVES), drawn=True)
+    return [*found, drawn]
 
 
 @dataclass(frozen=True)
@@ -107,17 +100,17 @@ def run(
     Raises `RuntimeError` if one fails.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    names = {process(variant, folder, warm): variant for variant in chosen}
+    processes = [process(variant, folder.resolve(), warm) for variant in chosen]
 
     def told(done: Process, repeat: int, sentence: str) -> None:
-        said(f"{names[done].name}: {sentence}{'' if repeat else ' (not counted)'}")
+        said(f"{chosen[processes.index(done)].name}: {sentence}{'' if repeat else ' (not counted)'}")
 
-    return [use_of(names[timing.process], timing, folder) for timing in time_all(list(names), repeats, told)]
+    return [use_of(*pair, folder) for pair in zip(chosen, time_all(processes, repeats, told), strict=True)]
 
 
 def process(variant: Variant, folder: Path, warm: bool) -> Process:
     """The command of ``variant`` in the existing ``folder``; its result is the note of what it loaded."""
-    run_folder, note = variant.case.folder(folder.resolve()), folder.resolve() / "note.json"
+    run_folder, note = variant.case.folder(folder), folder / "note.json"
     arguments = ["picture", str(run_folder)]
     if not variant.drawn:
         scene = run_folder.with_suffix(".toml")
@@ -148,21 +141,19 @@ def use_of(variant: Variant, timing: Timing, folder: Path) -> Use:
     )
 
 
-def row(used: Use) -> dict[str, object]:
-    """The entries of a variant by heading."""
-    return {
-        "variant": used.variant.name,
-        "dofs": used.dofs,
-        "seconds": f"{used.seconds:.2f}",
-        "peak memory [MB]": f"{used.memory / 1e6:.0f}",
-        "modules": used.modules,
-        "written [kB]": f"{used.written / 1e3:.0f}",
-        **{name: "loaded" if name in used.loaded else "" for name in WATCHED},
-    }
-
-
 def write(uses: Sequence[Use], folder: Path) -> tuple[str, list[Path]]:
     """Write variants.csv and variants.md into ``folder``; returns the table and the files."""
-    rows = [row(used) for used in uses]
+    rows = [
+        {
+            "variant": used.variant.name,
+            "dofs": used.dofs,
+            "seconds": f"{used.seconds:.2f}",
+            "peak memory [MB]": f"{used.memory / 1e6:.0f}",
+            "modules": used.modules,
+            "written [kB]": f"{used.written / 1e3:.0f}",
+            **{name: "loaded" if name in used.loaded else "" for name in WATCHED},
+        }
+        for used in uses
+    ]
     text = Table.of(rows).markdown()
     return text, write_report(folder, "variants", rows, text)

@@ -2,13 +2,14 @@
 
 import json
 import os
+import subprocess
 import sys
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from archord.benchmarks.cost.sweep_speed import measure, table
+from archord.benchmarks.cost.pairs import WITHOUT, command, saved, strategy_cases, sweep_table, timed
 from archord.benchmarks.timing import INTERRUPTED, Failure, Process, Run, Timing, last_core, run_once, time_all
 from tests.studies.parts import written
 
@@ -96,23 +97,44 @@ def test_the_middle_run_has_the_median_time(tmp_path):
 def test_a_pair_is_two_sweeps_that_were_solved(tmp_path):
     """Both ranks work: no less processor time than alone for the same cases."""
     said = []
-    alone, together = measure(Path(written(tmp_path, "[grid]\npin.E = [1.0, 1.82]\n")), 2, 1, said.append)
+    sweep = ("sweep", written(tmp_path, "[grid]\npin.E = [1.0, 1.82]\n"))
+    alone, together = timed(command(1, sweep), command(2, sweep), 1, said.append)
     assert len(alone) == len(together) == 1
     assert 0.5 < alone[0].cpu < 2 * together[0].cpu
     cores = os.cpu_count() or 1
     assert all(run.seconds * cores >= run.cpu for run in (*alone, *together))
-    assert len(said) == 2
+    assert len(said) == 3
 
 
-def test_a_sweep_that_fails_is_no_measurement(tmp_path):
+def test_a_command_that_fails_is_no_measurement(tmp_path):
     (tmp_path / "bad.sweep.toml").write_text("nonsense = 1\n")
+    bad = command(1, ("sweep", str(tmp_path / "bad.sweep.toml")))
     with pytest.raises(RuntimeError, match="nonsense"):
-        measure(tmp_path / "bad.sweep.toml", 1, 1)
+        timed(bad, bad, 1)
+
+
+def test_a_change_comes_before_the_command(tmp_path):
+    """Statements of strategies that are left out run, and what they change is there."""
+    marked = command(1, ("--version",), f"open({str(tmp_path / 'mark')!r}, 'w').close()")
+    subprocess.run(marked[: marked.index("-q")], check=True, capture_output=True)
+    assert (tmp_path / "mark").exists()
+    for change in WITHOUT.values():
+        subprocess.run([sys.executable, "-c", change], check=True, env=os.environ)
+
+
+def test_what_a_strategy_takes_off_is_that_of_the_pair_in_the_middle(tmp_path):
+    """And every case has a scene or a sweep to solve, and names strategies that are known."""
+    kept = [Run(s, 2 * s, 0, None) for s in (1.0, 3.0, 2.0)]
+    left = [Run(s, 8 * s, 0, None) for s in (2.0, 4.0, 20.0)]
+    assert (saved(kept, left, "seconds"), saved(kept, left, "cpu")) == (0.5, 0.875)
+    cases = list(strategy_cases(tmp_path))
+    assert {strategy for _, _, strategy, _ in cases} == set(WITHOUT)
+    assert all(Path(arguments[-1]).is_file() for *_, arguments in cases)
 
 
 def test_the_table_ends_with_the_medians():
     alone = [Run(s, cpu, 0, None) for s, cpu in ((20.0, 19.0), (30.0, 20.0), (22.0, 18.0))]
     together = [Run(s, cpu, 0, None) for s, cpu in ((10.0, 21.0), (20.0, 22.0), (11.5, 20.0))]
-    found = table(alone, together, 2)
+    found = sweep_table(alone, together, 2)
     assert found.headings[2] == "2 ranks [s]"
     assert found.rows[-1] == ["median", "22.0", "11.5", "1.91", "19.0", "21.0"]
