@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.benchmarks.case import paper_joint
+from archord.benchmarks.case import Case, paper_joint
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.scene import geometry as scene_geometry
@@ -32,6 +32,14 @@ def open_scene(asked, steps=2, yield_stress=None, **sections):
     return paper_joint(steps=steps, yield_stress=yield_stress, **sections)
 
 
+def accurate(scene, folder, comm=MPI.COMM_SELF, **hooks):
+    """The scene solved to its accuracy in ``folder``, which is made if it is not there."""
+    if comm.rank == 0:
+        folder.mkdir(exist_ok=True)
+    comm.barrier()
+    return solve_to_accuracy(scene, folder, comm, **hooks)
+
+
 def known_force(case):
     """P at 2 dR in units of E* R, from meshes of up to 400 thousand dofs (docs/work_precision.md)."""
     return json.loads(REFERENCE.read_text())["cases"][case]["current"]["quantities"]["P"]["value"]
@@ -39,8 +47,7 @@ def known_force(case):
 
 @pytest.fixture(scope="module")
 def elastic(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("elastic")
-    return solve_to_accuracy(open_scene(1e-3), folder, MPI.COMM_SELF)
+    return accurate(open_scene(1e-3), tmp_path_factory.mktemp("elastic"))
 
 
 def test_an_elastic_joint_is_as_accurate_as_asked(elastic):
@@ -80,7 +87,7 @@ def test_the_scene_that_is_left_gives_the_same_numbers(elastic, tmp_path):
 
 def test_a_plastic_joint_is_as_accurate_as_asked(tmp_path):
     """In 20 output steps, as the reference has them; its own error of the steps at 2 dR is below 5e-4."""
-    outcome = solve_to_accuracy(open_scene(6e-3, 20, 0.002, output={"fields": False}), tmp_path, MPI.COMM_SELF)
+    outcome = accurate(open_scene(6e-3, 20, 0.002, output={"fields": False}), tmp_path)
     found = outcome.accuracy
     assert outcome.status == "done"
     assert found.estimated == found.mesh_error + found.step_error <= 6e-3
@@ -92,22 +99,21 @@ def test_a_plastic_joint_is_as_accurate_as_asked(tmp_path):
 
 def test_under_a_force_the_displacement_is_accurate(tmp_path):
     """The force that belongs to 2 dR presses the pin by 2 dR."""
-    scene = open_scene(3e-3, load={"displacement": None, "relative_force": known_force("elastic")})
-    outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
+    load = {"displacement": None, "relative_force": known_force("elastic")}
+    outcome = accurate(open_scene(3e-3, load=load), tmp_path)
     assert outcome.steps[-1].delta == pytest.approx(0.01, rel=3e-3)
     assert outcome.accuracy.levels[-1].last == outcome.steps[-1].delta
 
 
 def test_short_steps_are_chosen_where_long_ones_err(tmp_path):
     """A plastic joint in two output steps: more accuracy takes more substeps, and brings P closer to that of many."""
-    plane = {"plane": "stress"}
-    short = {"initial": 1 / 16, "maximum": 1 / 16}
+    plane, short = {"plane": "stress"}, {"initial": 1 / 16, "maximum": 1 / 16}
     many = paper_joint(0.2, 2, 0.002, joint={"growth": 1.25}, analysis=plane, stepping=short)
-    known = solve_scene(many, _made(tmp_path / "many"), MPI.COMM_SELF).steps[-1].P
+    known = Case("many", many).solve(tmp_path).steps[-1].P
     taken, errors = [], []
     for asked in (0.1, 0.04):
         scene = open_scene(asked, 2, 0.002, analysis=plane, output={"fields": False})
-        found = solve_to_accuracy(scene, _made(tmp_path / f"{asked}"), MPI.COMM_SELF).accuracy
+        found = accurate(scene, tmp_path / f"{asked}").accuracy
         of_coarsest = {level.substeps: level.last for level in found.levels if level.mesh == 1}
         taken.append(found.substeps)
         errors.append(abs(of_coarsest[found.substeps] / known - 1))
@@ -120,7 +126,7 @@ def test_a_mesh_that_does_not_see_the_contact_is_no_evidence(tmp_path, monkeypat
     """Where the contact is smaller than expected, coarse meshes are passed over until a few facets touch."""
     monkeypatch.setattr(mesh_family, "expected_angle", lambda scene: 1.17)
     scene = open_scene(0.02, 1, load={"displacement": 0.05}, output={"fields": False})
-    outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
+    outcome = accurate(scene, tmp_path)
     levels = outcome.accuracy.levels
     facets = [outcome.steps[-1].contact_area / 2 / level.element_size for level in levels]
     assert facets[0] < 2
@@ -130,7 +136,7 @@ def test_a_mesh_that_does_not_see_the_contact_is_no_evidence(tmp_path, monkeypat
 
 def test_a_pin_that_never_touches_has_no_error(tmp_path):
     """Drawn away from the hole it bears no force on any mesh."""
-    outcome = solve_to_accuracy(open_scene(0.01, 1, load={"displacement": -0.5}), tmp_path, MPI.COMM_SELF)
+    outcome = accurate(open_scene(0.01, 1, load={"displacement": -0.5}), tmp_path)
     assert outcome.status == "done"
     assert outcome.accuracy.estimated == 0
 
@@ -139,7 +145,7 @@ def test_too_much_accuracy_ends_with_a_warning(tmp_path, monkeypatch):
     """The finest mesh allowed stays; the warning has the estimate and what to do."""
     scene = open_scene(1e-4)
     monkeypatch.setattr(scene_geometry, "_MOST_CELLS", 1000)
-    outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
+    outcome = accurate(scene, tmp_path)
     assert outcome.status == "done"
     assert outcome.accuracy.estimated > 1e-4
     (warning,) = (w for w in outcome.warnings if w.startswith("accuracy"))
@@ -148,7 +154,7 @@ def test_too_much_accuracy_ends_with_a_warning(tmp_path, monkeypatch):
     assert json.loads((tmp_path / "run.json").read_text())["warnings"] == outcome.warnings
     monkeypatch.setattr(scene_geometry, "_MOST_CELLS", 5)
     with pytest.raises(InputError, match="no mesh within the limits"):
-        solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF)
+        accurate(scene, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +172,7 @@ def test_ctrl_c_in_any_mesh_ends_the_run(tmp_path, when, number, yield_stress, s
 
     before = signal.getsignal(signal.SIGINT)
     scene = open_scene(1e-3, 4, yield_stress)
-    outcome = solve_to_accuracy(scene, tmp_path, MPI.COMM_SELF, **{when: interrupt})
+    outcome = accurate(scene, tmp_path, **{when: interrupt})
     assert (outcome.status, outcome.signal, len(outcome.steps)) == ("interrupted", signal.SIGINT, steps)
     assert "interrupted by SIGINT" in outcome.message
     assert accepted_steps(tmp_path) == steps
@@ -201,19 +207,13 @@ def test_small_contacts_get_small_elements_that_grow_as_fast():
 
 def test_units_do_not_matter():
     """Metres and pascals instead of millimetres and megapascals: the same meshes in units of R."""
-    text = resolved(open_scene(1e-3, load={"displacement": 0.3}))
-    data = load_data(text)
-    other = load_data(text)
+    data, other = (tomllib.loads(resolved(open_scene(1e-3, load={"displacement": 0.3}))) for _ in range(2))
     other["joint"] |= {"radius": 0.037, "clearance": 0.005 * 0.037, "block_size": 3.7}
     for body in ("pin", "block"):
         other[body]["E"] *= 1.3e9
     joints = [MeshFamily(s, 1e-3).scene_of(1, 1).joint for s in map(parse_scene, (data, other))]
     assert joints[0].relative_element_size == joints[1].relative_element_size
     assert joints[0].growth == joints[1].growth
-
-
-def load_data(text):
-    return tomllib.loads(text)
 
 
 def test_meshes_are_bounded_by_the_keys():
@@ -232,7 +232,7 @@ def test_a_scene_without_a_mesh_is_not_solved_as_it_is(tmp_path):
     with pytest.raises(InputError, match=r"accuracy = 0\.001: leaves the mesh open"):
         solve_scene(open_scene(1e-3), tmp_path, MPI.COMM_SELF)
     with pytest.raises(InputError, match=r"analysis\.accuracy is missing"):
-        solve_to_accuracy(paper_joint(), tmp_path, MPI.COMM_SELF)
+        accurate(paper_joint(), tmp_path)
     assert not any(tmp_path.iterdir())
 
 
@@ -241,16 +241,15 @@ def test_the_accuracy_and_the_mesh_exclude_each_other(tmp_path):
     text = resolved(open_scene(1e-3))
     file = tmp_path / "open.toml"
     file.write_text(text)
-    assert load_scene(file) == parse_scene(load_data(text))
+    assert load_scene(file) == parse_scene(tomllib.loads(text))
     for override in ("joint.growth=0.5", "joint.element_size=0.1", "stepping.initial=0.5"):
         assert load_scene(file, [override]).analysis.accuracy is None
         key, _, value = override.partition("=")
         section, _, name = key.partition(".")
-        data = load_data(text)
+        data = tomllib.loads(text)
         data[section][name] = float(value)
-        with pytest.raises(
-            InputError, match=rf"{key} = {value} must not be given together with analysis\.accuracy, which chooses it"
-        ):
+        said = rf"{key} = {value} must not be given together with analysis\.accuracy, which chooses it"
+        with pytest.raises(InputError, match=said):
             parse_scene(data)
         with pytest.raises(InputError, match="must not be given together"):
             load_scene(file, ["analysis.accuracy=0.01", override])
@@ -264,25 +263,12 @@ def test_ranks_choose_the_same_meshes(tmp_path, comm):
     """As one rank does, with the same estimates and forces."""
     scene = open_scene(0.03, 4, 0.002)
     folder = Path(comm.bcast(str(tmp_path)))
-    together = solve_to_accuracy(scene, _shared(folder / "together", comm), comm)
-    alone = None
+    together, alone = accurate(scene, folder / "together", comm), None
     if comm.rank == 0:
-        alone = solve_to_accuracy(scene, _made(folder / "alone"), MPI.COMM_SELF)
+        alone = accurate(scene, folder / "alone")
         alone = [m.P for m in alone.steps], alone.accuracy
     forces, found = comm.bcast(alone)
     assert [m.P for m in together.steps] == pytest.approx(forces, rel=1e-8)
     assert together.accuracy.estimated == pytest.approx(found.estimated, rel=1e-4)
     for a, b in zip(together.accuracy.levels, found.levels, strict=True):
         assert (a.mesh, a.element_size, a.substeps, a.dofs) == (b.mesh, b.element_size, b.substeps, b.dofs)
-
-
-def _made(folder):
-    folder.mkdir()
-    return folder
-
-
-def _shared(folder, comm):
-    if comm.rank == 0:
-        folder.mkdir()
-    comm.barrier()
-    return folder

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -127,18 +128,16 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
     base["load"] = {"path": "targets.csv"}
     (tmp_path / "other.csv").write_text("relative_force\n0.001\n")
     path = tmp_path / "scenes" / "base.toml"
-    path.write_text(_toml(base))
+    path.write_text(tomli_w.dumps(base))
     text = """
         [grid]
-        load.path = ["none", "other.csv"]
+        load.path = ["other.csv"]
         [zip]
         pin.E = [1.0, 2.0]
-        [[list]]
-        load.displacement = 1.5
         [latin_hypercube]
         number = 3
         ranges = { "joint.clearance" = { from = 0.001, to = 0.01, scale = "log" } }
-    """.replace("[[list]]\n        load.displacement = 1.5\n", "").replace('["none", "other.csv"]', '["other.csv"]')
+    """
     sweep = read_sweep(written(tmp_path, text, "scenes/base.toml"))
     assert {case.scene.load.name for case in sweep.cases} == {"relative_force"}
     unchanged = read_sweep(written(tmp_path, "", "scenes/base.toml"))
@@ -150,12 +149,6 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
         again = read_sweep(folder / "sweep.toml")
         assert [(c.number, c.run) for c in again.cases] == [(c.number, c.run) for c in one.cases]
         assert again.keys == one.keys
-
-
-def _toml(data) -> str:
-    import tomli_w
-
-    return tomli_w.dumps(data)
 
 
 @pytest.mark.parametrize(
@@ -227,6 +220,14 @@ def _toml(data) -> str:
             ],
         ),
         (
+            '[grid]\nload.steps = [3, "a = b c", 4, "d", 2.5]',
+            ['FILE: case 2 and 2 more: load.steps = "a = b c" must be a whole number or a list of them.'],
+        ),
+        (
+            "grid.pin.E = [1.0, 2.0]\n[latin_hypercube]\nnumber = 30\nranges = { load.steps = [5, 6] }",
+            ["FILE: every case: load.steps = NUMBER must be a whole number or a list of them."],
+        ),
+        (
             f"[grid]\npin.E = {[1.0] * 400}\nload.steps = {[1] * 400}",
             ["FILE: has 160000 cases (400 x 400); 100000 are allowed."],
         ),
@@ -234,34 +235,30 @@ def _toml(data) -> str:
 )  # fmt: skip
 def test_faults_are_told_in_a_sentence(tmp_path, text, said):
     """File, key, value, and what is allowed; each fault once, however many cases have it."""
-    assert sorted(faults(tmp_path, text)) == sorted(said)
+    found = [re.sub(r"5\.\d+", "NUMBER", line) for line in faults(tmp_path, text)]
+    assert sorted(found) == sorted(said)
 
 
-def test_one_fault_of_many_values_is_told_once(tmp_path):
-    sampled = "[latin_hypercube]\nnumber = 30\nranges = { load.steps = [5, 6] }"
-    (told,) = faults(tmp_path, f"[grid]\njoint.clearance = [0.004, 0.005]\n{sampled}")
-    assert re.fullmatch(r"FILE: every case: load\.steps = 5\.\d+ must be a whole number or a list of them\.", told)
-    (told,) = faults(tmp_path, '[grid]\nload.steps = [3, "a = b c", 4, "d", 2.5]')
-    assert told == 'FILE: case 2 and 2 more: load.steps = "a = b c" must be a whole number or a list of them.'
-
-
-def test_a_base_is_needed(tmp_path):
-    assert faults(tmp_path, "", "") == ['FILE: base is missing; give base = "scene.toml" or a [base] table.']
-    assert faults(tmp_path, "base = 3", "") == ['FILE: base must be a scene file, base = "scene.toml", or a table.']
-    nowhere = f'FILE: base = "nowhere.toml" must be a scene file, beside the sweep file; {tmp_path}/nowhere.toml'
-    assert faults(tmp_path, "", "nowhere.toml") == [f"{nowhere} does not exist."]
-    assert faults(tmp_path, "", ".") == [
-        f'FILE: base = "." must be a scene file, beside the sweep file; {tmp_path} is not one.'
-    ]
-    sweep = f'FILE: base = "some.sweep.toml" must be a scene file, beside the sweep file; {tmp_path}/some.sweep.toml'
-    assert faults(tmp_path, "", "some.sweep.toml") == [f"{sweep} is a sweep."]
+@pytest.mark.parametrize(
+    ("base", "text", "said"),
+    [
+        ("", "", 'base is missing; give base = "scene.toml" or a [base] table.'),
+        ("", "base = 3", 'base must be a scene file, base = "scene.toml", or a table.'),
+        ("nowhere.toml", "", "HERE/nowhere.toml does not exist."),
+        (".", "", "HERE is not one."),
+        ("some.sweep.toml", "", "HERE/some.sweep.toml is a sweep."),
+    ],
+)
+def test_a_base_is_needed(tmp_path, base, text, said):
+    beside = f'base = "{base}" must be a scene file, beside the sweep file; ' if base else ""
+    assert faults(tmp_path, text, base) == [f"FILE: {beside}{said.replace('HERE', str(tmp_path))}"]
 
 
 def test_a_fault_of_the_base_names_its_file(tmp_path):
     """Unless the sweep or --set gives the key."""
     scene = tomllib.loads(Path(ELASTIC).read_text())
     scene["block"]["nu"] = 0.7
-    (tmp_path / "base.toml").write_text(_toml(scene))
+    (tmp_path / "base.toml").write_text(tomli_w.dumps(scene))
     fault = "block.nu = 0.7 must be at least -0.999 and at most 0.499999."
     by_base = f"FILE: every case, by its base {tmp_path}/base.toml: {fault}"
     assert faults(tmp_path, "[grid]\npin.nu = [0.1, 0.2]", "base.toml") == [by_base]
@@ -270,12 +267,15 @@ def test_a_fault_of_the_base_names_its_file(tmp_path):
     assert faults(tmp_path, "[grid]\nblock.nu = [0.7, 0.3]", "base.toml") == [f"FILE: case 1: {fault}"]
 
 
-def test_the_example_of_the_documentation_is_sound(tmp_path):
+def test_examples_are_sound(tmp_path):
+    """Of the scenes' folder and of the documentation."""
     text = re.search(r"```toml\n(base = .*?)```", (DOCS / "sweeps.md").read_text(), re.DOTALL)[1]
-    path = tmp_path / "all.sweep.toml"
-    path.write_text(text.replace("steel_pin.toml", str(SCENES / "steel_pin.toml")))
-    sweep = read_sweep(path)
-    assert len(sweep.cases) == len(sweep.distinct) == 2 * 2 * 3 * 20
+    documented = tmp_path / "all.sweep.toml"
+    documented.write_text(text.replace("steel_pin.toml", str(SCENES / "steel_pin.toml")))
+    files = {documented: 240, SCENES / "clearance.sweep.toml": 9, SCENES / "stiffness.sweep.toml": 24}
+    for file, number in files.items():
+        sweep = read_sweep(file)
+        assert len(sweep.cases) == len(sweep.distinct) == number
 
 
 def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
@@ -290,19 +290,12 @@ def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
 
 
 def test_scenes_and_sweeps_are_told_apart(tmp_path):
-    with pytest.raises(InputError, match="is a scene, not a sweep; solve it by archord solve") as told:
+    with pytest.raises(InputError, match=r"\A.* is a scene, not a sweep; solve it by archord solve.*\Z"):
         read_sweep(ELASTIC)
-    assert len(str(told.value).splitlines()) == 1
     sweep = written(tmp_path, "[grid]\npin.E = [1.0]")
     with pytest.raises(InputError) as told:
         load_scene(sweep)
     assert str(told.value) == f"{sweep}: is a sweep, not a scene; archord sweep solves it."
-
-
-@pytest.mark.parametrize("name", ["clearance", "stiffness"])
-def test_examples_are_sound(name):
-    sweep = read_sweep(SCENES / f"{name}.sweep.toml")
-    assert len(sweep.cases) == len(sweep.distinct) == {"clearance": 9, "stiffness": 24}[name]
 
 
 def test_the_parts_of_an_array_are_the_whole(tmp_path):
