@@ -33,24 +33,6 @@ def test_two_ranks_say_and_write_what_one_does(runs, tmp_path, arguments, writte
     assert found[0] == found[1]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["fit", "nowhere"], "nowhere: is not a run folder"),
-        (["scene", "--bogus"], "No such option: --bogus"),
-        (["reproduce", "fig6"], "fig6: is not a figure of the paper"),
-        (["solve", "--bogus", "nowhere.toml"], "No such option: --bogus"),
-    ],
-)
-def test_bad_input_is_told_once_by_two_ranks(tmp_path, arguments, said):
-    """Exit code 2 for the whole launcher, nothing written, for commands of one rank and of all."""
-    result = archord(*arguments, cwd=tmp_path, ranks=2)
-    assert result.returncode == 2
-    assert result.stderr.count(said) == 1
-    assert "Traceback" not in result.stderr
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.fixture
 def launched(monkeypatch):
     """Sets the environment of a launcher, alone."""

@@ -1,10 +1,11 @@
 """What commands refuse: one sentence, exit code 2, nothing written, and runs that stay as they are."""
 
 import shutil
+from pathlib import Path
 
 import pytest
 
-from tests.test_cli import SCENE
+from tests.test_cli import SCENE, archord
 
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
 RUN, OTHER = "{coarse}", "{elastic}"
@@ -35,6 +36,10 @@ RUN, OTHER = "{coarse}", "{elastic}"
         (["export-deck", SCENE, "-o", "no/x.inp"], "no/x.inp: cannot be written: no is not a folder."),
         (["export-deck", SCENE, "--set", "block.nu=2"], "--set block.nu=2: block.nu must be"),
         (["export-deck", "none.toml"], "none.toml: cannot be read"),
+        (
+            ["solve", SCENE, "--set", "analysis.accuracy=0.02", "--set", "joint.growth=0.5"],
+            "--set joint.growth=0.5: joint.growth must not be given together with analysis.accuracy, which chooses it.",
+        ),
         (["law", "jonson", *JOINT], "jonson: is not a known law; did you mean johnson?"),
         (["law", "johnson", "--radius", "1"], "--clearance, --E-star: missing"),
         (["law", "johnson", *JOINT, "--clearance", "-1"], "clearance = -1 must be a positive number."),
@@ -55,6 +60,30 @@ def test_bad_input_is_one_sentence(runs, tmp_path, monkeypatch, refused, argumen
     assert refused([argument.format(**runs) for argument in arguments]).startswith(said.format(**runs))
     assert {path: path.stat().st_mtime_ns for path in runs["coarse"].rglob("*")} == before
     assert [path.name for path in tmp_path.rglob("*")] == ["empty"]
+
+
+@pytest.mark.parametrize(
+    ("ranks", "arguments", "said"),
+    [
+        (0, ["solve", "bad.toml"], "bad.toml: joint.radius = -10.0 must be greater than 0."),
+        (2, ["solve", "bad.toml"], "bad.toml: joint.radius = -10.0 must be greater than 0."),
+        (2, ["solve", "--bogus", "nowhere.toml"], "No such option: --bogus"),
+        (2, ["scene", "--bogus"], "No such option: --bogus"),
+        (2, ["fit", "nowhere"], "nowhere: is not a run folder"),
+        (2, ["reproduce", "fig6"], "fig6: is not a figure of the paper"),
+        (2, ["sweep", "bad.sweep.toml"], "pin.E = -1.0 must be greater than 0."),
+    ],
+)
+def test_a_process_tells_bad_input_once(tmp_path, ranks, arguments, said):
+    """Exit code 2 for the whole launcher, nothing written, for commands of one rank and of all."""
+    scene = Path(SCENE).read_text()
+    (tmp_path / "bad.toml").write_text(scene.replace("radius = 10.0", "radius = -10.0"))
+    (tmp_path / "bad.sweep.toml").write_text(f'base = "{SCENE}"\n[grid]\npin.E = [-1.0]\n')
+    result = archord(*arguments, cwd=tmp_path, ranks=ranks)
+    assert result.returncode == 2
+    assert result.stderr.count(said) == 1
+    assert "Traceback" not in result.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {"bad.toml", "bad.sweep.toml"}
 
 
 FIELDS = "run/fields.h5: cannot be read as the fields of a run: it is damaged."

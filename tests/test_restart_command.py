@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -9,9 +10,11 @@ import tomllib
 
 import pytest
 
+from archord.output.folder import occupied
 from archord.output.history import read_history
+from archord.scene.errors import InputError
 from tests.output.run_files import accepted_steps, same_run
-from tests.test_cli import ENVIRONMENT, SCENE, archord
+from tests.test_cli import ENVIRONMENT, SCENE, archord, kill_after
 
 COARSE = ["--set", "joint.relative_element_size=0.2", "--set", "load.steps=12"]
 
@@ -20,31 +23,15 @@ def killed(folder, after: int, ranks: int = 0) -> int:
     """Start a run, kill all its ranks once ``after`` steps are there; the number of accepted steps."""
     launcher = ["mpirun", "-n", str(ranks)] if ranks else []
     command = [*launcher, sys.executable, "-m", "archord", "solve", SCENE, *COARSE, "-o", "run"]
-    history = folder / "run" / "history.csv"
-    with subprocess.Popen(
-        command, cwd=folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as process:
-        deadline = time.monotonic() + 120
-        while time.monotonic() < deadline and not (history.exists() and len(history.read_text().splitlines()) > after):
-            time.sleep(0.01)
-        process.kill()
-        process.wait()
-    _await_free(folder / "run")
-    return accepted_steps(folder / "run")
-
-
-def _await_free(folder) -> None:
-    """mpirun's ranks outlive it by a moment."""
-    from archord.output.folder import occupied
-    from archord.scene.errors import InputError
-
+    kill_after(after, command, signal.SIGKILL, folder)
     deadline = time.monotonic() + 30
-    while time.monotonic() < deadline:
+    while time.monotonic() < deadline:  # mpirun's ranks outlive it by a moment
         try:
-            with occupied(folder):
-                return
+            with occupied(folder / "run"):
+                break
         except InputError:
             time.sleep(0.1)
+    return accepted_steps(folder / "run")
 
 
 @pytest.fixture(scope="module")

@@ -113,14 +113,6 @@ def test_two_ranks_write_what_one_does(whole, tmp_path):
     assert "2 meshes made, 10 used again" in result.stdout  # both ranks worked: each made the mesh
 
 
-def test_two_ranks_tell_bad_input_once(tmp_path):
-    file = written(tmp_path, "[grid]\npin.E = [-1.0]\n")
-    result = archord("sweep", file, cwd=tmp_path, ranks=2)
-    assert result.returncode == 2
-    assert result.stderr.count("pin.E = -1.0 must be greater than 0.") == 1
-    assert not (tmp_path / "runs").exists()
-
-
 def test_the_reader_of_the_progress_may_leave(tmp_path):
     """``archord sweep ... | head -1`` solves all cases."""
     file = written(tmp_path, "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\n")
