@@ -54,7 +54,8 @@ def judge(timing: Timing) -> Line:
     if values is None:
         return line
     reference = read_reference(line.task.case, values.kinematics)
-    known = {name: abs(v / reference.values[name] - 1) for name, v in values.quantities.items() if name in reference}
+    exact = reference.values
+    known = {name: abs(value / exact[name] - 1) for name, value in values.quantities.items() if exact.get(name)}
     if values.profile is not None and values.side in reference.profile:
         known["profile"] = profile_error(values.profile, reference.profile[values.side])
     return Line(timing, known, reference)
@@ -90,16 +91,14 @@ def envelopes(lines: Sequence[Line], case: str) -> dict[str, Pairs]:
     which its series stays below it. "CalculiX, own limit" is CalculiX against its own extrapolated P."""
     found: dict[str, Pairs] = {}
     limits = own_limit(lines, case)
-
-    def add(name: str, members: list[Line], errors: list[float | None]) -> None:
-        lasted = zip(members, lasting(errors), strict=True)
-        found[name] = found.get(name, []) + [(line.timing.median, e) for line, e in lasted if e is not None]
-
     for (code, series), members in series_of(lines, case).items():
-        add(code, members, [line.errors.get("P") for line in members])
+        judged = {code: [line.errors.get("P") for line in members]}
         if code == CALCULIX and series in limits:
             limit = limits[series].value
-            add(f"{CALCULIX}, own limit", members, [m.force and abs(m.force / limit - 1) for m in members])
+            judged[f"{CALCULIX}, own limit"] = [m.force and abs(m.force / limit - 1) for m in members]
+        for name, errors in judged.items():
+            lasted = zip(members, lasting(errors), strict=True)
+            found.setdefault(name, []).extend((line.timing.median, e) for line, e in lasted if e is not None)
     return {code: envelope(pairs) for code, pairs in found.items() if pairs}
 
 

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from time import perf_counter
 
 from archord.benchmarks.case import matches, slug
 from archord.benchmarks.cost.work_precision_cases import DECKS, SERIES, JointCase, Kinematics, Mesh, Series
@@ -37,7 +36,7 @@ class Values:
     not tell is absent."""
 
     quantities: dict[str, float]
-    dofs: int
+    dofs: int | None = None
     kinematics: Kinematics = "current"
     iterations: int | None = None
     factorisations: int | None = None
@@ -47,19 +46,20 @@ class Values:
 
 @dataclass(frozen=True, kw_only=True)
 class Task(Process):
-    """``code`` on the mesh ``label`` of a ``series`` of ``case``, to be timed; `read` gives `Values`.
-
-    ``size`` is the element size over R, ``export`` the seconds that writing its input took before.
-    """
+    """``code`` on the mesh of element size ``size`` (in R) of a ``series`` of ``case``, to be timed; `read` gives
+    `Values`."""
 
     case: str
     code: str
     series: str
-    label: str
     size: float
     steps: int
-    export: float = 0.0
     version: str = ""
+
+    @property
+    def label(self) -> str:
+        """The mesh."""
+        return f"{self.size:g} R"
 
     @property
     def name(self) -> str:
@@ -92,26 +92,20 @@ def chosen(found: Sequence[Task], patterns: Sequence[str]) -> list[Task]:
     Raises `InputError` for a pattern that fits none.
     """
 
-    def fits(task: Task, pattern: str) -> bool:
-        return matches(pattern, task.name, task.code, task.series)
-
-    for pattern in patterns:
-        if not any(fits(task, pattern) for task in found):
+    chosen_by = {p: [t for t in found if matches(p, t.name, t.code, t.series)] for p in patterns}
+    for pattern, fitting in chosen_by.items():
+        if not fitting:
             known = ", ".join(dict.fromkeys(name for t in found for name in (t.code, t.series)))
             raise InputError(f"--only {pattern}: no code or series has such a name; there are {known}.")
-    return [task for task in found if not patterns or any(fits(task, pattern) for pattern in patterns)]
+    return [t for t in found if not patterns or any(t in fitting for fitting in chosen_by.values())]
 
 
 def _task(case: JointCase, code: str, series: str, size: float, folder: Path) -> Task:
     """The task, without a command, in a folder of its own, which is made."""
-    label = f"{size:g} R"
-    place = (folder / slug(f"{case.name} {code} {series} {label}")).resolve()
+    place = (folder / slug(f"{case.name} {code} {series} {size:g} R")).resolve()
     place.mkdir(parents=True, exist_ok=True)
-    kind = (code, case.name, series)
-    return Task(
-        (), place, core=last_core(), kind=kind, case=case.name, code=code, series=series, label=label, size=size,
-        steps=case.steps,
-    )  # fmt: skip
+    names = {"case": case.name, "code": code, "series": series}
+    return Task((), place, core=last_core(), kind=tuple(names.values()), size=size, steps=case.steps, **names)
 
 
 def _archord_task(case: JointCase, series: Series, mesh: Mesh, folder: Path, limit: float) -> Task:
@@ -125,7 +119,7 @@ def _archord_task(case: JointCase, series: Series, mesh: Mesh, folder: Path, lim
         if report["status"] != "done":
             raise Failure(report["message"])
         return Values(
-            {name: value for name, value in values_of(run).items() if name in case.quantities},
+            values_of(run, case),
             report["mesh"]["dofs"],
             scene.analysis.kinematics,
             round(sum(read_history(run / "history.csv")["iterations"])),
@@ -142,10 +136,9 @@ def _calculix_task(case: JointCase, series: Series, keys: Mesh, folder: Path, li
     if case.name == "elastic":
         case = replace(case, steps=series.elastic_steps)
     scene = case.scene(keys)
-    task, start = _task(case, CALCULIX, series.name, scene.joint.h, folder), perf_counter()
+    task = _task(case, CALCULIX, series.name, scene.joint.h, folder)
     mesh = deck_mesh(scene, series.elements or "quadratic")
     ccx = calculix.process(scene, mesh, task.folder)
-    export = perf_counter() - start
 
     def read() -> Values:
         opinion = ccx.read()
@@ -154,16 +147,11 @@ def _calculix_task(case: JointCase, series: Series, keys: Mesh, folder: Path, li
             # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
             values["dissipation"] = case.yield_stress * opinion.peeq_integral
         # no contact angle: pressures at the nodes near the edge scatter too much to find one
-        return Values(
-            {name: value for name, value in values.items() if math.isfinite(value)},
-            2 * len(mesh.x),
-            iterations=opinion.iterations,
-            profile=interpolated(opinion.angle, opinion.pressure),
-            side="pin",
-        )
+        known = {name: value for name, value in values.items() if math.isfinite(value)}
+        profile = interpolated(opinion.angle, opinion.pressure)
+        return Values(known, 2 * len(mesh.x), iterations=opinion.iterations, profile=profile, side="pin")
 
-    version = _calculix_version()
-    return replace(task, command=ccx.command, clear=ccx.clear, read=read, limit=limit, export=export, version=version)
+    return replace(task, command=ccx.command, clear=ccx.clear, read=read, limit=limit, version=_calculix_version())
 
 
 @cache

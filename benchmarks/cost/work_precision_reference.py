@@ -29,7 +29,6 @@ from archord.postprocess.arc import SIDES, read_arcs
 from archord.postprocess.convergence import extrapolated
 from archord.postprocess.curve import read_run
 from archord.presets.arc import ArcProfile
-from archord.scene.errors import InputError
 
 FILE = Path(__file__).with_name("work_precision_reference.json")
 COLUMNS = {"P": "P/(E* R)", "p0": "p0/E*", "eps": "eps", "dissipation": "plastic_dissipation/(E* R2)"}  # of history.csv
@@ -46,13 +45,18 @@ class Reference:
     errors: dict[str, float]
     profile: dict[str, Array]
 
-    def __contains__(self, quantity: str) -> bool:
-        """Whether there is a number to compare with."""
-        return bool(self.values.get(quantity))
+
+def _everything() -> dict[str, dict[str, Any]]:
+    return json.loads(FILE.read_text(encoding="utf-8"))["cases"] if FILE.exists() else {}
+
+
+def stored(case: str, kinematics: Kinematics) -> dict[str, Any]:
+    """All that is known of the reference: quantities, extrapolations, runs."""
+    return _everything()[case][kinematics]
 
 
 def read_reference(case: str, kinematics: Kinematics = "current") -> Reference:
-    """The stored values. Raises `InputError` if there are none."""
+    """The stored values."""
     data = stored(case, kinematics)
     values = {name: entry["value"] for name, entry in data["quantities"].items()}
     errors = {name: entry["error"] for name, entry in data["quantities"].items()}
@@ -60,26 +64,15 @@ def read_reference(case: str, kinematics: Kinematics = "current") -> Reference:
     return Reference(values, errors, profile | {"both": _mean(profile)} if profile else {})
 
 
-def stored(case: str, kinematics: Kinematics) -> dict[str, Any]:
-    """All that is known of the reference: quantities, extrapolations, runs. Raises `InputError` if there is nothing."""
-    data = _stored().get(case, {}).get(kinematics)
-    if data is None:
-        raise InputError(
-            f"{FILE.name}: holds no values of the {case} case with {kinematics} kinematics; compute them with "
-            "archord benchmark work-precision --reference."
-        )
-    return data
-
-
 def _mean(profile: dict[str, Array]) -> Array:
     """The pressure at an angle, of which the unbiased contact integrates one half on either side."""
     return np.mean(list(profile.values()), axis=0)
 
 
-def values_of(folder: Path) -> dict[str, float]:
-    """The quantities of a run's last step."""
+def values_of(folder: Path, case: JointCase) -> dict[str, float]:
+    """The quantities that ``case`` is judged by, at a run's last step."""
     history = read_history(folder / "history.csv")
-    return {name: history[column][-1] for name, column in COLUMNS.items()}
+    return {name: history[column][-1] for name, column in COLUMNS.items() if name in case.quantities}
 
 
 def profile_of(folder: Path) -> dict[str, Array]:
@@ -99,19 +92,20 @@ def compute(
     """
     chosen = families(case)
     runs = [_solve(case, kinematics, series, folder, said) for series in chosen]
-    entry: dict[str, Any] = {"quantities": {}, "families": []}
-    for series, found in zip(chosen, runs, strict=True):
-        entry["families"].append({"name": series.name, "runs": [r | {"folder": r["folder"].name} for r in found]})
-    for quantity in COLUMNS:
-        if quantity in case.quantities:
-            pairs = [[(r["element_size"], r[quantity]) for r in found] for found in runs]
-            entry["quantities"][quantity] = combined(pairs)
-    samples = [[profile_of(r["folder"]) for r in found[-_FINEST:]] for found in runs]
+    entry: dict[str, Any] = {
+        "quantities": {
+            quantity: combined([[(r["element_size"], r[quantity]) for r in found] for found in runs])
+            for quantity in COLUMNS
+            if quantity in case.quantities
+        },
+        "families": [{"name": series.name, "runs": found} for series, found in zip(chosen, runs, strict=True)],
+    }
+    samples = [[profile_of(folder / r["folder"]) for r in found[-_FINEST:]] for found in runs]
     profile, apart = smooth_profile(samples, _TERMS[case.name])
     entry["quantities"]["profile"] = {"value": 0.0, "error": apart}
     if kinematics == "current":
         entry["profile"] = {side: [float(f"{p:.7g}") for p in values] for side, values in profile.items()}
-    everything = _stored()
+    everything = _everything()
     # Fixed pairs can be chosen with either side's normals, which is a difference of the order of (dR/R)^2: another
     # code's choice, which the file holds, tells how much of the value depends on that.
     if independent := everything.get(case.name, {}).get(kinematics, {}).get("independent"):
@@ -151,6 +145,7 @@ def combined(found: list[list[tuple[float, float]]]) -> dict[str, Any]:
 def _solve(
     joint: JointCase, kinematics: Kinematics, series: Series, folder: Path, said: Callable[[str], None]
 ) -> list[dict[str, Any]]:
+    """What the file holds of the run on each mesh of ``series``."""
     found = []
     for mesh in series.meshes:
         scene = joint.scene(mesh, kinematics)
@@ -160,15 +155,10 @@ def _solve(
             case.solve(folder)
         run = case.folder(folder)
         report = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        values = {name: value for name, value in values_of(run).items() if name in joint.quantities}
-        dofs = report["mesh"]["dofs"]
-        found.append({"element_size": g.h, "growth": g.growth, "dofs": dofs, **values, "folder": run})
+        values, dofs = values_of(run, joint), report["mesh"]["dofs"]
+        found.append({"element_size": g.h, "growth": g.growth, "dofs": dofs, **values, "folder": run.name})
         said(f"{run.name}: {dofs} dofs, {values}, {report['seconds']['total']:.0f} s")
     return found
-
-
-def _stored() -> dict[str, dict[str, Any]]:
-    return json.loads(FILE.read_text(encoding="utf-8"))["cases"] if FILE.exists() else {}
 
 
 def sampled(arc: ArcProfile) -> Array:
@@ -199,15 +189,13 @@ def smoothed(pressure: Array, terms: int) -> Array:
     if len(pressed) <= terms:
         raise ValueError("a profile to be smoothed must be pressed at more angles than there are terms")
     guess = float(ANGLES[pressed[-1]])
+
+    def misfit(edge: float) -> float:
+        return float(np.sum((_fit(pressure, edge, terms) - pressure) ** 2))
+
     # the last angle that is pressed may be anywhere within the last facet
-    scan = np.linspace(0.97, 1.03, 61) * guess
-    misfits = [np.sum((_fit(pressure, edge, terms) - pressure) ** 2) for edge in scan]
-    best = scan[int(np.argmin(misfits))]
-    found = minimize_scalar(
-        lambda edge: float(np.sum((_fit(pressure, edge, terms) - pressure) ** 2)),
-        bounds=(best - 1e-3 * guess, best + 1e-3 * guess),
-        method="bounded",
-    )
+    best = min(np.linspace(0.97, 1.03, 61) * guess, key=misfit)
+    found = minimize_scalar(misfit, bounds=(best - 1e-3 * guess, best + 1e-3 * guess), method="bounded")
     return _fit(pressure, float(found.x), terms)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 from statistics import median
 
@@ -11,7 +12,7 @@ from PIL import Image
 
 from archord.benchmarks.cost.work_precision import Line, Pairs, envelopes, own_limit, seconds_at, series_of
 from archord.benchmarks.cost.work_precision_cases import CASES, QUANTITIES, JointCase, Kinematics
-from archord.benchmarks.cost.work_precision_codes import CALCULIX, OURS
+from archord.benchmarks.cost.work_precision_codes import CALCULIX, OURS, Values
 from archord.benchmarks.cost.work_precision_reference import stored
 from archord.report import files
 from archord.report.figure import new_figure, save
@@ -23,8 +24,7 @@ NAMES = {"P": "P", "p0": "p0", "eps": "contact angle", "profile": "pressure prof
 _HEADINGS = ("code", "series", "mesh", "dofs", "steps", "iterations", "factorisations", "seconds", "from - to", "MB",
              "P/(E* R)")  # fmt: skip
 _MARKERS = "os^Dvphx*"
-_COLOURS = {OURS: "tab:red", CALCULIX: "tab:blue"}
-_OTHERS = ("tab:green", "tab:purple", "tab:brown", "tab:olive", "tab:cyan", "tab:pink")
+_COLOURS = [f"tab:{name}" for name in ("red", "blue", "green", "purple", "brown", "olive", "cyan", "pink")]
 _FLOOR = 1e-9  # an error of zero has no place on a logarithmic axis
 
 
@@ -41,9 +41,12 @@ def write(lines: Sequence[Line], folder: Path, warm: Mapping[str, Sequence[float
 
 def row(line: Line) -> dict[str, object]:
     """The entries of a point by heading; what is not known is empty."""
-    task, timing, values = line.task, line.timing, line.values
-    seconds = [run.seconds for run in timing.runs] if values else []
-    found = values.quantities if values else {}
+    task, timing, values = line.task, line.timing, line.values or Values({})
+    runs = timing.runs if line.values else []
+
+    def known(value: float | None, form: str = "") -> str:
+        return "" if value is None else format(value, form)
+
     entries: dict[str, object] = {
         "case": task.case,
         "code": task.code,
@@ -51,28 +54,23 @@ def row(line: Line) -> dict[str, object]:
         "series": task.series,
         "label": task.label,
         "status": "done" if timing.done else "failed",
-        "dofs": values.dofs if values else "",
+        "dofs": known(values.dofs),
         "steps": task.steps,
-        "iterations": _known(values.iterations if values else None),
-        "factorisations": _known(values.factorisations if values else None),
-        "seconds median": f"{timing.median:.4g}" if seconds else "",
-        "seconds min": f"{min(seconds):.4g}" if seconds else "",
-        "seconds max": f"{max(seconds):.4g}" if seconds else "",
+        "iterations": known(values.iterations),
+        "factorisations": known(values.factorisations),
+        "seconds median": known(timing.median if runs else None, ".4g"),
+        "seconds min": known(min((run.seconds for run in runs), default=None), ".4g"),
+        "seconds max": known(max((run.seconds for run in runs), default=None), ".4g"),
         "repeats": len(timing.runs),
-        "export seconds": f"{task.export:.3g}" if task.export else "",
-        "memory [MB]": f"{max(run.memory for run in timing.runs) / 1e6:.0f}" if seconds else "",
-        "kinematics": values.kinematics if values else "",
+        "memory [MB]": known(max((run.memory / 1e6 for run in runs), default=None), ".0f"),
+        "kinematics": values.kinematics if line.values else "",
     }
-    known, errors = line.errors, line.reference.errors
-    entries |= {name: f"{found[name]:.10g}" if name in found else "" for name in QUANTITIES if name != "profile"}
-    entries |= {f"error of {name}": f"{known[name]:.3e}" if name in known else "" for name in QUANTITIES}
+    entries |= {name: known(values.quantities.get(name), ".10g") for name in QUANTITIES if name != "profile"}
+    entries |= {f"error of {name}": known(line.errors.get(name), ".3e") for name in QUANTITIES}
     for name in QUANTITIES:
-        entries[f"reference's error of {name}"] = f"{errors[name]:.1e}" if name in known and name in errors else ""
+        unsure = line.reference.errors.get(name) if name in line.errors else None
+        entries[f"reference's error of {name}"] = known(unsure, ".1e")
     return entries | {"message": timing.failure}
-
-
-def _known(value: int | None) -> object:
-    return "" if value is None else value
 
 
 def markdown(lines: Sequence[Line], warm: Mapping[str, Sequence[float]] | None = None) -> str:
@@ -135,9 +133,6 @@ def _notes(case: JointCase, lines: Sequence[Line]) -> list[str]:
             f"{CALCULIX}'s {series} extrapolates to P = {limit.value:.8f} by itself, with order {limit.order:.1f} "
             f"(moves by {limit.error:.0e} if a mesh is left out); its penalty is part of that.\n"
         )
-    exports = [line.task.export for line in lines if line.task.export]
-    if exports:
-        out.append(f"Meshing and writing a deck took {min(exports):.1f} to {max(exports):.1f} s more, not counted.\n")
     return out
 
 
@@ -197,16 +192,16 @@ def draw(case: JointCase, lines: Sequence[Line], path: Path) -> None:
 
 def _styles(lines: Sequence[Line], case: str) -> dict[tuple[str, str], dict]:
     """A colour for each code, a marker for each of its series."""
-    styles: dict[tuple[str, str], dict] = {}
-    count: dict[str, int] = {}
-    colours, strangers = dict(_COLOURS), iter(_OTHERS * 4)
-    for code, series in series_of(lines, case):
-        if code not in colours:
-            colours[code] = next(strangers)
-        k = count[code] = count.get(code, -1) + 1
-        styles[code, series] = {
+    series = series_of(lines, case)
+    codes = dict.fromkeys((OURS, CALCULIX, *(code for code, _ in series)))
+    colours = dict(zip(codes, cycle(_COLOURS), strict=False))
+    count = {code: [name for known, name in series if known == code] for code in codes}
+    styles = {}
+    for code, name in series:
+        k = count[code].index(name)
+        styles[code, name] = {
             "color": colours[code], "marker": _MARKERS[k % len(_MARKERS)], "markersize": 5, "linewidth": 1.1,
-            "linestyle": ("-", "--", ":", "-.")[k % 4], "label": f"{code}, {series}",
+            "linestyle": ("-", "--", ":", "-.")[k % 4], "label": f"{code}, {name}",
         }  # fmt: skip
     return styles
 
