@@ -86,11 +86,15 @@ def test_unloading_counts_only_where_the_ways_are_the_same(runs, more):
         assert force.largest[1] < 1e-8
 
 
-def test_the_first_loading_ends_where_the_pin_goes_back():
-    """Also if it later goes further than before."""
+def test_the_first_loading_ends_where_the_pin_goes_back(runs):
+    """Also if it later goes further than before; runs that share no range of it are not compared."""
     delta = np.array([1.0, 2.0, 3.0, 2.0, 1.0, 4.0])
-    curve = RunCurve("x", paper_joint(), delta, delta, delta, delta, delta)
+    curve = RunCurve("x", paper_joint(), *5 * [delta])
     assert list(curve.first_loading().P) == [1, 2, 3]
+    near, far = Run(runs["coarse"]), Run(runs["coarse"])
+    far.curve = curve
+    with pytest.raises(InputError, match="shares no range of displacements"):
+        compare_runs([near, far])
 
 
 def test_nothing_has_no_relative_difference(runs):
@@ -118,14 +122,3 @@ def test_compare_draws_and_tells_the_difference(runs, more, tmp_path, capsys):
     assert "joint.radius" in printed
     assert printed.endswith(f"{target}\n")
     assert target.read_bytes()[1:4] == b"PNG"
-
-
-def test_runs_without_a_common_displacement(runs, more):
-    """A sentence."""
-    run = Run(runs["coarse"])
-    far = Run(more["stepped"])
-    far.curve = RunCurve(
-        "far", far.scene, *(getattr(far.curve, n) + 9 for n in ("delta", "P", "p0", "eps", "peeq_max"))
-    )
-    with pytest.raises(InputError, match="shares no range of displacements"):
-        compare_runs([run, far])
