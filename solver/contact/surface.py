@@ -8,6 +8,7 @@ cells it owns. What a facet needs of its own cell stays local.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import basix
 import numpy as np
@@ -92,6 +93,7 @@ class Surface:
     def place_points(self, xi: Array, w: Array) -> None:
         """Put the contact points at ``xi`` ``(n_facets of the curve, q)`` in (0, 1) with weights ``w``; no history."""
         self.curve_xi = xi
+        self.__dict__.pop("_arc_length", None)
         start, along = self._ends[:, 0], self._ends[:, 1] - self._ends[:, 0]
         X = start[:, None] + xi[self.facet][..., None] * along[:, None]
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
@@ -128,9 +130,14 @@ class Surface:
 
     def arc_position(self, origin: Array) -> Array:
         """Arc length ``(n_facets, q)`` of all points, from the end of the curve nearest to ``origin`` ``(2,)``."""
-        s = self.curve.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
+        s = self._arc_length
         first, last = np.linalg.norm(self.curve.X[[0, -1]] - origin, axis=1)
         return s[-1, -1] - s[:, :-1] if last < first else s[:, :-1]
+
+    @cached_property
+    def _arc_length(self) -> Array:
+        """From the start of the curve to all points, and to the end of each facet ``(n_facets, q + 1)``."""
+        return self.curve.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
 
     def curve_displacement(self, u: Array) -> Array:
         """Displacement ``(n_nodes, 2)`` of the whole curve, from this rank's nodal displacements ``u`` ``(n, 2)``."""
@@ -174,6 +181,11 @@ class RigidSurface:
     def neighbours(self, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
         """As those of a `Surface`: there are none."""
         return np.arange(len(facets)), facets
+
+    @cached_property
+    def _arc_length(self) -> Array:
+        """From the start of the curve to all points, and to the end of each facet ``(n_facets, q + 1)``."""
+        return self.curve.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
 
     def curve_displacement(self, u: Array) -> Array:
         """The displacement of the disc ``(1, 2)``, whatever that of the bodies."""

@@ -20,7 +20,7 @@ from archord.scene.errors import InputError
 from tests.output.run_files import accepted_steps
 from tests.solver.solving import scene
 
-SHAPES = {"a": ((1000,), "<f8"), "pin/b": ((20, 3, 2), "<f8")}
+SHAPES = {"a": ((5000,), "<f8"), "pin/b": ((20, 3, 2), "<f8")}
 FIXED = {"mesh/x": np.arange(30.0).reshape(10, 3), "mesh/tag": np.arange(5, dtype=np.int8)}
 
 
