@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 
 from archord.cli import run
+from archord.presets import joint
 
 SCENES = Path(__file__).parents[2] / "scenes"
 BASE = """
@@ -42,3 +43,15 @@ def times(folder: Path) -> dict[str, int]:
 
 def sweep(*arguments: str | Path) -> int:
     return run(["sweep", *map(str, arguments)])
+
+
+def break_mesh(monkeypatch, message: str, below: float) -> None:
+    """Let every case fail whose pin has less than this E."""
+    true_mesh = joint._mesh
+
+    def broken(scene, *rest):
+        if below > scene.pin.E:
+            raise ValueError(message)
+        return true_mesh(scene, *rest)
+
+    monkeypatch.setattr(joint, "_mesh", broken)

@@ -7,17 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from archord.benchmarks.case import Case
 from archord.geometry.mesh_cache import MESHES
-from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.ranks import agreed
-from archord.output.run import solve_scene
 from archord.studies.case_run import solve_case
 from archord.studies.cases import read_sweep
 from archord.studies.farm import Farm, suited
 from archord.studies.sweep import Job, Share, open_jobs
 from archord.studies.tables import of_case, report_of, result_of
-from tests.studies.parts import SOFT, written
+from tests.studies.parts import SOFT, break_mesh, written
 
 CLOCK = {"seconds", "force_balance"}
 
@@ -49,13 +48,15 @@ def test_each_job_is_solved_once_by_somebody(comm, tmp_path):
     assert sum(result.meshes + result.reused for result in results) == len(jobs)
     for job in jobs:
         assert report_of(job.folder)["ranks"] == 1
-    from mpi4py import MPI
+    a, b = alone_and_in(jobs[0], folder)
+    assert a == b
 
-    alone = folder / "alone"
-    claim_folder(alone, force=True)
-    solve_scene(jobs[0].scene, alone, MPI.COMM_SELF)
-    a, b = (read_history(place / "history.csv") for place in (alone, jobs[0].folder))
-    assert {name: a[name] for name in a if name not in CLOCK} == {name: b[name] for name in b if name not in CLOCK}
+
+def alone_and_in(job: Job, folder: Path) -> list[dict]:
+    """What does not depend on the clock of two histories: of a solve on one rank, and of the job."""
+    Case("alone", job.scene).solve(folder)
+    both = (read_history(place / "history.csv") for place in (folder / "alone", job.folder))
+    return [{name: column for name, column in history.items() if name not in CLOCK} for history in both]
 
 
 @pytest.mark.mpi
@@ -65,17 +66,12 @@ def test_a_group_solves_what_one_rank_does(comm, tmp_path):
     results = []
     assert Farm(comm, comm.size).run(jobs, results.append) == 0
     if comm.rank == 0:
-        from mpi4py import MPI
-
         assert [result.status for result in results] == ["done", "done"]
         for job in jobs:
             assert report_of(job.folder)["ranks"] == comm.size
-        alone = folder / "alone"
-        claim_folder(alone, force=True)
-        solve_scene(jobs[1].scene, alone, MPI.COMM_SELF)
-        a, b = (read_history(place / "history.csv") for place in (alone, jobs[1].folder))
-        for name in set(a) - CLOCK:
-            assert a[name] == pytest.approx(b[name], rel=1e-9), name
+        a, b = alone_and_in(jobs[1], folder)
+        for name, column in a.items():
+            assert column == pytest.approx(b[name], rel=1e-9), name
 
 
 @pytest.mark.mpi
@@ -104,16 +100,7 @@ def test_a_signal_ends_the_batch_on_all_ranks(comm, tmp_path):
 @pytest.mark.mpi
 def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
     """Whichever rank has them."""
-    from archord.presets import joint
-
-    true_mesh = joint._mesh
-
-    def broken(scene, *rest):
-        if scene.pin.E < 0.75:
-            raise ValueError("broken")
-        return true_mesh(scene, *rest)
-
-    monkeypatch.setattr(joint, "_mesh", broken)
+    break_mesh(monkeypatch, "broken", below=0.75)
     _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 0.6, 0.7, 0.8, 1.0, 1.82]\n")
     results = []
     assert Farm(comm).run(jobs, results.append) == 0

@@ -12,7 +12,7 @@ from archord.output.history import read_history
 from archord.postprocess.curve import read_run
 from archord.studies.cases import read_sweep
 from archord.studies.tables import result_of
-from tests.studies.parts import SOFT, STUCK, numbers, sweep, table, times, written
+from tests.studies.parts import SOFT, STUCK, break_mesh, numbers, sweep, table, times, written
 
 
 @pytest.fixture(scope="module")
@@ -92,15 +92,12 @@ def test_what_is_solved_is_not_solved_again(solved, tmp_path, capsys):
     assert times(solved / "out") == after
 
 
-def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, capsys):
+def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, refused):
     out = _again(solved)
     before = {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
     other = written(tmp_path, SOFT.replace("[2, 3]", "[4]"), "other")
-    assert sweep(other, "-o", out) == 2
-    assert capsys.readouterr().err == (
-        f"{out}: holds another sweep, which has no case in common with {other}; choose another folder with -o, or "
-        "remove this one.\n"
-    )
+    said = f"{out}: holds another sweep, which has no case in common with {other}; choose another folder with -o, or "
+    assert refused(["sweep", other, "-o", str(out), "-q"]) == f"{said}remove this one.\n"
     assert {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()} == before
 
 
@@ -144,20 +141,11 @@ def test_a_failure_stops_nobody_else(tmp_path, capsys):
 
 def test_an_error_is_kept_with_its_traceback(tmp_path, monkeypatch, capsys):
     """What nobody foresaw is the case's own: failure.txt has it, the table its sentence, and a retry removes it."""
-    from archord.presets import joint
-
-    true_mesh = joint._mesh
-
-    def broken(scene, *rest):
-        if scene.pin.E == 1.0:
-            raise ValueError("two\nlines")
-        return true_mesh(scene, *rest)
-
-    monkeypatch.setattr(joint, "_mesh", broken)
+    break_mesh(monkeypatch, "two\nlines", below=0.75)
     file = written(tmp_path, "[grid]\npin.E = [0.5, 1.0, 1.82]\n")
     assert sweep(file, "-o", tmp_path / "out") == 3
     assert "2 done, 1 failed" in capsys.readouterr().out
-    end = table(tmp_path / "out" / "cases.csv")[1]
+    end = table(tmp_path / "out" / "cases.csv")[0]
     assert (end["status"], end["message"], end["P [E* R]"]) == ("failed", "ValueError: two lines", "")
     run_folder = tmp_path / "out" / "cases" / end["run"]
     assert "in broken" in (run_folder / "failure.txt").read_text()
