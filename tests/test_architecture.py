@@ -1,8 +1,10 @@
 """The house: rooms in layers, arrows one way, everything installed."""
 
 import ast
+import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -63,6 +65,29 @@ def test_a_room_imports_only_from_those_below_it(room):
     above = set(ROOMS[ROOMS.index(room) + 1 :])
     assert files_of(room)
     assert not {file.name: rooms for file in files_of(room) if (rooms := imported(file) & above)}
+
+
+def test_no_imports_at_the_top_of_files_make_a_circle():
+    known = {
+        f"archord.{file.relative_to(ROOT).with_suffix('').as_posix().replace('/', '.')}"
+        for room in ROOMS
+        for file in files_of(room)
+    }
+    graph = {}
+    for name in known:
+        tree = ast.parse((ROOT / f"{name.removeprefix('archord.').replace('.', '/')}.py").read_text(encoding="utf-8"))
+        froms = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.module]
+        graph[name] = {f"{f.module}.{a.name}" for f in froms for a in f.names} | {f.module for f in froms}
+        graph[name] &= known
+    TopologicalSorter(graph).prepare()  # raises CycleError
+
+
+def test_the_plan_of_the_house_names_every_file():
+    plan = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    parts = dict(re.findall(r"\*\*`([\w/]+)/`\*\*\n\n((?:- .*\n)+)", plan))
+    said = {room.replace("/", "."): set(re.findall(r"^- `(\w+\.py)`", lines, re.M)) for room, lines in parts.items()}
+    there = {room: {file.name for file in files_of(room)} - {"__init__.py"} for room in ROOMS}
+    assert said == there
 
 
 def test_every_folder_with_code_is_a_room():
