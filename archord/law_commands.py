@@ -174,7 +174,6 @@ def _print_table(
 @file("--python", "write force and stiffness over delta as a module that needs only math")
 @file("--csv", "sweep: write k, c, curves here [SWEEP/fit.csv]", parameter="csv_file")
 @file("--law", "sweep: write the model of k and c as JSON", parameter="law_file")
-@click.option("--held-out", type=float, metavar="SHARE", help="sweep: cases kept to judge the model by [0.15]")
 @flag("--force", "overwrite files that are there and are no picture or earlier output")
 def fit(
     folders: tuple[Path, ...],
@@ -187,7 +186,6 @@ def fit(
     python: Path | None,
     csv_file: Path | None,
     law_file: Path | None,
-    held_out: float | None,
     force: bool,
 ) -> int:
     """Fit the plastic-Winkler law to runs: k from P(delta) and from p0(delta), c where the joint yields.
@@ -208,13 +206,13 @@ def fit(
             files.append(csv_file)
         targets = csv_file, law_file, json_file, picture
         sweep_fit.check_files(folders[0], *targets, force)
-        found = sweep_fit.fit_sweep(folders[0], deltas, confidence, 0.15 if held_out is None else held_out)
+        found = sweep_fit.fit_sweep(folders[0], deltas, confidence)
         with _sentences():
             found.write(*targets)
         print(found.text(), *files, sep="\n")
         return 0
-    if csv_file or law_file or held_out is not None:
-        raise InputError(f"{folders[0]}: --csv, --law and --held-out are for a sweep, and this is none.")
+    if csv_file or law_file:
+        raise InputError(f"{folders[0]}: --csv and --law are for a sweep, and this is none.")
     from archord.output.folder import FILES
     from archord.output.user_file import check_target, writing
     from archord.postprocess.curve import read_run

@@ -20,20 +20,18 @@ from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.study import (
     CSV_BEGINS,
     Cases,
-    Study,
     TooFewError,
     read_cases,
     rounded,
-    shipped_rows,
+    shipped_errors,
     study,
     table_of,
     usable,
     write_cases,
 )
-from archord.report.table import Table
 from archord.scene.errors import InputError
 from archord.studies.cases import Case, read_sweep
-from archord.studies.tables import entry, heading, of_case, report_of, result_of
+from archord.studies.tables import of_case, result_of
 
 FILE, TABLE = "sweep.toml", "fit.csv"
 BLOCKS = "small blocks"
@@ -42,43 +40,37 @@ _SOFTER = 0.01  # share of P that a block may cost without a word
 
 @dataclass(frozen=True)
 class SweepFit:
-    """The fitted ``cases`` of a sweep, their ``table`` with what they vary, ``notes`` on where they are from, the runs
-    ``left_out`` with the reason, and the ``study`` of a model over them, None where the cases are ``too_few``."""
+    """The fitted ``cases`` of a sweep, ``notes`` on where they are from, the runs ``left_out`` with the reason, and the
+    ``model`` of k and c, None where the cases are ``too_few``."""
 
     cases: Cases
-    table: Table
     notes: dict[str, str]
     left_out: list[tuple[str, str]]
-    study: Study | None
+    model: CalibratedModel | None
     too_few: str
 
-    @property
-    def model(self) -> CalibratedModel | None:
-        """The model of k and c, if there is one."""
-        return self.study.model if self.study else None
-
     def text(self) -> str:
-        """The cases, the model and its errors; of another sweep than archord's own also those of archord's law."""
-        parts = [str(self.table), "", *(f"left out: {name}: {reason}" for name, reason in self.left_out)]
-        if self.study is None:
+        """The cases, the errors of their model, and of archord's law where that is another one."""
+        tables = [str(study_report.case_table(self.cases))]
+        parts = [f"left out: {name}: {reason}" for name, reason in self.left_out]
+        parts += [f"{BLOCKS}: {self.notes[BLOCKS]}"] if BLOCKS in self.notes else []
+        if self.model is None:
             parts.append(f"model: {self.too_few}; the table stands alone.")
         else:
-            parts.append(study_report.model_text(self.study, len(self.cases)))
-        if BLOCKS in self.notes:
-            said = f"{self.notes[BLOCKS]}; k is smaller in them, which a model does not know."
-            parts.append(f"\n{BLOCKS}: {said}\n")
-        if self.notes.get("sweep") != shipped_model().data["provenance"].get("sweep"):
-            rows = shipped_rows(usable(self.cases)[0])
-            if rows:
-                table = study_report.error_table(rows).markdown()
-                parts.append(f"\narchord law calibrated on these cases, as far as they are in its range:\n\n{table}")
-        return "\n".join(parts)
+            fitted, held = (self.model.data["provenance"][name] for name in ("fitted", "held out"))
+            parts.append(f"model: from {fitted} of {len(self.cases)} cases; {held} held out until the end")
+            tables.append(study_report.error_table(self.model.data["errors"]).markdown())
+        found = shipped_errors(usable(self.cases)[0])
+        if found and (self.model is None or self.model.data["elastic"] != shipped_model().data["elastic"]):
+            tables.append("archord law calibrated on these cases, as far as they are in its range:\n")
+            tables.append(study_report.error_table({"archord's law": found}).markdown())
+        return "\n".join([tables[0], "", *parts, "", *tables[1:]])
 
     def write(self, csv: Path | None, law: Path | None, json: Path | None, picture: Path | None) -> None:
         """Write those files that are named: cases, model, everything, a picture. Raises `InputError` where the cases
-        give no model for ``law``, and ValueError for a picture of unknown format."""
-        if law and self.study is None:
-            raise InputError(f"{law}: no law to write: {self.too_few}.")
+        give no model for ``law`` or ``picture``, and ValueError for a picture of unknown format."""
+        if (law or picture) and self.model is None:
+            raise InputError(f"{law or picture}: no law to {'write' if law else 'draw'}: {self.too_few}.")
         if csv:
             write_cases(self.cases, self.notes, csv)
         if law and self.model:
@@ -88,7 +80,7 @@ class SweepFit:
             with writing(json):
                 text = study_report.as_json(self.cases, self.notes, self.left_out, self.model)
                 json.write_text(text, encoding="utf-8")
-        if picture:
+        if picture and self.model:
             study_report.draw_study(self.cases, self.model, picture)
 
 
@@ -108,59 +100,57 @@ def check_files(
             check_target(file, [path, path / FILE], force=force or file == picture, begins=kinds.get(file))
 
 
-def fit_sweep(path: Path, load_range: tuple[float, float], confidence: float, held_out: float) -> SweepFit:
-    """Fit the sweep in the folder ``path``, or take the stored table ``path``; then a model, with a share ``held_out``
-    to judge it by. Raises `InputError`."""
-    if not 0 <= held_out <= 0.5:
-        raise InputError(f"--held-out {held_out:g}: must be a share from 0 to 0.5.")
+def fit_sweep(path: Path, load_range: tuple[float, float], confidence: float) -> SweepFit:
+    """Fit the sweep in the folder ``path``, or take the stored table ``path``; then a model. Raises `InputError`."""
+    left_out: list[tuple[str, str]] = []
     if path.suffix == ".csv":
         cases, notes = read_cases(path)
         if not len(cases):
             raise InputError(f"{path}: holds no case.")
-        numbers = range(1, len(cases) + 1)
-        left_out: list[tuple[str, str]] = []
-        table = study_report.case_table(numbers, cases, study_report.numbers_of(cases))
     else:
-        cases, table, notes, left_out = _solved(path, load_range, confidence)
+        cases, notes, left_out = _solved(path, load_range, confidence)
     used, unfit = usable(cases)
-    left_out += unfit
     try:
-        result, too_few = study(used, held_out, provenance=notes), ""
+        model, too_few = study(used, provenance=notes), ""
     except TooFewError as error:
-        result, too_few = None, str(error)
-    return SweepFit(cases, table, notes, left_out, result, too_few)
+        model, too_few = None, str(error)
+    return SweepFit(cases, notes, left_out + unfit, model, too_few)
 
 
 def _solved(
     folder: Path, load_range: tuple[float, float], confidence: float
-) -> tuple[Cases, Table, dict[str, str], list[tuple[str, str]]]:
-    """Fit k and c to every distinct case, on its finest mesh; the first four of `SweepFit`."""
-    design = read_sweep(folder / FILE)
-    of: dict[str, Case] = {}
+) -> tuple[Cases, dict[str, str], list[tuple[str, str]]]:
+    """Fit k and c to every distinct case, on its finest mesh; the first three of `SweepFit`."""
+    distinct = read_sweep(folder / FILE).distinct
+    of: dict[str, str] = {}  # the names of the cases by those of their curves
     runs, fitted, left_out = [], [], list[tuple[str, str]]()
-    for case in design.distinct:
+    for case in distinct:
         try:
-            run = _run(case, folder)
+            runs.append(_run(case, folder))
+            of[runs[-1].name] = case.run
         except InputError as error:
             left_out.append((case.run, str(error)))
-        else:
-            runs.append(run)
-            of[run.name] = case
     for refined in group(runs):
-        case = of[refined.run.name]
-        left_out += [(of[run.name].run, f"{case.run} is the same joint on a finer mesh") for run in refined.coarser]
+        name = of[refined.run.name]
+        left_out += [(of[run.name], f"{name} is the same joint on a finer mesh") for run in refined.coarser]
         try:
-            fitted.append((case, fit_case(refined, load_range, confidence, case.run)))
+            fitted.append(fit_case(refined, load_range, confidence, name))
         except InputError as error:
-            left_out.append((case.run, str(error)))
+            left_out.append((name, str(error)))
     if not fitted:
         said = "; ".join(f"{name}: {reason}" for name, reason in left_out[:1])
         raise InputError(f"{folder}: holds no case that can be fitted{f' ({said})' if said else ''}.")
-    cases = rounded(table_of(found for _, found in fitted))
-    varied = {heading(key, fitted[0][0].scene): [_shown(entry(case.value(key))) for case, _ in fitted]
-              for key in design.keys}  # fmt: skip
-    table = study_report.case_table([case.number for case, _ in fitted], cases, varied)
-    return cases, table, _notes(folder, design.distinct, cases), left_out
+    cases = rounded(table_of(fitted))
+    notes = {
+        "archord": archord.__version__,
+        "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
+        "distinct cases": str(len(distinct)),
+        "mesh": f"elements of {' and '.join(sorted({f'{mesh:.3g}' for mesh in cases.mesh}))} R on the arcs",
+    }
+    softer = max(LawJoint.from_scene(run.scene).softer[0] for run in runs)
+    if softer > _SOFTER:
+        notes[BLOCKS] = f"P up to about {softer:.1%} smaller than in a wide block, and k, which a model does not know"
+    return cases, notes, left_out
 
 
 def fit_case(refined: Refined, load_range: tuple[float, float], confidence: float, name: str) -> dict[str, Any]:
@@ -171,7 +161,7 @@ def fit_case(refined: Refined, load_range: tuple[float, float], confidence: floa
     run = refined.run
     force = fit_curve("P", [refined], load_range, confidence)
     plateau = fit_plateau(force, [refined], load_range, confidence)
-    pin, block, k, c = run.scene.pin, run.scene.block, force.k, force.c
+    pin, block = run.scene.pin, run.scene.block
     case = {
         "run": name,
         "plane": run.plane,
@@ -182,23 +172,17 @@ def fit_case(refined: Refined, load_range: tuple[float, float], confidence: floa
         "clearance": run.dR / run.R,
         "strength": math.inf if run.sigY is None else run.sigY / run.E_star,
         "mesh": run.scene.joint.h / run.R,
-        "k": k and k.value,
-        "k_error": k and k.standard_error,
-        "k_mesh": k and k.discretisation_error,
-        "c": c and c.value,
-        "c_error": c and c.standard_error,
-        "c_mesh": c and c.discretisation_error,
         "plateau": plateau and plateau.c and plateau.c.value,
         "rms": force.rms,
         "largest": force.largest,
         "load": force.residuals[0].load,
         "P": force.residuals[0].data,
     }
-    return {column: math.nan if value is None else value for column, value in case.items()}
-
-
-def _shown(value: Any) -> str:
-    return "-" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
+    for parameter, found in (("k", force.k), ("c", force.c)):
+        if found:
+            errors = {"_error": found.standard_error, "_mesh": found.discretisation_error}
+            case |= {parameter: found.value} | {parameter + kind: error for kind, error in errors.items()}
+    return case
 
 
 def _run(case: Case, folder: Path) -> RunCurve:
@@ -212,27 +196,3 @@ def _run(case: Case, folder: Path) -> RunCurve:
     if case.scene.pin.hardening > 0 or case.scene.block.hardening > 0:
         raise InputError("hardening: the law is for perfect plasticity")
     return read_run(run).loading()
-
-
-def _notes(folder: Path, distinct: list[Case], cases: Cases) -> dict[str, str]:
-    """Where the fitted cases are from."""
-    reports = [report for case in distinct if (report := report_of(of_case(case, folder)))]
-    days = sorted({str(report.get("started", ""))[:10] for report in reports} - {""})
-    command = [str(word) for word in (reports[0].get("command", []) if reports else [])]
-    seconds = sum(report.get("seconds", {}).get("total", 0.0) for report in reports)
-    meshes = sorted({f"{mesh:.3g}" for mesh in cases.mesh})
-    notes = {
-        "archord": archord.__version__,
-        "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
-        "command": " ".join([Path(command[0]).name, *command[1:]]) if command else "unknown",
-        "solved": " to ".join(dict.fromkeys((days[0], days[-1]))) if days else "unknown",
-        "distinct cases": str(len(distinct)),
-        "mesh": f"elements of {' and '.join(meshes)} R on the arcs",
-        "cost": f"{seconds:.0f} s on one rank, on a machine that did other work besides",
-    }
-    joints = [(case.scene.joint, LawJoint.from_scene(case.scene)) for case in distinct]
-    widths = {g.W / g.radius: joint.softer[0] for g, joint in joints if g.model == "block"}
-    softer = {width: share for width, share in widths.items() if share > _SOFTER}
-    if softer:
-        notes[BLOCKS] = f"block_size from {min(softer):.4g} R on, P about {max(softer.values()):.1%} smaller there"
-    return notes

@@ -1,7 +1,7 @@
 """The study behind the calibrated law: fitted joints, a model of their k and c, and how good it is on unseen ones.
 
 The joints are cases, rows of a table that a CSV file keeps. Everything in it is dimensionless, so cases of different
-units and sizes stand side by side. `study` makes a `CalibratedModel` of many, and says how far it is off.
+units and sizes stand side by side. `study` makes a `CalibratedModel` of many, with its errors.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import hashlib
 import io
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -34,11 +33,17 @@ from archord.postprocess.laws.joint import Array, LawJoint
 from archord.scene.errors import InputError
 
 Cases: TypeAlias = pd.DataFrame  # with the columns of `COLUMNS` and of `table_of`
-Form = dict[str, Any]  # name, and the terms of each polynomial, see `CalibratedModel`
-Row = tuple[str, str, str, dict[str, Any]]  # what, plane, which bodies yield, `summary` of errors
+Errors = dict[str, dict[str, Any]]  # by plane and yielding ("strain block", "both all"): `summary` of errors
 
-PLANES = ("strain", "stress")
-KINDS: tuple[Kind, ...] = tuple((plane, yielding) for plane in PLANES for yielding in ("none", "both", "block"))
+KINDS: tuple[Kind, ...] = tuple((plane, yielding) for plane in ("strain", "stress")
+                                for yielding in ("none", "both", "block"))  # fmt: skip
+FORM = {  # the terms of 1/k_e, of A for late yielding, and of ln c in either plane, see `CalibratedModel`
+    "name": "calibrated",
+    "elastic": ["p", "q", "pm", "qn", "qnn", "qqnn", "pqmn", "ppmmm"],
+    "late": ["1", "p", "x", "pm", "qn"],
+    "strain": ["1", "x", "p", "xp", "pp", "pn", "ppm"],
+    "stress": ["1", "pm", "n", "d"],
+}
 LATE = 0.45  # delta/dR from which errors of P count; the contact is Hertz's before
 FOLDS = 10
 HELD_OUT = 0.15
@@ -65,25 +70,11 @@ COLUMNS = {  # of a case, with the heading in its file
     "load": "delta/dR",  # of the steps fitted, an array
     "P": "P/(E* dR)",
 }
-_WORDS, _CURVES = ("run", "plane", "yielding"), ("load", "P")
+_TYPES = {name: float for name in COLUMNS} | dict.fromkeys(("run", "plane", "yielding"), str)
+_CURVES = ("load", "P")
 _PLENTY = 2  # cases per coefficient without which nothing is fitted
 _CLEAR = 0.65  # of the largest load: where the plateau must have begun for c to count
 _SHORT = 0.99  # of the largest load of the sweep, that a case must have reached
-
-
-def form(name: str, elastic: str, late: str, strain: str, stress: str) -> Form:
-    """The terms of 1/k_e, of A for late yielding, and of ln c in plane ``strain`` and plane ``stress``."""
-    terms = {"elastic": elastic, "late": late, "strain": strain, "stress": stress}
-    return {"name": name} | {part: names.split() for part, names in terms.items()}
-
-
-FORM = form("calibrated", "p q pm qn qnn qqnn pqmn ppmmm", "1 p x pm qn", "1 x p xp pp pn ppm", "1 pm n d")
-SIMPLER = (  # to compare with
-    form("constants", "1", "", "1", "1"),
-    form("k by alpha, c by s", "p q", "", "1 x", "1 x"),
-    form("and k by nu and s", "p q pm qn", "1", "1 x", "1 x"),
-    form("and c by alpha and nu", "p q pm qn", "1", "1 x p pm qn", "1 pm n"),
-)
 
 
 def table_of(cases: Iterable[dict[str, Any]]) -> Cases:
@@ -94,6 +85,7 @@ def table_of(cases: Iterable[dict[str, Any]]) -> Cases:
     shows in P, and the fit then takes c to mend the shape of the curve.
     """
     found = pd.DataFrame(cases, columns=list(COLUMNS))
+    found = found.astype({name: kind for name, kind in _TYPES.items() if name not in _CURVES})
     found["alpha"] = [dundurs_alpha(case.plane, case.ratio, case.pin_nu, case.nu) for case in found.itertuples()]
     found["s"] = found.strength / found.clearance
     longest = found.load.map(lambda load: load[-1])
@@ -125,9 +117,8 @@ def read_cases(file: str | Path) -> tuple[Cases, dict[str, str]]:
     Raises `InputError` if it cannot be read.
     """
     try:
-        lines = Path(file).read_text(encoding="utf-8").splitlines(keepends=True)
-        notes = dict(line[1:].strip().split(": ", 1) for line in lines if line.startswith("#"))
-        return _parsed("".join(line for line in lines if not line.startswith("#"))), notes
+        text = Path(file).read_text(encoding="utf-8")
+        return _parsed(text), dict(line[1:].strip().split(": ", 1) for line in text.split("\n") if line[:1] == "#")
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}.") from None
     except (ValueError, KeyError, TypeError, AttributeError):
@@ -135,15 +126,10 @@ def read_cases(file: str | Path) -> tuple[Cases, dict[str, str]]:
 
 
 def _parsed(text: str) -> Cases:
-    rows = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False).rename(
-        columns={heading: name for name, heading in COLUMNS.items()}
-    )
-    for name in COLUMNS:
-        if name in _CURVES:
-            rows[name] = [np.array(curve.split(), float) for curve in rows[name]]
-        elif name not in _WORDS:
-            rows[name] = rows[name].replace("", "nan").astype(float)
-    return table_of(rows.to_dict("records"))
+    types = {COLUMNS[name]: kind for name, kind in _TYPES.items() if name not in _CURVES}
+    curves = {COLUMNS[name]: lambda numbers: np.array(numbers.split(), float) for name in _CURVES}
+    rows = pd.read_csv(io.StringIO(text), comment="#", dtype=types, converters=curves, float_precision="round_trip")
+    return table_of(rows.rename(columns={heading: name for name, heading in COLUMNS.items()})[list(COLUMNS)])
 
 
 def rounded(cases: Cases) -> Cases:
@@ -181,18 +167,18 @@ def known(model: CalibratedModel, cases: Cases) -> Cases:
     return cases[[row.yielding == "none" or (row.plane, row.yielding) in kinds for row in cases.itertuples()]]
 
 
-def split(cases: Cases, share: float = HELD_OUT) -> tuple[Cases, Cases]:
-    """Cases to fit and to choose a form with, and a ``share`` of each kind to judge the result by at the end.
+def split(cases: Cases) -> tuple[Cases, Cases]:
+    """Cases to fit and to choose a form with, and `HELD_OUT` of each kind to judge the result by at the end.
 
     Chosen by the numbers of the joint themselves: always the same ones, however the cases are ordered.
     """
     groups = cases.sort_values("digest").groupby(["plane", "yielding"])
-    held = [index for _, same in groups for index in same.index[: round(share * len(same))]]
+    held = [index for _, same in groups for index in same.index[: round(HELD_OUT * len(same))]]
     chosen = cases.index.isin(held)
     return cases[~chosen], cases[chosen]
 
 
-def fit_model(cases: Cases, form: Form = FORM, plenty: int = _PLENTY) -> CalibratedModel:
+def fit_model(cases: Cases, form: dict[str, Any] = FORM, plenty: int = _PLENTY) -> CalibratedModel:
     """Least squares of ln k of the elastic cases, then of ln k and ln c of each kind that yields.
 
     Coefficients have six digits. A kind with less than ``plenty`` cases per coefficient is left out. Raises
@@ -220,18 +206,16 @@ def fit_model(cases: Cases, form: Form = FORM, plenty: int = _PLENTY) -> Calibra
 def _plastic(cases: Cases, kind: Kind, model: CalibratedModel, plenty: int) -> dict[str, Any]:
     late, threshold = model.data["form"]["late"], model.data["form"][kind[0]]
     yielded, what = cases[cases.clear_c.notna()], f"cases in plane {kind[0]} of which {kind[1]} yields"
-    _suffice(cases, plenty * (len(late) + bool(late)), what)
+    _suffice(cases, plenty * (len(late) + 1), what)
     _suffice(yielded, plenty * len(threshold), what)
-    rate, rest = 0.0, []
-    if late:
-        points = Points.of(cases)
-        k, terms = model.elastic_k(points), points.terms(late)
-        ratio, onset = np.log(cases.k.to_numpy() / k), points.s / k
-        starts = [np.array([b, *np.linalg.lstsq(np.exp(-b * onset)[:, None] * terms, ratio, rcond=None)[0]])
-                  for b in (2.0, 4.0)]  # fmt: skip
-        rate, *rest = _solve(lambda v: np.exp(-v[0] * onset) * (terms @ v[1:]) - ratio, *starts)
-    terms, c = Points.of(yielded).terms(threshold), np.log(yielded.c.to_numpy())
-    found = _solve(lambda v: terms @ v - c, np.linalg.lstsq(terms, c, rcond=None)[0])
+    points = Points.of(cases)
+    k, terms = model.elastic_k(points), points.terms(late)
+    ratio, onset = np.log(cases.k.to_numpy() / k), points.s / k
+    starts = [np.array([b, *np.linalg.lstsq(np.exp(-b * onset)[:, None] * terms, ratio, rcond=None)[0]])
+              for b in (2.0, 4.0)]  # fmt: skip
+    rate, *rest = _solve(lambda v: np.exp(-v[0] * onset) * (terms @ v[1:]) - ratio, *starts)
+    powers, c = Points.of(yielded).terms(threshold), np.log(yielded.c.to_numpy())
+    found = _solve(lambda v: powers @ v - c, np.linalg.lstsq(powers, c, rcond=None)[0])
     return {"plane": kind[0], "yielding": kind[1], "rate": rate, "late": rest, "threshold": found,
             "cases": len(cases), "cases_of_c": len(yielded)}  # fmt: skip
 
@@ -300,11 +284,6 @@ def errors(cases: Cases, k: Array, c: Array) -> pd.DataFrame:
     return pd.concat([*own, steps.assign(what=late, off=np.concatenate(forces), load=load)], ignore_index=True)
 
 
-def own_errors(cases: Cases) -> pd.DataFrame:
-    """With each joint's own k and c: what the shape of the law misses."""
-    return errors(cases, cases.k.to_numpy(), cases.c.to_numpy())
-
-
 def summary(found: pd.DataFrame) -> dict[str, Any]:
     """Of `errors`: number of cases; rms and largest size of each error, the case that has it, and for P where."""
     said: dict[str, Any] = {"cases": int((found.what == "k").sum())}
@@ -319,10 +298,10 @@ def summary(found: pd.DataFrame) -> dict[str, Any]:
     return said
 
 
-def cross_validate(cases: Cases, form: Form = FORM, folds: int = FOLDS) -> pd.DataFrame:
+def cross_validate(cases: Cases, form: dict[str, Any] = FORM, folds: int = FOLDS) -> pd.DataFrame:
     """`errors` of every case, predicted by a model fitted to the other folds only (Stone 1974); each kind is in all
-    folds. Raises `TooFewError`."""
-    cases = known(fit_model(cases, form), cases).sort_values(["plane", "yielding", "digest"])
+    folds, and must have been fitted. Raises `TooFewError`."""
+    cases = cases.sort_values(["plane", "yielding", "digest"])
     fold = np.arange(len(cases)) % folds
     k, c = np.empty(len(cases)), np.empty(len(cases))
     for f in set(fold.tolist()):
@@ -331,53 +310,35 @@ def cross_validate(cases: Cases, form: Form = FORM, folds: int = FOLDS) -> pd.Da
     return errors(cases, k, c)
 
 
-@dataclass(frozen=True)
-class Study:
-    """A ``model`` fitted to the cases ``used``, those ``held`` out, and the errors as rows of tables: by kind, each
-    case predicted by the others or held out of all, and of ``simpler`` forms, each case predicted by the others."""
+def study(cases: Cases, form: dict[str, Any] = FORM, provenance: dict[str, Any] | None = None) -> CalibratedModel:
+    """The model of ``cases`` with its errors on those of them that it has not seen, and ``provenance``.
 
-    model: CalibratedModel
-    used: Cases
-    held: Cases
-    rows: list[Row]
-    simpler: list[Row]
-
-
-def study(cases: Cases, share: float = HELD_OUT, form: Form = FORM, provenance: dict[str, Any] | None = None) -> Study:
-    """Hold a ``share`` of ``cases`` out, fit the model to the others, cross-validate it on them, and judge it by those
-    held out; the model carries its errors and ``provenance``. Raises `TooFewError`."""
-    used, held = split(cases, share)
+    `HELD_OUT` of the cases are kept out of everything ("held out"), the others predicted by each other
+    ("cross-validated"). Raises `TooFewError`.
+    """
+    used, held = split(cases)
     model = fit_model(used, form)
     used, held = known(model, used), known(model, held)
-    validated = cross_validate(used, form)
-    rows = _rows("cross-validated", validated, used)
+    said = {"cross-validated": by_kind(cross_validate(used, form), used)}
     if len(held):
-        rows += _rows("held out", errors(held, *predictions(model, held)), held)
-    said: dict[str, dict[str, Any]] = {}
-    for what, plane, yielding, found in rows:
-        said.setdefault(what, {})[f"{plane} {yielding}"] = found
-    paper = errors(used, np.full(len(used), 0.85), np.where(np.isfinite(used.s), 1.0, np.inf))
-    compared = {"k = 0.85, c = 1": paper}
-    compared |= {simpler["name"]: cross_validate(used, simpler) for simpler in SIMPLER}
-    compared |= {form["name"]: validated, "own k and c": own_errors(used)}
+        said["held out"] = by_kind(errors(held, *predictions(model, held)), held)
     notes = {**(provenance or {}), "fitted": len(used), "held out": len(held)}
-    model = CalibratedModel(model.data | {"errors": said, "provenance": notes})
-    return Study(model, used, held, rows, [(name, "both", "all", summary(off)) for name, off in compared.items()])
+    return CalibratedModel(model.data | {"errors": said, "provenance": notes})
 
 
-def shipped_rows(cases: Cases) -> list[Row]:
-    """Errors of the law that comes with archord on ``cases``, by kind, of those that are inside its range."""
+def by_kind(found: pd.DataFrame, cases: Cases) -> Errors:
+    """Summaries of the errors ``found`` of ``cases`` by kind, and of all; "P own" is that with each joint's own k and
+    c: what the shape of the law misses."""
+    own = errors(cases, cases.k.to_numpy(), cases.c.to_numpy())
+    kinds = {" ".join(kind): (of_kind(found, kind), of_kind(own, kind)) for kind in KINDS}
+    kinds = {name: parts for name, parts in kinds.items() if len(parts[0])} | {"both all": (found, own)}
+    return {name: summary(part) | {"P own": summary(same).get("P", {})} for name, (part, same) in kinds.items()}
+
+
+def shipped_errors(cases: Cases) -> Errors:
+    """`by_kind` of the law that comes with archord, of those of ``cases`` that are inside its range."""
     found = [joint_calibrated(joint_of_case(case, 1.0, 1.0)) for case in cases.itertuples()]
     inside = [law for law in found if not law.outside]
     chosen = cases[[not law.outside for law in found]]
     k, c = (np.array([getattr(law, name) for law in inside]) for name in "kc")
-    return _rows("archord's law", errors(chosen, k, c), chosen) if inside else []
-
-
-def _rows(what: str, found: pd.DataFrame, cases: Cases) -> list[Row]:
-    """Summaries by kind, and of all, with what the shape of the law misses beside it."""
-    own, rows = own_errors(cases), list[Row]()
-    for kind in KINDS:
-        if len(part := of_kind(found, kind)):
-            rows.append((what, *kind, summary(part) | {"P own": summary(of_kind(own, kind)).get("P", {})}))
-    return [*rows, (what, "both", "all", summary(found) | {"P own": summary(own).get("P", {})})]
+    return by_kind(errors(chosen, k, c), chosen) if inside else {}

@@ -98,7 +98,6 @@ def test_held_k_is_told_everywhere(runs, tmp_path, capsys):
         (["{elastic}", "--json", "{empty}/no/x"], "{empty}/no/x: cannot be written: {empty}/no is not a folder."),
         (["{elastic}", "--python", "{empty}"], "{empty}: cannot be written: it is a folder"),
         (["{elastic}", "--json", "{empty}/x.json", "--picture", "{empty}/x.xyz"], "{empty}/x.xyz: must end in one of "),
-        (["{elastic}", "--held-out", "0.2"], "{elastic}: --csv, --law and --held-out are for a sweep, and this is"),
         (["{apart}"], "{apart}: the bodies never touch in this run, so there is no law to fit to it."),
         (["{coarse}", "{apart}"], "{apart}: the bodies never touch in this run, so there is no law to fit to it."),
         (["{level}"], "{level}: the bodies never touch in this run, so there is no law to fit to it."),

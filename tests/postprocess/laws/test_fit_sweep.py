@@ -73,8 +73,8 @@ def test_small_blocks_are_named(solved, tmp_path, capsys):
     (tmp_path / "blocks.sweep.toml").write_text(listed + text.partition("[base]")[2])
     assert run(["sweep", str(tmp_path / "blocks.sweep.toml"), "-o", str(tmp_path / "out"), "-q"]) == 0
     assert run(["fit", str(tmp_path / "out")]) == 0
-    said = "block_size from 5 R on, P about 5.6% smaller there"
-    assert f"small blocks: {said}; k is smaller in them" in capsys.readouterr().out
+    said = "small blocks: P up to about 5.6% smaller than in a wide block, and k, which a model does not know"
+    assert said in capsys.readouterr().out
     small, wide = read_cases(tmp_path / "out" / "fit.csv")[0].k
     assert small < 0.96 * wide
     assert run(["fit", str(tmp_path / "out" / "fit.csv")]) == 0
@@ -133,7 +133,6 @@ def test_stored_rows_give_the_law_that_is_shipped(tmp_path, capsys):
     np.testing.assert_allclose(model["elastic"], shipped["elastic"], rtol=1e-4)
     assert model["provenance"] == shipped["provenance"]
     assert copy.read_text() == ROWS.read_text()
-    assert f"{abs(model['elastic'][0]):g} p" in printed
     row = next(line for line in printed.splitlines() if line.startswith("| held out | both | all |"))
     assert f"{model['errors']['held out']['both all']['P']['rms']:.1%}" in row
     everything = json.loads(data.read_text())
@@ -149,8 +148,8 @@ def test_stored_rows_give_the_law_that_is_shipped(tmp_path, capsys):
     [
         (["{out}", "{out}"], "a sweep is fitted alone"),
         (["{out}", "--hold-k", "0.8"], "--hold-k, --residuals and --python are for runs"),
-        (["{out}", "--held-out", "0.9"], "--held-out 0.9: must be a share from 0 to 0.5"),
-        (["{run}", "--csv", "x.csv"], "--csv, --law and --held-out are for a sweep"),
+        (["{out}", "--picture", "x.png"], "x.png: no law to draw: 2 elastic cases are too few"),
+        (["{run}", "--csv", "x.csv"], "--csv and --law are for a sweep"),
         (["nothing.csv"], "nothing.csv: cannot be read"),
         (["{out}", "--csv", "no/where.csv"], "no is not a folder"),
     ],
