@@ -7,7 +7,7 @@ import pytest
 
 from archord.materials.elasticity import Elastic, contact_modulus, mean_stress, von_mises
 
-E, NU = 210e3, 0.3
+E, NU = 200e3, 0.3
 
 
 @pytest.fixture
@@ -19,6 +19,14 @@ def hooke(stress):
     """Strains [xx, yy, zz, gamma_xy] from Hooke's law in three dimensions."""
     xx, yy, zz, xy = stress.T
     return np.stack([xx - NU * (yy + zz), yy - NU * (xx + zz), zz - NU * (xx + yy), 2 * (1 + NU) * xy], axis=1) / E
+
+
+def turned(xx, yy, xy):
+    """Components of a tensor in the plane along axes at 0.7 rad."""
+    c, s = np.cos(0.7), np.sin(0.7)
+    Q, t = np.array([[c, s], [-s, c]]), np.array([[xx, xy], [xy, yy]])
+    t = np.einsum("ik,kl...,jl->ij...", Q, t, Q)
+    return t[0, 0], t[1, 1], t[0, 1]
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
@@ -39,13 +47,6 @@ def test_tangent_is_symmetric_and_positive(plane):
     assert np.linalg.eigvalsh(C)[0] > 0
 
 
-def test_lame_constants_give_back_youngs_modulus():
-    """E = mu (3 lambda + 2 mu) / (lambda + mu), nu = lambda / (2 (lambda + mu))."""
-    lam, mu = Elastic(E, NU, "strain").lame
-    assert mu * (3 * lam + 2 * mu) / (lam + mu) == pytest.approx(E, rel=1e-14)
-    assert lam / (2 * (lam + mu)) == pytest.approx(NU, rel=1e-14)
-
-
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_contact_modulus_is_that_of_a_uniaxial_stress_in_the_plane(plane):
     """E / (1 - nu^2) or E: the stiffness of a strip that may contract within the plane."""
@@ -64,16 +65,7 @@ def test_von_mises_of_uniaxial_shear_and_hydrostatic_stress():
 def test_invariants_do_not_change_with_the_axes(rng):
     """Von Mises and mean stress of a rotated stress are the same."""
     stress = rng.normal(size=(100, 4))
-    c, s = np.cos(0.7), np.sin(0.7)
-    xx, yy, zz, xy = stress.T
-    rotated = np.stack(
-        [
-            c * c * xx + s * s * yy + 2 * c * s * xy,
-            s * s * xx + c * c * yy - 2 * c * s * xy,
-            zz,
-            (c * c - s * s) * xy - c * s * (xx - yy),
-        ],
-        axis=1,
-    )
+    xx, yy, xy = turned(*stress[:, [0, 1, 3]].T)
+    rotated = np.stack([xx, yy, stress[:, 2], xy], axis=1)
     np.testing.assert_allclose(von_mises(rotated), von_mises(stress), rtol=1e-13)
     np.testing.assert_allclose(mean_stress(rotated), mean_stress(stress), rtol=0, atol=1e-14)
