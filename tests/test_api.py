@@ -69,17 +69,10 @@ def test_faults_are_the_sentences_of_scene_files(change, said):
     assert "\n" not in str(caught.value)
 
 
-def test_a_folder_without_results_is_a_sentence(tmp_path):
-    """None there, or nothing in it."""
-    with pytest.raises(archord.InputError, match=r"x: is not a folder; give the folder of a run or of a sweep\."):
-        archord.load(tmp_path / "x")
-    with pytest.raises(archord.InputError, match=r"is not a run folder: scene\.toml is missing\."):
-        archord.load(tmp_path)
-
-
 @pytest.mark.mpi
 def test_solve_gives_the_run_on_every_rank(tmp_path, comm):
-    """The same object as load gives; an occupied folder is refused on all ranks."""
+    """The same object as load gives; an occupied folder is refused on all ranks, and so is one without results. On one
+    rank temporary results go with the run."""
     folder = comm.bcast(tmp_path / "run")
     run = archord.solve(archord.load_scene(SCENE, COARSE), folder)
     assert (run.status, run.steps) == ("done", 2)
@@ -87,12 +80,11 @@ def test_solve_gives_the_run_on_every_rank(tmp_path, comm):
     assert run.fields().delta == pytest.approx(2 * 0.005, rel=1e-12)
     with pytest.raises(archord.InputError, match=r"is not empty; choose another folder, or overwrite .* force=True\."):
         archord.solve(SCENE, folder)
+    with pytest.raises(archord.InputError, match=r"x: is not a folder; give the folder of a run or of a sweep\."):
+        archord.load(folder / "x")
+    with pytest.raises(archord.InputError, match=r"is not a run folder: scene\.toml is missing\."):
+        archord.load(folder.parent)
     comm.barrier()
-
-
-@pytest.mark.mpi
-def test_temporary_results_are_there_as_long_as_they_are_needed(comm):
-    """On one rank they go with the run."""
     run = archord.solve(archord.Scene(**SECTIONS))
     folder = run.folder
     assert run.pressure()["pressure"].max() > 0

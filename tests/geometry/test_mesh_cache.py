@@ -31,9 +31,12 @@ def content(model: TaggedMesh) -> list[np.ndarray]:
 @pytest.mark.parametrize(("make", "sizes"), [(quarter_joint, QUARTER), (half_ring, RING)])
 @pytest.mark.parametrize("degree", [2, 3])
 def test_a_kept_mesh_is_the_one_made_anew(comm, meshes, make, sizes, degree):
-    """Every array of it, twice over, as dolfinx may have worked in what it was given; on rank 0 gmsh ran once."""
+    """Every array of it, twice over, as dolfinx may have worked in what it was given; on rank 0 gmsh ran once. Nothing
+    is kept unless asked."""
+    assert mesh_cache.MESHES.capacity == meshes.made == 0
     meshes.capacity = 0
     anew = content(make(comm, **sizes, degree=degree))
+    assert (meshes.made, meshes.reused) == (0, 0)
     meshes.capacity = 2
     for _ in range(3):
         for a, b in zip(anew, content(make(comm, **sizes, degree=degree)), strict=True):
@@ -71,11 +74,3 @@ def test_the_mesh_not_used_for_longest_is_forgotten(comm, meshes):
         quarter_joint(comm, **sizes[number])
         made.append(meshes.made > before)
     assert made == [True, True, False, True, False, True]
-
-
-def test_nothing_is_kept_unless_asked(comm):
-    before = mesh_cache.MESHES.made, mesh_cache.MESHES.reused
-    for _ in range(2):
-        quarter_joint(comm, **QUARTER)
-    assert (mesh_cache.MESHES.made, mesh_cache.MESHES.reused) == before
-    assert mesh_cache.MESHES.capacity == 0

@@ -73,20 +73,16 @@ def test_csv_reads_back_the_tables(runs, tmp_path):
     np.testing.assert_allclose(corners.mean(axis=1), cells[["x [mm]", "y [mm]"]], atol=1e-9)
 
 
-def test_a_step_alone(runs, tmp_path, capsys):
-    """Two files and the collection, which are printed."""
-    assert command(["export", str(runs["elastic"]), "--vtk", str(tmp_path / "new" / "vtk"), "--step", "4"]) == 0
-    names = {file.name for file in (tmp_path / "new" / "vtk").iterdir()}
-    assert names == {"run.pvd", "bodies_0004.vtu", "contact_0004.vtu"}
+def test_a_step_alone_and_nothing_overwritten_without_force(runs, tmp_path, capsys, refused):
+    """Two files and the collection, which are printed; the first of the files in the way is named, and none changed."""
+    folder = tmp_path / "new" / "vtk"
+    arguments = ["export", str(runs["coarse"]), "--vtk", str(folder), "--step", "4"]
+    assert command(arguments) == 0
     assert "2 .vtu files beside it, bodies_0004.vtu to contact_0004.vtu" in capsys.readouterr().out
-
-
-def test_nothing_is_overwritten_without_force(runs, tmp_path, refused):
-    """The first of the files in the way is named, and none is changed; --force replaces them."""
-    (tmp_path / "run.pvd").write_text("mine")
-    arguments = ["export", str(runs["coarse"]), "--vtk", str(tmp_path)]
-    said = f"{tmp_path}/run.pvd: is there already; choose another folder, or overwrite with --force.\n"
+    assert {file.name for file in folder.iterdir()} == {"run.pvd", "bodies_0004.vtu", "contact_0004.vtu"}
+    (folder / "run.pvd").write_text("mine")
+    said = f"{folder}/run.pvd: is there already (and 2 more); choose another folder, or overwrite with --force.\n"
     assert refused(arguments) == said
-    assert [file.read_text() for file in tmp_path.iterdir()] == ["mine"]
-    assert command([*arguments, "--force"]) == 0
-    assert len(list(tmp_path.iterdir())) == 1 + 2 * 6
+    assert (folder / "run.pvd").read_text() == "mine"
+    assert command([*arguments[:-2], "--force"]) == 0
+    assert len(list(folder.iterdir())) == 1 + 2 * 6
