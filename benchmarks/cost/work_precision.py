@@ -25,21 +25,14 @@ _SCATTER = 1e-4
 
 @dataclass(frozen=True)
 class Line:
-    """A task, timed, and its relative errors by quantity, against the reference of its kinematics."""
+    """A task, timed, what it found (None if it failed), and its relative errors by quantity, against the reference of
+    its kinematics."""
 
+    task: Task
     timing: Timing
+    values: Values | None
     errors: dict[str, float]
     reference: Reference
-
-    @property
-    def task(self) -> Task:
-        """What was run."""
-        return cast(Task, self.timing.process)
-
-    @property
-    def values(self) -> Values | None:
-        """What it found; None if it failed."""
-        return self.timing.runs[-1].result if self.timing.done else None
 
     @property
     def force(self) -> float | None:
@@ -49,53 +42,46 @@ class Line:
 
 def judge(timing: Timing) -> Line:
     """The errors of what a task found; none if it failed."""
-    line = Line(timing, {}, read_reference(cast(Task, timing.process).case, "current"))
-    values = line.values
-    if values is None:
-        return line
-    reference = read_reference(line.task.case, values.kinematics)
-    exact = reference.values
-    known = {name: abs(value / exact[name] - 1) for name, value in values.quantities.items() if exact.get(name)}
-    if values.profile is not None and values.side in reference.profile:
-        known["profile"] = profile_error(values.profile, reference.profile[values.side])
-    return Line(timing, known, reference)
+    task, errors = cast(Task, timing.process), {}
+    values: Values | None = timing.runs[-1].result if timing.done else None
+    reference = read_reference(task.case, values.kinematics if values else "current")
+    if values:
+        exact = reference.values
+        errors = {name: abs(value / exact[name] - 1) for name, value in values.quantities.items() if exact.get(name)}
+        if values.profile is not None and values.side in reference.profile:
+            errors["profile"] = profile_error(values.profile, reference.profile[values.side])
+    return Line(task, timing, values, errors, reference)
 
 
-def series_of(lines: Sequence[Line], case: str) -> dict[tuple[str, str], list[Line]]:
-    """The lines of ``case`` by code and series, each from coarse to fine, as given."""
+def series_of(lines: Sequence[Line]) -> dict[tuple[str, str], list[Line]]:
+    """The lines of one case by code and series, each from coarse to fine, as given."""
     found: dict[tuple[str, str], list[Line]] = {}
     for line in lines:
-        if line.task.case == case:
-            found.setdefault((line.task.code, line.task.series), []).append(line)
+        found.setdefault((line.task.code, line.task.series), []).append(line)
     return found
 
 
-def own_limit(lines: Sequence[Line], case: str) -> dict[str, Limit]:
-    """Per series of CalculiX, its P extrapolated from the four finest meshes, or from three if no more were solved;
-    absent where one of them moves it by more than 1e-4.
+def own_limit(code: str, members: Sequence[Line]) -> Limit | None:
+    """For a series of CalculiX, its P extrapolated from the four finest meshes, or from three if no more were solved;
+    None for others, and where one of the meshes moves it by more than 1e-4.
 
     CalculiX's contact is a penalty: its P converges to a value that is a little smaller than that of exact contact.
     """
-    found = {}
-    for (code, series), members in series_of(lines, case).items():
-        pairs = [(line.task.size, line.force) for line in members if line.force is not None]
-        if code == CALCULIX and len({size for size, _ in pairs}) >= 3:
-            limit = extrapolated(*zip(*sorted(pairs)[:4], strict=True))
-            if limit.error < _SCATTER * abs(limit.value):
-                found[series] = limit
-    return found
+    pairs = [(line.task.size, line.force) for line in members if line.force is not None]
+    if code != CALCULIX or len({size for size, _ in pairs}) < 3:
+        return None
+    limit = extrapolated(*zip(*sorted(pairs)[:4], strict=True))
+    return limit if limit.error < _SCATTER * abs(limit.value) else None
 
 
-def envelopes(lines: Sequence[Line], case: str) -> dict[str, Pairs]:
-    """Per code the best of all its series: pairs (seconds, error of P), where an error counts from the mesh on from
-    which its series stays below it. "CalculiX, own limit" is CalculiX against its own extrapolated P."""
+def envelopes(lines: Sequence[Line]) -> dict[str, Pairs]:
+    """Per code the best of all its series in one case: pairs (seconds, error of P), where an error counts from the mesh
+    on from which its series stays below it. "CalculiX, own limit" is CalculiX against its own extrapolated P."""
     found: dict[str, Pairs] = {}
-    limits = own_limit(lines, case)
-    for (code, series), members in series_of(lines, case).items():
+    for (code, _), members in series_of(lines).items():
         judged = {code: [line.errors.get("P") for line in members]}
-        if code == CALCULIX and series in limits:
-            limit = limits[series].value
-            judged[f"{CALCULIX}, own limit"] = [m.force and abs(m.force / limit - 1) for m in members]
+        if limit := own_limit(code, members):
+            judged[f"{code}, own limit"] = [m.force and abs(m.force / limit.value - 1) for m in members]
         for name, errors in judged.items():
             lasted = zip(members, lasting(errors), strict=True)
             found.setdefault(name, []).extend((line.timing.median, e) for line, e in lasted if e is not None)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
-from itertools import cycle
 from pathlib import Path
 from statistics import median
 
@@ -24,7 +23,7 @@ NAMES = {"P": "P", "p0": "p0", "eps": "contact angle", "profile": "pressure prof
 _HEADINGS = ("code", "series", "mesh", "dofs", "steps", "iterations", "factorisations", "seconds", "from - to", "MB",
              "P/(E* R)")  # fmt: skip
 _MARKERS = "os^Dvphx*"
-_COLOURS = [f"tab:{name}" for name in ("red", "blue", "green", "purple", "brown", "olive", "cyan", "pink")]
+_COLOURS = ("red", "blue", "green", "purple", "brown", "olive", "cyan", "pink")
 _FLOOR = 1e-9  # an error of zero has no place on a logarithmic axis
 
 
@@ -82,7 +81,7 @@ def markdown(lines: Sequence[Line], warm: Mapping[str, Sequence[float]] | None =
     for case in CASES.values():
         if some := [line for line in lines if line.task.case == case.name]:
             parts += [f"**{case.title}**\n", _table(case, some), *_notes(case, some)]
-            parts += ratio_table(envelopes(some, case.name))
+            parts += ratio_table(envelopes(some))
     if warm:
         rows = [
             (name, f"{median(seconds):.3g}", f"{min(seconds):.3g} - {max(seconds):.3g}", len(seconds))
@@ -128,11 +127,12 @@ def _notes(case: JointCase, lines: Sequence[Line]) -> list[str]:
             if name in r.errors
         )
         out.append(f"Errors of codes with `{kinematics}` kinematics are against {values}.\n")
-    for series, limit in own_limit(lines, case.name).items():
-        out.append(
-            f"{CALCULIX}'s {series} extrapolates to P = {limit.value:.8f} by itself, with order {limit.order:.1f} "
-            f"(moves by {limit.error:.0e} if a mesh is left out); its penalty is part of that.\n"
-        )
+    for (code, series), members in series_of(lines).items():
+        if limit := own_limit(code, members):
+            out.append(
+                f"{code}'s {series} extrapolates to P = {limit.value:.8f} by itself, with order {limit.order:.1f} "
+                f"(moves by {limit.error:.0e} if a mesh is left out); its penalty is part of that.\n"
+            )
     return out
 
 
@@ -179,10 +179,10 @@ def draw(case: JointCase, lines: Sequence[Line], path: Path) -> None:
     top, bottom = figure.subfigures(2, 1, height_ratios=(1.15, 1.6))
     above = top.subplots(1, 2)
     below = bottom.subplots(2, len(others), sharey="col", squeeze=False)
-    styles = _styles(lines, case.name)
+    styles = _styles(lines)
     for k, against in enumerate(("seconds", "dofs")):
         for ax, name in ((above[k], "P"), *zip(below[k], others, strict=True)):
-            _panel(ax, lines, case, name, against, styles)
+            _panel(ax, lines, name, against, styles)
     handles, labels = above[0].get_legend_handles_labels()
     top.legend(handles, labels, loc="outside upper center", ncols=4, fontsize=8, frameon=False, title=case.title)
     save(figure, path, dots=80)
@@ -190,24 +190,21 @@ def draw(case: JointCase, lines: Sequence[Line], path: Path) -> None:
     Image.open(path).convert("RGB").quantize(64).save(path, optimize=True)
 
 
-def _styles(lines: Sequence[Line], case: str) -> dict[tuple[str, str], dict]:
+def _styles(lines: Sequence[Line]) -> dict[tuple[str, str], dict]:
     """A colour for each code, a marker for each of its series."""
-    series = series_of(lines, case)
-    codes = dict.fromkeys((OURS, CALCULIX, *(code for code, _ in series)))
-    colours = dict(zip(codes, cycle(_COLOURS), strict=False))
-    count = {code: [name for known, name in series if known == code] for code in codes}
-    styles = {}
-    for code, name in series:
-        k = count[code].index(name)
-        styles[code, name] = {
-            "color": colours[code], "marker": _MARKERS[k % len(_MARKERS)], "markersize": 5, "linewidth": 1.1,
-            "linestyle": ("-", "--", ":", "-.")[k % 4], "label": f"{code}, {name}",
+    styles: dict[tuple[str, str], dict] = {}
+    codes = list(dict.fromkeys((OURS, CALCULIX, *(line.task.code for line in lines))))
+    for code, series in series_of(lines):
+        k = sum(known == code for known, _ in styles)
+        styles[code, series] = {
+            "color": f"tab:{_COLOURS[codes.index(code) % len(_COLOURS)]}", "marker": _MARKERS[k % len(_MARKERS)],
+            "markersize": 5, "linewidth": 1.1, "linestyle": ("-", "--", ":", "-.")[k % 4], "label": f"{code}, {series}",
         }  # fmt: skip
     return styles
 
 
-def _panel(ax, lines: Sequence[Line], case: JointCase, quantity: str, against: str, styles: dict) -> None:
-    for key, members in series_of(lines, case.name).items():
+def _panel(ax, lines: Sequence[Line], quantity: str, against: str, styles: dict) -> None:
+    for key, members in series_of(lines).items():
         known = [line for line in members if line.values and quantity in line.errors]
         if known or quantity == "P":
             x = [line.timing.median if against == "seconds" else line.values.dofs for line in known if line.values]
