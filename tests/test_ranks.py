@@ -27,7 +27,6 @@ def test_two_ranks_say_and_write_what_one_does(runs, tmp_path, arguments, writte
         file = tmp_path / f"{n}" / (written or "none")
         file.parent.mkdir(exist_ok=True)
         result = archord(*(a.replace("FILE", str(file)).format(**runs) for a in arguments), cwd=tmp_path, ranks=n)
-        assert result.returncode == 0, result.stderr
         said = result.stdout.replace("\r\n", "\n").replace(str(file), "FILE")
         found.append((said, result.stderr, file.read_bytes() if written else None))
     assert found[0] == found[1]

@@ -66,6 +66,7 @@ def test_bad_input_is_one_sentence(runs, tmp_path, monkeypatch, refused, argumen
     ("ranks", "arguments", "said"),
     [
         (0, ["solve", "bad.toml"], "bad.toml: joint.radius = -10.0 must be greater than 0."),
+        (0, ["slove", "--help"], "No such command 'slove'."),
         (2, ["solve", "bad.toml"], "bad.toml: joint.radius = -10.0 must be greater than 0."),
         (2, ["solve", "--bogus", "nowhere.toml"], "No such option: --bogus"),
         (2, ["scene", "--bogus"], "No such option: --bogus"),
@@ -79,10 +80,8 @@ def test_a_process_tells_bad_input_once(tmp_path, ranks, arguments, said):
     scene = Path(SCENE).read_text()
     (tmp_path / "bad.toml").write_text(scene.replace("radius = 10.0", "radius = -10.0"))
     (tmp_path / "bad.sweep.toml").write_text(f'base = "{SCENE}"\n[grid]\npin.E = [-1.0]\n')
-    result = archord(*arguments, cwd=tmp_path, ranks=ranks)
-    assert result.returncode == 2
+    result = archord(*arguments, cwd=tmp_path, ranks=ranks, code=2)
     assert result.stderr.count(said) == 1
-    assert "Traceback" not in result.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"bad.toml", "bad.sweep.toml"}
 
 

@@ -38,8 +38,7 @@ def killed(folder, after: int, ranks: int = 0) -> int:
 def whole(tmp_path_factory):
     """The run that nobody disturbed."""
     folder = tmp_path_factory.mktemp("whole")
-    result = archord("solve", SCENE, *COARSE, "-o", "run", cwd=folder)
-    assert result.returncode == 0, result.stderr
+    archord("solve", SCENE, *COARSE, "-o", "run", cwd=folder)
     return folder / "run"
 
 
@@ -48,20 +47,18 @@ def test_a_killed_run_goes_on_and_says_where(tmp_path, whole):
     steps = killed(tmp_path, 3)
     assert 3 <= steps < 12
     result = archord("solve", "run", "--restart", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
     lines = result.stdout.splitlines()
     assert lines[0] == f"continuing run after step {steps} of 12."
     assert [line.split()[0] for line in lines[3:-1]] == [str(k) for k in range(steps + 1, 13)]
     same_run(whole, tmp_path / "run", 1e-12)
     again = archord("solve", SCENE, *COARSE, "-o", "run", "--restart", cwd=tmp_path)
-    assert (again.returncode, again.stdout) == (0, "the run in run is finished: nothing to do.\n")
+    assert again.stdout == ("the run in run is finished: nothing to do.\n")
 
 
 def test_two_ranks_are_continued_by_three(tmp_path, whole):
     """Killed on two ranks, finished on three, compared with one."""
     steps = killed(tmp_path, 2, ranks=2)
     result = archord("solve", SCENE, *COARSE, "-o", "run", "--restart", cwd=tmp_path, ranks=3)
-    assert result.returncode == 0, result.stderr
     assert result.stdout.count(f"continuing run after step {steps} of 12.") == 1
     same_run(whole, tmp_path / "run", 1e-8, 3e-7)
     report = json.loads((tmp_path / "run" / "run.json").read_text())
@@ -91,10 +88,7 @@ def untouched(tmp_path, whole):
 @pytest.mark.parametrize(("arguments", "said"), REFUSED)
 def test_what_cannot_be_continued_is_refused(untouched, arguments, said):
     """Exit code 2, one sentence, nothing changed."""
-    result = archord("solve", *arguments, cwd=untouched)
-    assert result.returncode == 2
-    assert result.stderr.count(said) == 1
-    assert "Traceback" not in result.stderr
+    assert archord("solve", *arguments, cwd=untouched, code=2).stderr.count(said) == 1
 
 
 def test_two_ranks_refuse_once(untouched):
@@ -114,15 +108,14 @@ def test_two_ranks_refuse_once(untouched):
 def test_a_finished_run_is_extended(tmp_path):
     """Two steps become four; the resolved scene is the whole path."""
     short = ["--set", "joint.relative_element_size=0.25", "--set", "load.displacement=1", "--set", "load.steps=2"]
-    assert archord("solve", SCENE, *short, "-o", "run", "-q", cwd=tmp_path).returncode == 0
+    archord("solve", SCENE, *short, "-o", "run", "-q", cwd=tmp_path)
     longer = ["--set", "load.displacement=2", "--set", "load.steps=4"]
     result = archord("solve", "run", "--extend", *longer, cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
     assert result.stdout.splitlines()[0] == "extending run from step 2 to step 4."
     load = tomllib.loads((tmp_path / "run" / "scene.toml").read_text())["load"]
     assert (load["displacement"], load["steps"]) == ([1.0, 2.0], [2, 2])
     assert read_history(tmp_path / "run" / "history.csv")["delta/dR"] == pytest.approx([0.5, 1.0, 1.5, 2.0])
-    assert archord("solve", "run/scene.toml", "-o", "again", "-q", cwd=tmp_path).returncode == 0
+    archord("solve", "run/scene.toml", "-o", "again", "-q", cwd=tmp_path)
     same_run(tmp_path / "again", tmp_path / "run", 1e-12)
 
 
@@ -146,6 +139,5 @@ def test_a_full_disk_is_one_sentence_and_the_run_can_go_on(tmp_path, whole, rank
     assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "stopped"
     assert accepted_steps(tmp_path / "run") == 0
     again = archord("solve", "run", "--restart", cwd=tmp_path)
-    assert again.returncode == 0, again.stderr
     assert again.stdout.splitlines()[0] == "run holds no accepted step: starting from the beginning."
     same_run(whole, tmp_path / "run", 1e-12)
