@@ -117,26 +117,23 @@ def _curve(scene: Scene, outcome: Outcome) -> list[float]:
     return [m.delta if scene.force_controlled else m.P for m in outcome.steps]
 
 
-def row(line: Line) -> dict[str, object]:
-    """The entries of a line by heading."""
-    a = line.accuracy
-    return {
-        "joint": line.case.name,
-        "asked": f"{a.asked:g}",
-        "estimated": f"{a.estimated or nan:.1e}",
-        "true": f"{line.true_error:.1e}",
-        "of the mesh": f"{a.mesh_error or nan:.1e}",
-        "of the steps": f"{a.step_error:.1e}" if a.step_error else "",
-        "meshes": a.levels[-1].mesh,
-        "element size / R": f"{a.levels[-1].element_size:.3g}",
-        "substeps": a.substeps,
-        "dofs": a.levels[-1].dofs,
-        "seconds": f"{a.seconds:.1f}",
-    }
-
-
 def write(lines: Sequence[Line], folder: Path) -> tuple[str, list[Path]]:
     """Write accuracy.csv and accuracy.md into ``folder``; returns the table and the files."""
-    rows = [row(line) for line in lines]
+    rows = [
+        {
+            "joint": line.case.name,
+            "asked": f"{a.asked:g}",
+            "estimated": f"{a.estimated or nan:.1e}",
+            "true": f"{line.true_error:.1e}",
+            "of the mesh": f"{a.mesh_error or nan:.1e}",
+            "of the steps": f"{a.step_error:.1e}" if a.step_error else "",
+            "meshes": a.levels[-1].mesh,
+            "element size / R": f"{a.levels[-1].element_size:.3g}",
+            "substeps": a.substeps,
+            "dofs": a.levels[-1].dofs,
+            "seconds": f"{a.seconds:.1f}",
+        }
+        for line, a in ((line, line.accuracy) for line in lines)
+    ]
     text = Table.of(rows).markdown()
     return text, write_report(folder, "accuracy", rows, text)

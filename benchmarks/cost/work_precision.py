@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 
 from archord.benchmarks.case import Case
-from archord.benchmarks.cost.work_precision_cases import CASES, edged
+from archord.benchmarks.cost.work_precision_cases import CASES, meshes
 from archord.benchmarks.cost.work_precision_codes import CALCULIX, Task, Values
 from archord.benchmarks.cost.work_precision_reference import Reference, profile_error, read_reference
 from archord.benchmarks.timing import Timing
@@ -118,7 +118,10 @@ def seconds_at(error: float, kept: Pairs) -> float | None:
 
 def warm_curves() -> list[Case]:
     """Curves up to 2 dR, on the meshes that are good for 1e-4 (elastic) and 3e-4 (plastic) in P."""
-    elastic, plastic = edged("elastic", 0.16, growth=0.5, degree=3)[0], edged("plastic", 0.1, growth=0.3)[0]
+    elastic, plastic = (
+        meshes(0.16, growth=0.5, edge="elastic", degree=3)[0],
+        meshes(0.1, growth=0.3, edge="plastic")[0],
+    )
     return [
         Case("elastic, 8 steps", replace(CASES["elastic"], steps=8).scene(elastic)),
         Case("elasto-plastic, sigY/E* = 0.2 %, 20 steps", CASES["plastic"].scene(plastic)),

@@ -63,59 +63,48 @@ CASES = {
 }
 
 
-def meshes(*sizes: float, growth: float, **sections: Mapping[str, Any]) -> tuple[Mesh, ...]:
-    """A mesh for each element size on the arc (in R); ``sections`` are keys that all of them set."""
-    joint = sections.pop("joint", {})
-    return tuple({"joint": {"element_size": h, "growth": growth, **joint}, **sections} for h in sizes)
-
-
-def scaled(*sizes: float, ratio: float, most: float = 2.0, **sections: Mapping[str, Any]) -> tuple[Mesh, ...]:
-    """Meshes whose growth is ``ratio`` times the element size (in R), but no more than ``most``, so that they are
-    refined everywhere."""
-    return tuple(mesh for h in sizes for mesh in meshes(h, growth=min(most, round(ratio * h, 6)), **sections))
-
-
 # Where the contact ends at 2 dR; from a run on any mesh.
 EDGE = {"elastic": 1.17, "plastic": 1.395}
 
 
-def edged(case: str, *sizes: float, growth: float, degree: int = 2) -> tuple[Mesh, ...]:
-    """Meshes that are four times finer at the contact's edge."""
-    joint = {"edge_angle": EDGE[case]}
-    return meshes(*sizes, growth=growth, joint=joint, analysis={"degree": degree})
+def meshes(
+    *sizes: float, growth: float = 0.0, ratio: float = 0.0, most: float = 2.0, edge: str = "", degree: int = 2
+) -> tuple[Mesh, ...]:
+    """A mesh for each element size on the arc (in R), of one ``growth`` or, so that they are refined everywhere, of
+    ``ratio`` times the size, but no more than ``most``. Four times finer at the ``edge`` of the contact in that case.
+    """
+    fine = {"edge_angle": EDGE[edge]} if edge else {}
+    return tuple(
+        {
+            "joint": {"element_size": h, "growth": growth or min(most, round(ratio * h, 6)), **fine},
+            "analysis": {"degree": degree},
+        }
+        for h in sizes
+    )
 
 
+_DECK = {"ratio": 6.25, "most": 0.25}
 SERIES = (
-    Series("edge, growth 0.3", edged("plastic", 0.12, 0.1, 0.08, 0.06, 0.04, growth=0.3), ("plastic",)),
-    Series("edge, growth 0.12", edged("plastic", 0.12, 0.08, 0.06, growth=0.12), ("plastic",)),
-    Series("edge, growth 0.25", edged("elastic", 0.12, 0.08, 0.06, 0.04, growth=0.25), ("elastic",)),
-    Series("degree 3, edge, growth 0.5", edged("elastic", 0.16, 0.12, 0.08, growth=0.5, degree=3), ("elastic",)),
-    Series("degree 3, growth 0.35", meshes(0.08, 0.06, 0.04, growth=0.35, analysis={"degree": 3}), ("elastic",)),
-    Series("degree 3, growth = 5 h", scaled(0.04, 0.02, 0.01, ratio=5.0, analysis={"degree": 3}), ("elastic",)),
+    Series("edge, growth 0.3", meshes(0.12, 0.1, 0.08, 0.06, 0.04, growth=0.3, edge="plastic"), ("plastic",)),
+    Series("edge, growth 0.12", meshes(0.12, 0.08, 0.06, growth=0.12, edge="plastic"), ("plastic",)),
+    Series("edge, growth 0.25", meshes(0.12, 0.08, 0.06, 0.04, growth=0.25, edge="elastic"), ("elastic",)),
+    Series("degree 3, edge, growth 0.5", meshes(0.16, 0.12, 0.08, growth=0.5, edge="elastic", degree=3), ("elastic",)),
+    Series("degree 3, growth 0.35", meshes(0.08, 0.06, 0.04, growth=0.35, degree=3), ("elastic",)),
+    Series("degree 3, growth = 5 h", meshes(0.04, 0.02, 0.01, ratio=5.0, degree=3), ("elastic",)),
     Series("growth 0.25", meshes(0.16, 0.12, 0.08, 0.06, 0.04, growth=0.25), quick=True),
-    Series("growth = 6.25 h", scaled(0.06, 0.04, 0.03, 0.02, 0.014, ratio=6.25)),
+    Series("growth = 6.25 h", meshes(0.06, 0.04, 0.03, 0.02, 0.014, ratio=6.25)),
 )
-
-
-def _deck(name: str, elements: Elements, *sizes: float, **options: Any) -> Series:
-    return Series(name, scaled(*sizes, ratio=6.25, most=0.25), elements=elements, **options)
-
-
 # In 2 steps CalculiX is off by 2e-3 on some meshes, in 4 it is not.
 DECKS = (
-    _deck("CPE6", "quadratic", 0.08, 0.06, 0.04),
-    _deck("CPE6, 4 steps", "quadratic", 0.06, 0.04, 0.02, cases=("elastic",), elastic_steps=4),
-    _deck("CPE3", "linear", 0.06, 0.03),
-)
-
-_FAMILIES = (  # growth over element size, and element sizes, the finest of the elastic case alone
-    (6.25, (0.02, 0.014, 0.01, 0.007, 0.005)),
-    (12.5, (0.014, 0.01, 0.007, 0.005, 0.0035)),
+    Series("CPE6", meshes(0.08, 0.06, 0.04, **_DECK), elements="quadratic"),
+    Series("CPE6, 4 steps", meshes(0.06, 0.04, 0.02, **_DECK), ("elastic",), elements="quadratic", elastic_steps=4),
+    Series("CPE3", meshes(0.06, 0.03, **_DECK), elements="linear"),
 )
 
 
 def families(case: JointCase) -> list[Series]:
     """What the reference is extrapolated from: two families that are refined everywhere, near and far elements in
-    different shares."""
+    different shares; the finest mesh of either for the elastic case alone."""
     count = 4 if case.yield_stress else 5
-    return [Series(f"growth = {ratio:g} h", scaled(*sizes[:count], ratio=ratio)) for ratio, sizes in _FAMILIES]
+    sizes = {6.25: (0.02, 0.014, 0.01, 0.007, 0.005), 12.5: (0.014, 0.01, 0.007, 0.005, 0.0035)}
+    return [Series(f"growth = {ratio:g} h", meshes(*sizes[ratio][:count], ratio=ratio)) for ratio in sizes]

@@ -46,20 +46,15 @@ class Reference:
     profile: dict[str, Array]
 
 
-def _everything() -> dict[str, dict[str, Any]]:
+def stored() -> dict[str, dict[str, Any]]:
+    """All that the file says of the references, by case and kinematics: quantities, extrapolations, runs."""
     return json.loads(FILE.read_text(encoding="utf-8"))["cases"] if FILE.exists() else {}
-
-
-def stored(case: str, kinematics: Kinematics) -> dict[str, Any]:
-    """All that is known of the reference: quantities, extrapolations, runs."""
-    return _everything()[case][kinematics]
 
 
 def read_reference(case: str, kinematics: Kinematics = "current") -> Reference:
     """The stored values."""
-    data = stored(case, kinematics)
-    values = {name: entry["value"] for name, entry in data["quantities"].items()}
-    errors = {name: entry["error"] for name, entry in data["quantities"].items()}
+    data = stored()[case][kinematics]
+    values, errors = ({name: q[key] for name, q in data["quantities"].items()} for key in ("value", "error"))
     profile = {side: np.array(pressures) for side, pressures in data.get("profile", {}).items()}
     return Reference(values, errors, profile | {"both": _mean(profile)} if profile else {})
 
@@ -105,7 +100,7 @@ def compute(
     entry["quantities"]["profile"] = {"value": 0.0, "error": apart}
     if kinematics == "current":
         entry["profile"] = {side: [float(f"{p:.7g}") for p in values] for side, values in profile.items()}
-    everything = _everything()
+    everything = stored()
     # Fixed pairs can be chosen with either side's normals, which is a difference of the order of (dR/R)^2: another
     # code's choice, which the file holds, tells how much of the value depends on that.
     if independent := everything.get(case.name, {}).get(kinematics, {}).get("independent"):

@@ -160,7 +160,7 @@ def reference_table(cases: Sequence[JointCase], kinematics: Sequence[Kinematics]
     """The reference values, what they are known to, and the two extrapolations that they come from."""
     table = Table("case", "kinematics", "quantity", "value", "relative error", "first family", "second family")
     for case, way in ((case, way) for case in cases for way in kinematics):
-        entry = stored(case.name, way)
+        entry = stored()[case.name][way]
         for name, found in entry["quantities"].items():
             if "extrapolations" in found:
                 limits = [f"{limit['value']:.9g} (order {limit['order']:.1f})" for limit in found["extrapolations"]]

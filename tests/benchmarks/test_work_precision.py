@@ -22,7 +22,7 @@ from archord.benchmarks.cost.work_precision import (
     warm_curves,
     warm_seconds,
 )
-from archord.benchmarks.cost.work_precision_cases import CASES, DECKS, SERIES, Series, families, scaled
+from archord.benchmarks.cost.work_precision_cases import CASES, DECKS, SERIES, Series, families, meshes
 from archord.benchmarks.cost.work_precision_codes import Task, Values
 from archord.benchmarks.cost.work_precision_reference import (
     ANGLES,
@@ -150,7 +150,7 @@ def test_references_are_there():
 def test_a_reference_is_computed_stored_and_read(tmp_path, monkeypatch):
     """From finished runs only where the scene is the same; the force is that of its profile."""
     case = CASES["elastic"]
-    coarse = tuple(Series(f"{ratio:g}", scaled(0.3, 0.2, 0.15, ratio=ratio)) for ratio in (3, 4))
+    coarse = tuple(Series(f"{ratio:g}", meshes(0.3, 0.2, 0.15, ratio=ratio)) for ratio in (3, 4))
     monkeypatch.setattr(work_precision_reference, "families", lambda case: coarse)
     monkeypatch.setattr(work_precision_reference, "FILE", tmp_path / "reference.json")
     said: list[str] = []
