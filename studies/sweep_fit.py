@@ -14,20 +14,20 @@ from archord.postprocess.convergence import Refined, group
 from archord.postprocess.curve import RunCurve, read_run
 from archord.postprocess.laws import study_report
 from archord.postprocess.laws.calibrated import JSON_BEGINS, CalibratedModel, shipped_model
-from archord.postprocess.laws.calibration import fit_plateau
+from archord.postprocess.laws.calibration import check_compatible, fit_plateau
 from archord.postprocess.laws.curve_fit import fit_curve
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.study import (
     CSV_BEGINS,
     Cases,
     TooFewError,
+    as_csv,
+    from_csv,
     read_cases,
-    rounded,
     shipped_errors,
     study,
     table_of,
     usable,
-    write_cases,
 )
 from archord.scene.errors import InputError
 from archord.studies.cases import Case, read_sweep
@@ -71,15 +71,12 @@ class SweepFit:
         give no model for ``law`` or ``picture``, and ValueError for a picture of unknown format."""
         if (law or picture) and self.model is None:
             raise InputError(f"{law or picture}: no law to {'write' if law else 'draw'}: {self.too_few}.")
-        if csv:
-            write_cases(self.cases, self.notes, csv)
-        if law and self.model:
-            with writing(law):
-                law.write_text(self.model.to_json(), encoding="utf-8")
-        if json:
-            with writing(json):
-                text = study_report.as_json(self.cases, self.notes, self.left_out, self.model)
-                json.write_text(text, encoding="utf-8")
+        everything = study_report.as_json(self.cases, self.notes, self.left_out, self.model)
+        model = self.model.to_json() if self.model else ""
+        for file, text in ((csv, as_csv(self.cases, self.notes)), (law, model), (json, everything)):
+            if file:
+                with writing(file):
+                    file.write_text(text, encoding="utf-8", newline="")
         if picture and self.model:
             study_report.draw_study(self.cases, self.model, picture)
 
@@ -140,17 +137,17 @@ def _solved(
     if not fitted:
         said = "; ".join(f"{name}: {reason}" for name, reason in left_out[:1])
         raise InputError(f"{folder}: holds no case that can be fitted{f' ({said})' if said else ''}.")
-    cases = rounded(table_of(fitted))
+    meshes = sorted({f"{case['mesh']:.3g}" for case in fitted})
     notes = {
         "archord": archord.__version__,
         "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
         "distinct cases": str(len(distinct)),
-        "mesh": f"elements of {' and '.join(sorted({f'{mesh:.3g}' for mesh in cases.mesh}))} R on the arcs",
+        "mesh": f"elements of {' and '.join(meshes)} R on the arcs",
     }
     softer = max(LawJoint.from_scene(run.scene).softer[0] for run in runs)
     if softer > _SOFTER:
         notes[BLOCKS] = f"P up to about {softer:.1%} smaller than in a wide block, and k, which a model does not know"
-    return cases, notes, left_out
+    return *from_csv(as_csv(table_of(fitted), notes)), left_out  # the digits of the file, whether it is read or not
 
 
 def fit_case(refined: Refined, load_range: tuple[float, float], confidence: float, name: str) -> dict[str, Any]:
@@ -191,8 +188,6 @@ def _run(case: Case, folder: Path) -> RunCurve:
     status = result_of(run)
     if status.status not in ("done", "stopped") or not status.steps:
         raise InputError(f"{status.status}: {status.message}" if status.message else status.status)
-    if case.scene.joint.model != "block":
-        raise InputError(f'joint.model = "{case.scene.joint.model}" has no such law')
-    if case.scene.pin.hardening > 0 or case.scene.block.hardening > 0:
-        raise InputError("hardening: the law is for perfect plasticity")
-    return read_run(run).loading()
+    curve = read_run(run).loading()
+    check_compatible([curve])
+    return curve

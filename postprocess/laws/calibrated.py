@@ -29,7 +29,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.postprocess.laws.law import Outside, warn
@@ -44,12 +43,6 @@ SOFT_WORDS = "(1 - alpha)/2 times the pin's equivalent Poisson's ratio"
 UNFIT = {"pin": "only the pin yields", "unlike": "the bodies have unlike yield stresses"}
 _RATIO = "E'(pin)/E'(block)"
 _LAST_DIGITS = 1e-3  # of the bounds as they are stored, and of moduli that a scene has rounded
-
-
-def equivalent(nu: npt.ArrayLike, plane: npt.ArrayLike) -> Array:
-    """Poisson's ratio that a body in plane stress would need to deform like this one in its plane."""
-    ratio = np.asarray(nu, float)
-    return np.where(np.asarray(plane) == "strain", ratio / (1 - ratio), ratio)
 
 
 @dataclass(frozen=True)
@@ -68,8 +61,11 @@ class Points:
         """From plane, alpha, pin_nu (nan: the block's), nu, s and clearance of ``joints``, numbers or arrays."""
         names = ("plane", "alpha", "pin_nu", "nu", "s", "clearance")
         plane, alpha, pin, nu, s, clearance = np.broadcast_arrays(*(np.atleast_1d(joints[name]) for name in names))
-        m = equivalent(np.where(np.isnan(pin), nu, pin), plane)
-        return cls(alpha, m, equivalent(nu, plane), s, clearance)
+        # Poisson's ratios that bodies in plane stress would need to deform like these in their plane
+        m, n = (
+            np.where(plane == "strain", ratio / (1 - ratio), ratio) for ratio in (np.where(np.isnan(pin), nu, pin), nu)
+        )
+        return cls(alpha, m, n, s, clearance)
 
     def terms(self, names: list[str]) -> Array:
         """The products called ``names`` ``(n, terms)``."""
@@ -82,15 +78,14 @@ class Points:
             "x": np.log(np.where(np.isfinite(self.s), self.s, MIDDLE) / MIDDLE),
             "d": 100 * self.clearance,
         }
-        columns = [np.prod([factors[letter] for letter in name], axis=0) for name in names]
-        return np.stack(columns, axis=-1) if columns else np.zeros((*self.alpha.shape, 0))
+        return np.stack([np.prod([factors[letter] for letter in name], axis=0) for name in names], axis=-1)
 
 
 @dataclass(frozen=True)
 class CalibratedModel:
     """The model as the ``data`` of its JSON file.
 
-    ``form`` has the terms of 1/k_e ("elastic"), of A ("late"; none: k is the elastic one throughout), and of C in plane
+    ``form`` has the terms of 1/k_e ("elastic"), of A ("late"), and of C in plane
     "strain" and "stress"; ``elastic`` the coefficients of 1/k_e; ``plastic``, by plane and yielding, ``rate`` b, those
     of A ("late") and C ("threshold"), and from how many cases they are; ``bounds``, likewise, the smallest and largest
     of what was fitted (None: infinite); ``load_range`` is delta/dR of the steps fitted; ``errors`` say how good the
@@ -134,12 +129,6 @@ class CalibratedModel:
         same = [b for b in every if b["plane"] == kind[0] and b["yielding"] != "none"] or [own]
         found = {name: _widest(name, every) for name in ("nu", "pin_nu", "clearance", "alpha")}
         return found | {"s": _widest("s", same), "alpha": (found["alpha"][0], own["alpha"][1])}
-
-    @property
-    def numbers(self) -> int:
-        """How many coefficients there are."""
-        parts = self.data["plastic"]
-        return len(self.data["elastic"]) + sum(len(p["late"]) + bool(p["late"]) + len(p["threshold"]) for p in parts)
 
     def to_json(self) -> str:
         """The model as JSON."""

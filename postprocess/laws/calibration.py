@@ -89,7 +89,7 @@ def calibrate(
         raise InputError(f"--confidence {confidence:g}: must be at least 0.5 and below 1.")
     if hold_k is not None and not 0 < hold_k < np.inf:
         raise InputError(f"--hold-k {hold_k:g}: must be a number greater than 0.")
-    _check_compatible(runs)
+    check_compatible(runs)
     groups = group(runs)
     of = {id(r): g for g in groups for r in (g.run, *g.coarser)}
     each = []
@@ -104,7 +104,8 @@ def calibrate(
     return Calibration(tuple(each), together, load_range, confidence, hold_k)
 
 
-def _check_compatible(runs: list[RunCurve]) -> None:
+def check_compatible(runs: list[RunCurve]) -> None:
+    """Raise `InputError` for runs that have no such law, or none in common."""
     if not runs:
         raise InputError("no run to fit.")
     first = runs[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from string import Template
 
 import numpy as np
@@ -50,11 +50,6 @@ class FittedLaw:
             raise ValueError("law: c and sigY belong together; give both or none.")
 
     @property
-    def onset(self) -> float | None:
-        """Displacement ``delta0 = c sigY R/(k E*)`` at which the plateau begins; None for an elastic law."""
-        return None if self.c is None else self.joint.first_yield
-
-    @property
     def joint(self) -> LawJoint:
         """The joint with the law's coefficients, as the closed-form laws take it."""
         return LawJoint(self.R, self.dR, self.E_star, self.sigY, k=self.k, c=self.c or 1.0)
@@ -77,13 +72,9 @@ class FittedLaw:
             lambda x: plastic_force(joint, x), lambda x: plastic_stiffness(joint, x), np.asarray(force, float), self.dR
         )
 
-    def to_json(self) -> str:
-        """The law as a JSON object; `from_json` gives it back, digit for digit."""
-        return json.dumps(asdict(self), indent=2, ensure_ascii=False)
-
     @classmethod
     def from_json(cls, text: str) -> FittedLaw:
-        """The law in ``text``, written by `to_json` or by ``archord fit --json``. Raises ValueError."""
+        """The law in ``text``, written by ``archord fit --json``. Raises ValueError."""
         try:
             data = json.loads(text)
         except json.JSONDecodeError as error:

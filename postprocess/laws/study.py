@@ -17,7 +17,6 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import least_squares
 
-from archord.output.user_file import writing
 from archord.postprocess.laws.calibrated import (
     SOFT,
     SOFT_WORDS,
@@ -27,27 +26,23 @@ from archord.postprocess.laws.calibrated import (
     Points,
     dundurs_alpha,
     joint_calibrated,
+    shipped_model,
 )
 from archord.postprocess.laws.chord_laws import plastic_force
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.scene.errors import InputError
 
 Cases: TypeAlias = pd.DataFrame  # with the columns of `COLUMNS` and of `table_of`
+Form = dict[str, Any]
 Errors = dict[str, dict[str, Any]]  # by plane and yielding ("strain block", "both all"): `summary` of errors
 
 KINDS: tuple[Kind, ...] = tuple((plane, yielding) for plane in ("strain", "stress")
                                 for yielding in ("none", "both", "block"))  # fmt: skip
-FORM = {  # the terms of 1/k_e, of A for late yielding, and of ln c in either plane, see `CalibratedModel`
-    "name": "calibrated",
-    "elastic": ["p", "q", "pm", "qn", "qnn", "qqnn", "pqmn", "ppmmm"],
-    "late": ["1", "p", "x", "pm", "qn"],
-    "strain": ["1", "x", "p", "xp", "pp", "pn", "ppm"],
-    "stress": ["1", "pm", "n", "d"],
-}
+FORM: Form = shipped_model().data["form"]  # which products of what decides a joint count, see `CalibratedModel`
 LATE = 0.45  # delta/dR from which errors of P count; the contact is Hertz's before
 FOLDS = 10
 HELD_OUT = 0.15
-CSV_BEGINS = "# archord: "  # by which a file of `write_cases` is known
+CSV_BEGINS = "# archord: "  # by which a file of `as_csv` is known
 COLUMNS = {  # of a case, with the heading in its file
     "run": "run",
     "plane": "plane",
@@ -70,8 +65,8 @@ COLUMNS = {  # of a case, with the heading in its file
     "load": "delta/dR",  # of the steps fitted, an array
     "P": "P/(E* dR)",
 }
-_TYPES = {name: float for name in COLUMNS} | dict.fromkeys(("run", "plane", "yielding"), str)
 _CURVES = ("load", "P")
+_TYPES = {name: str if name in ("run", "plane", "yielding") else float for name in COLUMNS if name not in _CURVES}
 _PLENTY = 2  # cases per coefficient without which nothing is fitted
 _CLEAR = 0.65  # of the largest load: where the plateau must have begun for c to count
 _SHORT = 0.99  # of the largest load of the sweep, that a case must have reached
@@ -84,8 +79,7 @@ def table_of(cases: Iterable[dict[str, Any]]) -> Cases:
     The last is c where the plateau fills the last third of the range or more, else nan: one that begins later hardly
     shows in P, and the fit then takes c to mend the shape of the curve.
     """
-    found = pd.DataFrame(cases, columns=list(COLUMNS))
-    found = found.astype({name: kind for name, kind in _TYPES.items() if name not in _CURVES})
+    found = pd.DataFrame(cases, columns=list(COLUMNS)).astype(_TYPES)
     found["alpha"] = [dundurs_alpha(case.plane, case.ratio, case.pin_nu, case.nu) for case in found.itertuples()]
     found["s"] = found.strength / found.clearance
     longest = found.load.map(lambda load: load[-1])
@@ -97,44 +91,32 @@ def table_of(cases: Iterable[dict[str, Any]]) -> Cases:
     return found
 
 
-def write_cases(cases: Cases, notes: dict[str, str], file: str | Path) -> None:
-    """Write ``cases`` with seven digits, below ``notes`` on where they are from. Raises `InputError`."""
-    with writing(Path(file)):
-        text = "".join(f"# {name}: {value}\n" for name, value in notes.items())
-        Path(file).write_text(text + _csv(cases), encoding="utf-8", newline="")
-
-
-def _csv(cases: Cases) -> str:
+def as_csv(cases: Cases, notes: dict[str, str]) -> str:
+    """The text of a file of ``cases``, with seven digits, below ``notes`` on where they are from."""
     shown = cases[list(COLUMNS)].rename(columns=COLUMNS)
     for name in _CURVES:
         shown[COLUMNS[name]] = [" ".join(f"{value:.7g}" for value in curve) for curve in cases[name]]
-    return shown.to_csv(index=False, float_format="%.7g", lineterminator="\n")
+    said = "".join(f"# {name}: {value}\n" for name, value in notes.items())
+    return said + shown.to_csv(index=False, float_format="%.7g", lineterminator="\n")
+
+
+def from_csv(text: str) -> tuple[Cases, dict[str, str]]:
+    """What `as_csv` made a ``text`` of. Raises ValueError or KeyError if it made none."""
+    types = {COLUMNS[name]: kind for name, kind in _TYPES.items()}
+    curves = {COLUMNS[name]: lambda numbers: np.array(numbers.split(), float) for name in _CURVES}
+    rows = pd.read_csv(io.StringIO(text), comment="#", dtype=types, converters=curves, float_precision="round_trip")
+    notes = dict(line[1:].strip().split(": ", 1) for line in text.split("\n") if line[:1] == "#")
+    return table_of(rows.rename(columns={heading: name for name, heading in COLUMNS.items()})[list(COLUMNS)]), notes
 
 
 def read_cases(file: str | Path) -> tuple[Cases, dict[str, str]]:
-    """The cases of ``file``, written by `write_cases`, and what it says about where they are from.
-
-    Raises `InputError` if it cannot be read.
-    """
+    """The cases in ``file``, and what it says about where they are from. Raises `InputError` if it cannot be read."""
     try:
-        text = Path(file).read_text(encoding="utf-8")
-        return _parsed(text), dict(line[1:].strip().split(": ", 1) for line in text.split("\n") if line[:1] == "#")
+        return from_csv(Path(file).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}.") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError):
         raise InputError(f"{file}: cannot be read as the fitted cases of a sweep, fit.csv.") from None
-
-
-def _parsed(text: str) -> Cases:
-    types = {COLUMNS[name]: kind for name, kind in _TYPES.items() if name not in _CURVES}
-    curves = {COLUMNS[name]: lambda numbers: np.array(numbers.split(), float) for name in _CURVES}
-    rows = pd.read_csv(io.StringIO(text), comment="#", dtype=types, converters=curves, float_precision="round_trip")
-    return table_of(rows.rename(columns={heading: name for name, heading in COLUMNS.items()})[list(COLUMNS)])
-
-
-def rounded(cases: Cases) -> Cases:
-    """``cases`` as `write_cases` and `read_cases` would give them back."""
-    return _parsed(_csv(cases))
 
 
 class TooFewError(ValueError):
@@ -144,13 +126,12 @@ class TooFewError(ValueError):
 def usable(cases: Cases) -> tuple[Cases, list[tuple[str, str]]]:
     """The cases that a model can be fitted to, and the runs of the others with the reason."""
     longest = max((load[-1] for load in cases.load), default=0.0)
-    points, out = Points.of(cases), {}
-    for index, case, m in zip(cases.index, cases.itertuples(), points.m, strict=True):
-        softness = (1 - case.alpha) / 2 * m
+    softness, out = (1 - cases.alpha) / 2 * Points.of(cases).m, {}
+    for index, case in cases.iterrows():
         if case.yielding in UNFIT:
             out[index] = UNFIT[case.yielding]
-        elif softness > SOFT + 1e-3:
-            out[index] = f"{SOFT_WORDS} = {softness:.3g} is more than {SOFT:g}: a soft pin, hardly compressible"
+        elif softness[index] > SOFT + 1e-3:
+            out[index] = f"{SOFT_WORDS} = {softness[index]:.3g} is more than {SOFT:g}: a soft pin, hardly compressible"
         elif case.load[-1] < _SHORT * longest:
             out[index] = f"ends at {case.load[-1]:.3g} dR, others at {longest:.3g}"
     return cases.drop(index=list(out)), [(cases.run[index], reason) for index, reason in out.items()]
@@ -178,7 +159,7 @@ def split(cases: Cases) -> tuple[Cases, Cases]:
     return cases[~chosen], cases[chosen]
 
 
-def fit_model(cases: Cases, form: dict[str, Any] = FORM, plenty: int = _PLENTY) -> CalibratedModel:
+def fit_model(cases: Cases, form: Form = FORM, plenty: int = _PLENTY) -> CalibratedModel:
     """Least squares of ln k of the elastic cases, then of ln k and ln c of each kind that yields.
 
     Coefficients have six digits. A kind with less than ``plenty`` cases per coefficient is left out. Raises
@@ -270,12 +251,10 @@ def errors(cases: Cases, k: Array, c: Array) -> pd.DataFrame:
     "k", "c" (nan where there is none), and at each ``load`` delta/dR "P", from `LATE` on, or "P early", before.
     """
     rows = cases[["run", "plane", "yielding"]]
+    scaled = (case.load * case.clearance for case in cases.itertuples())
     forces = [
-        plastic_force(joint_of_case(case, float(one), float(other)), case.load * case.clearance)
-        / case.clearance
-        / case.P
-        - 1
-        for case, one, other in zip(cases.itertuples(), k, c, strict=True)
+        plastic_force(joint_of_case(case, *map(float, kc)), delta) / case.clearance / case.P - 1
+        for case, delta, *kc in zip(cases.itertuples(), scaled, k, c, strict=True)
     ]
     steps = rows.loc[cases.index.repeat([len(part) for part in forces])]
     load = np.concatenate(list(cases.load))
@@ -298,19 +277,19 @@ def summary(found: pd.DataFrame) -> dict[str, Any]:
     return said
 
 
-def cross_validate(cases: Cases, form: dict[str, Any] = FORM, folds: int = FOLDS) -> pd.DataFrame:
+def cross_validate(cases: Cases, form: Form = FORM) -> pd.DataFrame:
     """`errors` of every case, predicted by a model fitted to the other folds only (Stone 1974); each kind is in all
     folds, and must have been fitted. Raises `TooFewError`."""
     cases = cases.sort_values(["plane", "yielding", "digest"])
-    fold = np.arange(len(cases)) % folds
+    fold = np.arange(len(cases)) % FOLDS
     k, c = np.empty(len(cases)), np.empty(len(cases))
-    for f in set(fold.tolist()):
+    for f in range(min(FOLDS, len(cases))):
         out = fold == f
         k[out], c[out] = predictions(fit_model(cases[~out], form, plenty=1), cases[out])
     return errors(cases, k, c)
 
 
-def study(cases: Cases, form: dict[str, Any] = FORM, provenance: dict[str, Any] | None = None) -> CalibratedModel:
+def study(cases: Cases, form: Form = FORM, provenance: dict[str, Any] | None = None) -> CalibratedModel:
     """The model of ``cases`` with its errors on those of them that it has not seen, and ``provenance``.
 
     `HELD_OUT` of the cases are kept out of everything ("held out"), the others predicted by each other
@@ -338,7 +317,6 @@ def by_kind(found: pd.DataFrame, cases: Cases) -> Errors:
 def shipped_errors(cases: Cases) -> Errors:
     """`by_kind` of the law that comes with archord, of those of ``cases`` that are inside its range."""
     found = [joint_calibrated(joint_of_case(case, 1.0, 1.0)) for case in cases.itertuples()]
-    inside = [law for law in found if not law.outside]
-    chosen = cases[[not law.outside for law in found]]
-    k, c = (np.array([getattr(law, name) for law in inside]) for name in "kc")
-    return by_kind(errors(chosen, k, c), chosen) if inside else {}
+    inside = np.array([not law.outside for law in found], bool)
+    k, c = (np.array([getattr(law, name) for law in found])[inside] for name in "kc")
+    return by_kind(errors(cases[inside], k, c), cases[inside]) if inside.any() else {}

@@ -118,7 +118,7 @@ def test_before_yield_there_is_no_plateau_to_fit():
     assert found.joint.P.c is None
     assert found.joint.p0.c is None
     assert found.joint.plateau is None
-    assert found.law().onset is None
+    assert found.law().c is None
 
 
 @pytest.mark.parametrize("first", [0.5, 0.2])

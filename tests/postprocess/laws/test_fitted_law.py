@@ -4,6 +4,7 @@ import ast
 import json
 import subprocess
 import sys
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -23,8 +24,8 @@ DELTA = np.array([-0.1, 0.0, 1e-9, 0.003, 0.01, 0.02, 0.1, 1.0])
 @pytest.mark.parametrize("law", [ELASTIC, PLASTIC], ids=["elastic", "plastic"])
 def test_json_gives_the_law_back(law):
     """Every digit, also out of the file of ``archord fit --json``."""
-    assert FittedLaw.from_json(law.to_json()) == law
-    assert FittedLaw.from_json(json.dumps({"law": json.loads(law.to_json()), "each": []})) == law
+    assert FittedLaw.from_json(json.dumps(asdict(law))) == law
+    assert FittedLaw.from_json(json.dumps({"law": asdict(law), "each": []})) == law
 
 
 def test_a_file_of_version_0_1_is_read():
@@ -78,9 +79,8 @@ def test_the_law_is_the_plastic_winkler_law_of_its_joint():
     """`force` is eqs. 9 to 12 with its own numbers, and yields at its onset."""
     joint = LawJoint(10.0, 0.05, 1.05e5, yield_stress=230.7, k=PLASTIC.k, c=PLASTIC.c)
     np.testing.assert_array_equal(PLASTIC.force(DELTA), plastic_force(joint, np.maximum(DELTA, 0)))
-    assert PLASTIC.onset < DELTA[4]
+    assert PLASTIC.joint.first_yield < DELTA[4]
     assert PLASTIC.force(0.02) < FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.0).force(0.02)
-    assert ELASTIC.onset is None
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,8 @@ def test_the_law_is_the_plastic_winkler_law_of_its_joint():
         ("{", "not valid JSON"),
         ("[1]", "must be a JSON object"),
         ('{"k": 1}', "must be a JSON object"),
-        (ELASTIC.to_json().replace("0.83", "-0.83"), "k = -0.83 must be a number greater than 0"),
-        (ELASTIC.to_json().replace('"c": null', '"c": 1.0'), "c and sigY belong together"),
+        (json.dumps(asdict(ELASTIC) | {"k": -0.83}), "k = -0.83 must be a number greater than 0"),
+        (json.dumps(asdict(ELASTIC) | {"c": 1.0}), "c and sigY belong together"),
     ],
 )
 def test_what_is_no_law(text, said):
