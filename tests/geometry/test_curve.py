@@ -44,6 +44,11 @@ def interpolate(f, n: int, grading: float = 1.0) -> Curve:
     return Curve(f(np.sort(np.concatenate([s, (s[1:] + s[:-1]) / 2]))), 2)
 
 
+def closest(c: Curve, x, outward, start=None):
+    """Closest points of the curve at rest."""
+    return c.closest_point(x, outward, np.zeros_like(c.X), start)
+
+
 def on_curve(c: Curve, facet, xi, displacement=0.0):
     """Points and unit outward normals at ``xi`` of ``facet``."""
     N, dN = c.shapes(xi)
@@ -108,7 +113,7 @@ def test_closest_point_is_the_nearest_of_all(f, n, grading, distance):
     (x - y) . tangent = 0 and the distance is the gap; the normal is a unit vector."""
     c = interpolate(f, n, grading)
     x, outward = scatter(c, distance)
-    p = c.closest_point(x, outward, np.zeros_like(c.X))
+    p = closest(c, x, outward)
     assert p.found.all()
     found, sampled = np.linalg.norm(x - p.point, axis=1), brute_force(c, x)
     assert np.all(found <= sampled + 1e-14)
@@ -140,11 +145,10 @@ def test_the_start_does_not_matter(f, shift):
     """From a facet near the partner, or from any facet, the result is that of the search over the whole curve."""
     c = interpolate(f, 24)
     x, outward = scatter(c, 0.2)
-    rest = np.zeros_like(c.X)
-    p = c.closest_point(x, outward, rest)
+    p = closest(c, x, outward)
     random = np.random.default_rng(0).integers(0, c.n_facets, len(x))
     start = random if shift == "anywhere" else np.clip(p.facet + shift, 0, c.n_facets - 1)
-    q = c.closest_point(x, outward, rest, start)
+    q = closest(c, x, outward, start)
     np.testing.assert_allclose(q.point, p.point, rtol=0, atol=1e-13)
     np.testing.assert_array_equal(q.found, p.found)
     np.testing.assert_allclose(
@@ -162,13 +166,13 @@ def test_a_corner_is_the_closest_point_of_its_cone():
     c = roof()
     angle = np.radians([50.0, 80, 100, 130, 30, 150])
     x = 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    p = c.closest_point(x, np.tile([0.0, -1.0], (6, 1)), np.zeros_like(c.X))
+    p = closest(c, x, np.tile([0.0, -1.0], (6, 1)))
     assert p.found.all()
     np.testing.assert_array_equal(p.slides, [False] * 4 + [True] * 2)
     np.testing.assert_allclose(p.point[:4], 0, atol=1e-15)
     np.testing.assert_array_equal(p.facet[4:], [0, 1])
     for start in range(2):
-        q = c.closest_point(x, np.tile([0.0, -1.0], (6, 1)), np.zeros_like(c.X), np.full(6, start))
+        q = closest(c, x, np.tile([0.0, -1.0], (6, 1)), np.full(6, start))
         np.testing.assert_allclose(q.point, p.point, atol=1e-15)
 
 
@@ -178,16 +182,15 @@ def test_points_beyond_a_free_end_or_facing_away_have_no_partner(f):
     that face away see only the far side of a body."""
     c = interpolate(f, 10)
     x, outward = scatter(c, 0.1)
-    assert not c.closest_point(x, -outward, np.zeros_like(c.X)).found.any()
+    assert not closest(c, x, -outward).found.any()
     y, normal = on_curve(c, np.array([0, 9]), np.array([0.0, 1.0]))
     _, dN = c.shapes(np.array([0.0, 1.0]))
     forward = np.einsum("ma,mai->mi", dN, c.X[c.connectivity[[0, 9]]]) * [[-1.0], [1.0]]
-    rest = np.zeros_like(c.X)
-    assert not c.closest_point(y + 0.1 * forward + 0.01 * normal, -normal, rest).found.any()
-    near = c.closest_point(y + 0.02 * forward + 0.01 * normal, -normal, rest)
+    assert not closest(c, y + 0.1 * forward + 0.01 * normal, -normal).found.any()
+    near = closest(c, y + 0.02 * forward + 0.01 * normal, -normal)
     assert near.found.all()
     assert near.slides.all()
-    assert c.closest_point(y - 0.02 * forward + 0.01 * normal, -normal, rest).found.all()
+    assert closest(c, y - 0.02 * forward + 0.01 * normal, -normal).found.all()
 
 
 def linearisation(p, x, dx, du, n_nodes):
@@ -286,4 +289,4 @@ def test_a_lost_point_is_an_error(monkeypatch, broken, name, value, said):
     x, outward = scatter(c, 0.3)
     monkeypatch.setattr(broken, name, value)
     with pytest.raises(ProjectionError, match=said):
-        c.closest_point(x, outward, np.zeros_like(c.X))
+        closest(c, x, outward)

@@ -19,7 +19,14 @@ SIZE, GROWTH = 0.2, 0.4
 
 @pytest.fixture(scope="module")
 def joint():
-    return quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH)
+    return made()
+
+
+def made(size=SIZE, growth=GROWTH, width=W, ring=False, comm=MPI.COMM_SELF, **options):
+    """A quarter joint, or a half ring with a core of half the radius."""
+    if ring:
+        return half_ring(comm, R, DR, width, size, growth, 0.5, **options)
+    return quarter_joint(comm, R, DR, width, size, growth, **options)
 
 
 def facet_nodes(joint, tag):
@@ -51,7 +58,7 @@ def sector(radius, n):
 def test_elements_shrink_toward_the_edge_of_the_contact():
     """Edges of both arcs are a quarter as long at the given angle, and elsewhere no longer than without it."""
     angle, fine = 1.1, SIZE / 4
-    joint = quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH, edge=(angle, fine))
+    joint = made(edge=(angle, fine))
     for tag, centre in ((Facets.PIN_ARC, -DR), (Facets.HOLE_ARC, 0.0)):
         x, length = facet_nodes(joint, tag) - [0, centre], edge_lengths(joint, tag)
         middle = x.mean(axis=1)
@@ -81,7 +88,7 @@ def test_arcs_are_where_they_belong(joint):
 def test_areas_and_edges(size, comm):
     """A quarter disc, and a square without one: exact for parabolic arcs, so in error by O(size^4) only. Edges of the
     arcs are no longer than the element size, and no shorter than a whole number of them asks for."""
-    joint = quarter_joint(comm, R, DR, W, size, GROWTH)
+    joint = made(size, comm=comm)
     n = int(np.ceil(np.pi / 2 / size))
     for tag in (Facets.PIN_ARC, Facets.HOLE_ARC):
         lengths = edge_lengths(joint, tag)
@@ -98,10 +105,7 @@ def test_areas_and_edges(size, comm):
 @pytest.mark.parametrize(("size", "size_ratio"), [(0.2, 0.05), (0.01, 20.0)])
 def test_pin_and_block_can_have_elements_of_their_own(ring, size, size_ratio):
     """1:20 and 20:1: each arc has its own edges, each body its own number of triangles, none of them a sliver."""
-    if ring:
-        joint = half_ring(MPI.COMM_SELF, R, DR, W, size, GROWTH, 0.5, size_ratio=size_ratio)
-    else:
-        joint = quarter_joint(MPI.COMM_SELF, R, DR, W, size, GROWTH, size_ratio=size_ratio)
+    joint = made(size, ring=ring, size_ratio=size_ratio)
     for tag, longest in ((Facets.HOLE_ARC, size), (Facets.PIN_ARC, size_ratio * size)):
         lengths = edge_lengths(joint, tag)
         assert 0.85 * longest < lengths.min() < lengths.max() <= longest * (1 + DR)
@@ -115,7 +119,7 @@ def test_pin_and_block_can_have_elements_of_their_own(ring, size, size_ratio):
 
 def test_equal_sizes_make_the_same_mesh_as_none(joint):
     """A ratio next to 1 takes the way of two fields: the same triangles up to their places' last digits."""
-    other = quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH, size_ratio=1 + 1e-14)
+    other = made(size_ratio=1 + 1e-14)
     np.testing.assert_allclose(other.mesh.geometry.x, joint.mesh.geometry.x, atol=1e-6)
     np.testing.assert_array_equal(other.cells.values, joint.cells.values)
 
@@ -141,7 +145,7 @@ def test_mesh_does_not_depend_on_the_unit_of_length(joint, unit):
 
 def test_a_rigid_pin_is_not_meshed(joint):
     """No cells and no facets of a pin; the block is the same to the area."""
-    rigid = quarter_joint(MPI.COMM_SELF, R, DR, W, SIZE, GROWTH, rigid_pin=True)
+    rigid = made(rigid_pin=True)
     assert set(rigid.cells.values) == {Cells.BLOCK}
     assert set(rigid.facets.values) == {Facets.HOLE_ARC, Facets.BLOCK_HELD, Facets.SYMMETRY}
     assert area(rigid, Cells.BLOCK) == pytest.approx(area(joint, Cells.BLOCK), rel=1e-12)
@@ -149,10 +153,8 @@ def test_a_rigid_pin_is_not_meshed(joint):
 
 def test_tagged_edges_are_where_their_names_say(joint):
     """Tops on y = 0 and y = -dR, symmetry on x = 0 along pin and block, each with its full length."""
-    pin_top, block_top, axis = (facet_nodes(joint, t) for t in (Facets.PIN_TOP, Facets.BLOCK_HELD, Facets.SYMMETRY))
-    np.testing.assert_allclose(pin_top[..., 1], -DR, atol=1e-15)
-    np.testing.assert_allclose(block_top[..., 1], 0, atol=1e-15)
-    np.testing.assert_allclose(axis[..., 0], 0, atol=1e-15)
+    for tag, axis, place in ((Facets.PIN_TOP, 1, -DR), (Facets.BLOCK_HELD, 1, 0), (Facets.SYMMETRY, 0, 0)):
+        np.testing.assert_allclose(facet_nodes(joint, tag)[..., axis], place, atol=1e-15)
     assert edge_lengths(joint, Facets.PIN_TOP).sum() == pytest.approx(R)
     assert edge_lengths(joint, Facets.BLOCK_HELD).sum() == pytest.approx(W - R - DR)
     assert edge_lengths(joint, Facets.SYMMETRY).sum() == pytest.approx(R + W - R - DR)
@@ -163,22 +165,15 @@ def test_tagged_edges_are_where_their_names_say(joint):
 )
 def test_the_expected_number_of_triangles_is_about_what_the_mesh_has(size, growth, width):
     """The scene model refuses meshes by this estimate before they are made."""
-    expected = JointGeometry(
-        radius=R, clearance=DR, block_size=width, relative_element_size=size, growth=growth
-    ).expected_cells
-    made = quarter_joint(MPI.COMM_SELF, R, DR, width, size, growth).mesh.topology.index_map(2).size_global
-    assert 0.5 < expected / made < 1.5
+    keys = {"radius": R, "clearance": DR, "block_size": width, "relative_element_size": size, "growth": growth}
+    cells = made(size, growth, width).mesh.topology.index_map(2).size_global
+    assert 0.5 < JointGeometry(**keys).expected_cells / cells < 1.5
 
 
 @pytest.mark.parametrize(("ring", "degree"), [(False, 3), (True, 2)], ids=["quarter joint", "half ring"])
 def test_a_mesh_made_by_cutting_is_like_one_made_at_once(ring, degree):
     """The same edges on the arcs, nodes on their circles to the last digits, few more triangles, the same areas."""
-    at_once, cut = (
-        half_ring(MPI.COMM_SELF, R, DR, W, 0.02, 0.05, 0.5, degree=degree, refinements=k)
-        if ring
-        else quarter_joint(MPI.COMM_SELF, R, DR, W, 0.02, 0.05, degree=degree, refinements=k)
-        for k in (0, 2)
-    )
+    at_once, cut = (made(0.02, 0.05, ring=ring, degree=degree, refinements=k) for k in (0, 2))
     for tag, radius, centre in ((Facets.HOLE_ARC, R + DR, 0.0), (Facets.PIN_ARC, R, 0.0 if ring else -DR)):
         assert len(cut.facets.find(tag)) == pytest.approx(len(at_once.facets.find(tag)), abs=6)
         assert edge_lengths(cut, tag).max() <= 0.02 * (1 + DR)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+import archord
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.chord import arc_angle, chord_coordinate, chord_projection, read_chord_pressure
 from archord.postprocess.curve import read_run
@@ -75,7 +76,7 @@ def test_an_arc_may_go_on_where_nothing_presses():
 @pytest.mark.parametrize("name", ["elastic", "plastic"])
 def test_a_runs_chord_carries_its_force(runs, name):
     """Every step and side: chord = arc to 1e-8; the side's arc = P of history.csv to dR/R (undeformed arcs differ by
-    that); the mean of both sides is nearer than either where the joint is elastic."""
+    that), and so is the table of pressures; the mean of both sides is nearer than either where the joint is elastic."""
     run = read_run(runs[name])
     for step in range(1, len(run.delta) + 1):
         P = run.P[step - 1]
@@ -87,6 +88,9 @@ def test_a_runs_chord_carries_its_force(runs, name):
             assert radius == pytest.approx(chord.R, rel=1e-14)
             assert chord.eps == run.eps[step - 1]
             sides[side] = chord.resultant / P - 1
+            table = archord.load(runs[name]).pressure(step, side)
+            force = 2 * (table["weight"] * table["pressure"] * np.cos(table["angle"])).sum()
+            assert force == pytest.approx(arc.resultant, rel=1e-8)
         assert set(sides) == {"pin", "hole"}
         assert max(map(abs, sides.values())) < 2 * run.dR / run.R
     np.testing.assert_array_equal(read_chord_pressure(runs[name]).py, chord.py)  # the hole in the last step
