@@ -16,11 +16,6 @@ def test_a_variation_changes_what_it_names_and_nothing_else():
     assert (other.joint, other.block, other.analysis) == (scene.joint, scene.block, scene.analysis)
 
 
-def test_the_paper_s_joint_has_unit_radius_and_contact_modulus():
-    scene = paper_joint()
-    assert (scene.joint.radius, scene.joint.dR, scene.E_star) == pytest.approx((1.0, 0.005, 1.0))
-
-
 def test_names_become_folders_and_are_found(tmp_path):
     assert slug("E_pin/E_block = 1e-6, 20 %R") == "E_pin_E_block_1e-6_20_pcR"
     assert Case("a, b", paper_joint()).folder(tmp_path) == tmp_path / "a_b"

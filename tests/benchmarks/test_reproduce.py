@@ -20,7 +20,7 @@ def folder(tmp_path_factory):
     """Two figures on meshes and in steps too coarse for the paper."""
     target = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_runs, "MESHES", {"coarse": 0.2, "fine": 0.1})
+        patch.setattr(paper_runs, "MESHES", {"coarse": 0.3, "fine": 0.15})
         patch.setattr(paper_runs, "STEPS", STEPS)
         solved: list[str] = []
         reproduce(["fig5", "fig3"], target, MPI.COMM_SELF, lambda one, P: solved.append(one.name))
