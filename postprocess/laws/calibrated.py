@@ -61,10 +61,9 @@ class Points:
         """From plane, alpha, pin_nu (nan: the block's), nu, s and clearance of ``joints``, numbers or arrays."""
         names = ("plane", "alpha", "pin_nu", "nu", "s", "clearance")
         plane, alpha, pin, nu, s, clearance = np.broadcast_arrays(*(np.atleast_1d(joints[name]) for name in names))
+        ratios = np.stack([np.where(np.isnan(pin), nu, pin), nu])
         # Poisson's ratios that bodies in plane stress would need to deform like these in their plane
-        m, n = (
-            np.where(plane == "strain", ratio / (1 - ratio), ratio) for ratio in (np.where(np.isnan(pin), nu, pin), nu)
-        )
+        m, n = np.where(plane == "strain", ratios / (1 - ratios), ratios)
         return cls(alpha, m, n, s, clearance)
 
     def terms(self, names: list[str]) -> Array:
@@ -85,11 +84,11 @@ class Points:
 class CalibratedModel:
     """The model as the ``data`` of its JSON file.
 
-    ``form`` has the terms of 1/k_e ("elastic"), of A ("late"), and of C in plane
-    "strain" and "stress"; ``elastic`` the coefficients of 1/k_e; ``plastic``, by plane and yielding, ``rate`` b, those
-    of A ("late") and C ("threshold"), and from how many cases they are; ``bounds``, likewise, the smallest and largest
-    of what was fitted (None: infinite); ``load_range`` is delta/dR of the steps fitted; ``errors`` say how good the
-    model is, ``provenance`` where it is from.
+    ``form`` has the terms of 1/k_e ("elastic"), of A ("late"), and of C in plane "strain" and "stress"; ``elastic`` the
+    coefficients of 1/k_e; ``plastic``, by plane and yielding, ``rate`` b, those of A ("late") and C ("threshold"), and
+    from how many cases they are; ``bounds``, likewise, the smallest and largest of what was fitted (None: infinite);
+    ``load_range`` is delta/dR of the steps fitted; ``errors`` say how good the model is, ``provenance`` where it is
+    from.
     """
 
     data: dict[str, Any]
