@@ -48,6 +48,12 @@ def random_path(m: J2Material, rng, n: int = N, steps: int = 4, size: float = 1.
     return strain, state
 
 
+def random_increment(m: J2Material, rng, size: float = 1.0) -> tuple[np.ndarray, PlasticState]:
+    """Strains ``size`` yield strains away from random paths, and the histories of these."""
+    strain, state = random_path(m, rng)
+    return strain + size * YIELD_STRAIN * rng.normal(size=strain.shape), state
+
+
 def on_the_surface(m: J2Material, rng, n: int = N) -> tuple[np.ndarray, PlasticState, np.ndarray]:
     """States on the yield surface, and strain increments (unit length) that load them plastically."""
     strain, state = np.zeros((n, 3)), m.state(n)
@@ -78,24 +84,16 @@ def strength(m, state):
     return m.hardening.stress(state.peeq)
 
 
-def differences(m, strain, old, h):
-    """Difference quotients ``(n, 3, 3)`` of the stress, steps ``h`` ``(n,)``; those that kept to one branch."""
-    D = np.zeros((len(strain), 3, 3))
-    one_branch = np.ones(len(strain), dtype=bool)
-    flows = m.update(strain, old)[2].peeq > old.peeq
-    for j in range(3):
-        step = h[:, None] * np.eye(3)[j]
-        plus, _, state_plus = m.update(strain + step, old)
-        minus, _, state_minus = m.update(strain - step, old)
-        D[:, :, j] = (plus - minus)[:, [0, 1, 3]] / (2 * h[:, None])
-        one_branch &= (flows == (state_plus.peeq > old.peeq)) & (flows == (state_minus.peeq > old.peeq))
-    return D, one_branch, flows
-
-
 def assert_tangent_is_derivative(m, strain, old, h, *, flowing):
-    """The consistent tangent is symmetric and the derivative of the stress, to 1e-6."""
-    _, tangent, _ = m.update(strain, old)
-    D, one_branch, flows = differences(m, strain, old, np.broadcast_to(h, len(strain)))
+    """The consistent tangent is symmetric and the derivative of the stress, to 1e-6, by differences of step ``h``
+    where these keep to one branch."""
+    _, tangent, new = m.update(strain, old)
+    D, flows = np.zeros((len(strain), 3, 3)), new.peeq > old.peeq
+    one_branch = np.ones(len(strain), dtype=bool)
+    for j in range(3):
+        (plus, _, ahead), (minus, _, behind) = (m.update(strain + sign * h * np.eye(3)[j], old) for sign in (1, -1))
+        D[:, :, j] = (plus - minus)[:, [0, 1, 3]] / (2 * h)
+        one_branch &= (flows == (ahead.peeq > old.peeq)) & (flows == (behind.peeq > old.peeq))
     assert one_branch.mean() > 0.99
     assert flows.mean() >= flowing
     error = np.abs(tangent - D).max(axis=(1, 2)) / np.abs(tangent).max(axis=(1, 2))
@@ -107,8 +105,7 @@ def assert_tangent_is_derivative(m, strain, old, h, *, flowing):
 @pytest.mark.parametrize(("size", "flowing"), [(0.3, 0.1), (3.0, 0.1), (100.0, 0.99)])
 def test_tangent_is_the_derivative_of_the_stress(m, size, flowing, rng):
     """Any history, any increment, also far beyond what a solver takes."""
-    strain, old = random_path(m, rng)
-    strain = strain + size * YIELD_STRAIN * rng.normal(size=strain.shape)
+    strain, old = random_increment(m, rng, size)
     assert_tangent_is_derivative(m, strain, old, (1e-3 if size > 10 else 1e-5) * YIELD_STRAIN, flowing=flowing)
 
 
@@ -150,8 +147,7 @@ def test_pressure_alone_never_yields(m):
 @pytest.mark.parametrize("size", [1.0, 100.0])
 def test_stress_returns_to_the_yield_surface(m, size, rng):
     """Flowing points have exactly the current yield stress, the others less."""
-    strain, old = random_path(m, rng)
-    strain = strain + size * YIELD_STRAIN * rng.normal(size=strain.shape)
+    strain, old = random_increment(m, rng, size)
     stress, _, new = m.update(strain, old)
     flows = new.peeq > old.peeq
     assert flows.mean() > 0.05
@@ -164,8 +160,8 @@ def test_stress_returns_to_the_yield_surface(m, size, rng):
 @every_material
 def test_flow_is_incompressible_and_peeq_is_its_length(m, rng):
     """trace(eps_p) = 0; PEEQ never decreases and grows by sqrt(2/3) of the length of the plastic increment."""
-    strain, old = random_path(m, rng)
-    _, _, new = m.update(strain + YIELD_STRAIN * rng.normal(size=strain.shape), old)
+    strain, old = random_increment(m, rng)
+    _, _, new = m.update(strain, old)
     scale = np.abs(new.plastic_strain).max()
     assert np.abs(new.plastic_strain[:, :3].sum(axis=1)).max() < 8 * ROUND_OFF * scale
     flow, grown = new.plastic_strain - old.plastic_strain, new.peeq - old.peeq
@@ -214,8 +210,7 @@ def test_below_yield_the_material_is_elastic(m, rng):
 @every_material
 def test_return_map_is_a_pure_function(m, rng):
     """Neither strain nor old state change, and the same input gives the same output."""
-    strain, old = random_path(m, rng)
-    strain = strain + YIELD_STRAIN * rng.normal(size=strain.shape)
+    strain, old = random_increment(m, rng)
     kept = strain.copy(), old.plastic_strain.copy(), old.peeq.copy()
     results = [(stress, C, new.plastic_strain) for stress, C, new in (m.update(strain, old) for _ in range(2))]
     for now, then in ((kept, (strain, old.plastic_strain, old.peeq)), results):
@@ -228,8 +223,7 @@ def test_return_map_is_a_pure_function(m, rng):
 def test_the_kernel_of_linear_hardening_is_the_return_map_of_any(name, size, rng):
     """Closed form in C and Newton's method in numpy: the same stress, tangent and history."""
     m = J2Material(E, NU, "strain", HARDENINGS[name])
-    strain, old = random_path(m, rng)
-    strain = strain + size * YIELD_STRAIN * rng.normal(size=strain.shape)
+    strain, old = random_increment(m, rng, size)
     (stress, tangent, new), found = m.update(strain, old), return_map(strain, old, m, m.hardening)
     assert (new.peeq > old.peeq).mean() > 0.05
     np.testing.assert_array_equal(found[2].peeq > old.peeq, new.peeq > old.peeq)
@@ -271,8 +265,7 @@ def _in_pascal(hardening):
 @every_material
 def test_units_do_not_matter(m, rng):
     """E, yield stress and hardening in Pa instead of MPa: the same strains, stresses times 1e6."""
-    strain, old = random_path(m, rng)
-    strain = strain + YIELD_STRAIN * rng.normal(size=strain.shape)
+    strain, old = random_increment(m, rng)
     in_pascal = replace(m, E=1e6 * m.E, hardening=_in_pascal(m.hardening))
     stress, tangent, new = m.update(strain, old)
     stress_pa, tangent_pa, new_pa = in_pascal.update(strain, old)
