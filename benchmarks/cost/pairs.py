@@ -41,13 +41,13 @@ def command(ranks: int, arguments: Sequence[str], change: str = "") -> tuple[str
 
 
 def timed(
-    one: tuple[str, ...], other: tuple[str, ...], pairs: int, said: Callable[[str], None] = lambda text: None
+    one: Sequence[str], other: Sequence[str], pairs: int, said: Callable[[str], None] = lambda text: None
 ) -> tuple[list[Run], list[Run]]:
     """The ``pairs`` runs of either command, in turn, after one of the first that is not counted; ``said`` follows each.
     Raises `RuntimeError` if one failed."""
     with tempfile.TemporaryDirectory() as place:
         processes = [
-            Process(side, Path(place) / str(k), limit=_A_DAY, clear=(_OUTPUT,), kind="warm")
+            Process(tuple(side), Path(place) / str(k), limit=_A_DAY, clear=(_OUTPUT,), kind="warm")
             for k, side in enumerate((one, other))
         ]
         found = time_all(processes, pairs, lambda process, repeat, text: said(f"pair {repeat} of {pairs}: {text}"))
@@ -99,9 +99,9 @@ def strategy_table(only: str, pairs: int, said: Callable[[str], None]) -> Table:
     with tempfile.TemporaryDirectory() as place:
         for name, ranks, strategy, arguments in strategy_cases(Path(place)):
             if matches(only, name, strategy):
-                said(f"{name}, {ranks} ranks, without {strategy}")
-                sides = (command(ranks, arguments, change) for change in ("pass", WITHOUT[strategy]))
-                runs = timed(*sides, pairs, said)
+                said(f"{name}, on {ranks}, without {strategy}")
+                kept, left = (command(ranks, arguments, change) for change in ("pass", WITHOUT[strategy]))
+                runs = timed(kept, left, pairs, said)
                 seconds = (f"{median(run.seconds for run in side):.2f}" for side in runs)
                 table.add(
                     name, ranks, strategy, *seconds, *(f"{saved(*runs, what):.0%}" for what in ("seconds", "cpu"))
@@ -129,8 +129,8 @@ def main() -> int:
     if options.what == "strategies":
         table = strategy_table(options.only, options.pairs, said)
     else:
-        sides = (command(ranks, ("sweep", str(options.file.resolve()))) for ranks in (1, options.ranks))
-        table = sweep_table(*timed(*sides, options.pairs, said), options.ranks)
+        alone, together = (command(ranks, ("sweep", str(options.file.resolve()))) for ranks in (1, options.ranks))
+        table = sweep_table(*timed(alone, together, options.pairs, said), options.ranks)
     print(table.markdown(), end="")
     return 0
 

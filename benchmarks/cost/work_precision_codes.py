@@ -104,8 +104,10 @@ def _task(case: JointCase, code: str, series: str, size: float, folder: Path) ->
     """The task, without a command, in a folder of its own, which is made."""
     place = (folder / slug(f"{case.name} {code} {series} {size:g} R")).resolve()
     place.mkdir(parents=True, exist_ok=True)
-    names = {"case": case.name, "code": code, "series": series}
-    return Task((), place, core=last_core(), kind=tuple(names.values()), size=size, steps=case.steps, **names)
+    kind = (code, case.name, series)
+    return Task(
+        (), place, core=last_core(), kind=kind, case=case.name, code=code, series=series, size=size, steps=case.steps
+    )
 
 
 def _archord_task(case: JointCase, series: Series, mesh: Mesh, folder: Path, limit: float) -> Task:
