@@ -1,6 +1,5 @@
 """archord sweep as a user runs it, in this process: what is solved, what is not solved again, what the tables say."""
 
-import shutil
 from pathlib import Path
 
 import h5py
@@ -111,48 +110,40 @@ def test_identical_cases_are_solved_once(tmp_path, capsys):
     assert len(list((tmp_path / "out" / "cases").iterdir())) == 1
 
 
-def test_a_failure_stops_nobody_else(tmp_path, capsys):
-    """A case that finds no equilibrium, and one that raises: noted, exit code 3, and left alone until --retry."""
-    file = written(
-        tmp_path, f"[[list]]\nload.steps = 1\n[[list]]\n{STUCK}[[list]]\npin.E = 1.0\n[[list]]\npin.nu = 0.2\n"
-    )
-    runs = [case.run for case in read_sweep(file).cases]
-    taken = tmp_path / "out" / "cases" / runs[2]
-    assert sweep(file, "-o", tmp_path / "out", "--array", "4/4", "-q") in (0, 3)  # makes the folder
-    if taken.exists():
-        shutil.rmtree(taken)
-    taken.write_text("a file where the run folder belongs")
-    capsys.readouterr()
-    assert sweep(file, "-o", tmp_path / "out") == 3
-    out, err = capsys.readouterr()
-    assert "2 done, 1 stopped, 1 failed" in out
-    assert f"archord: case 2, {runs[1]}: stopped: " in err
-    ends = table(tmp_path / "out" / "cases.csv")
-    assert [end["status"] for end in ends][:2] == ["done", "stopped"]
-    assert "no equilibrium" in ends[1]["message"]
-    assert ends[3]["status"] == "done"
-    before = times(tmp_path / "out")
-    assert sweep(file, "-o", tmp_path / "out", "-q") == 3
-    assert times(tmp_path / "out") == before
-    taken.unlink()
-    assert sweep(file, "-o", tmp_path / "out", "-q", "--retry") == 3
-    assert [end["status"] for end in table(tmp_path / "out" / "cases.csv")] == ["done", "stopped", "done", "done"]
-
-
-def test_an_error_is_kept_with_its_traceback(tmp_path, monkeypatch, capsys):
-    """What nobody foresaw is the case's own: failure.txt has it, the table its sentence, and a retry removes it."""
+def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
+    """A case that finds no equilibrium, and one with an error that nobody foresaw: noted, exit code 3, and left alone
+    until --retry. The error's traceback is in failure.txt, its sentence in the table, and a retry removes it."""
     break_mesh(monkeypatch, "two\nlines", below=0.75)
-    file = written(tmp_path, "[grid]\npin.E = [0.5, 1.0, 1.82]\n")
-    assert sweep(file, "-o", tmp_path / "out") == 3
-    assert "2 done, 1 failed" in capsys.readouterr().out
-    end = table(tmp_path / "out" / "cases.csv")[0]
-    assert (end["status"], end["message"], end["P [E* R]"]) == ("failed", "ValueError: two lines", "")
-    run_folder = tmp_path / "out" / "cases" / end["run"]
-    assert "in broken" in (run_folder / "failure.txt").read_text()
+    text = f"[[list]]\nload.steps = 1\n[[list]]\n{STUCK}[[list]]\npin.E = 0.5\n[[list]]\npin.nu = 0.2\n"
+    file, out = written(tmp_path, text), tmp_path / "out"
+    runs = [case.run for case in read_sweep(file).cases]
+    assert sweep(file, "-o", out) == 3
+    said, err = capsys.readouterr()
+    assert "2 done, 1 stopped, 1 failed" in said
+    assert f"archord: case 2, {runs[1]}: stopped: " in err
+    ends = table(out / "cases.csv")
+    assert [end["status"] for end in ends] == ["done", "stopped", "failed", "done"]
+    assert "no equilibrium" in ends[1]["message"]
+    assert (ends[2]["message"], ends[2]["P [E* R]"]) == ("ValueError: two lines", "")
+    failure = out / "cases" / runs[2] / "failure.txt"
+    assert "in broken" in failure.read_text()
+    before = times(out)
+    assert sweep(file, "-o", out, "-q") == 3
+    assert times(out) == before
     monkeypatch.undo()
-    assert sweep(file, "-o", tmp_path / "out", "--retry", "-q") == 0
-    assert result_of(run_folder).status == "done"
-    assert not (run_folder / "failure.txt").exists()
+    assert sweep(file, "-o", out, "-q", "--retry") == 3
+    assert [end["status"] for end in table(out / "cases.csv")] == ["done", "stopped", "done", "done"]
+    assert result_of(failure.parent).status == "done"
+    assert not failure.exists()
+
+
+def test_a_file_in_a_case_s_place_is_its_failure(tmp_path, capsys):
+    file, out = written(tmp_path, "[grid]\npin.E = [0.5, 1.0]\n"), tmp_path / "out"
+    assert sweep(file, "-o", out, "--array", "1/2", "-q") == 0
+    (missing,) = {case.run for case in read_sweep(file).cases} - {path.name for path in (out / "cases").iterdir()}
+    (out / "cases" / missing).write_text("a file where the run folder belongs")
+    assert sweep(file, "-o", out) == 3
+    assert "1 failed" in capsys.readouterr().out
 
 
 def test_an_array_solves_the_whole(tmp_path, solved):
