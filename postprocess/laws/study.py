@@ -212,9 +212,9 @@ def _suffice(cases: Cases, needed: int, what: str) -> None:
 
 
 def _bounds(cases: Cases, kind: Kind) -> dict[str, Any]:
-    names = {name: name for name in ("nu", "pin_nu", "modulus_ratio", "alpha", "clearance", "strength", "s")}
-    names["modulus_ratio"] = "ratio"
-    return {"plane": kind[0], "yielding": kind[1]} | {name: _span(cases[column]) for name, column in names.items()}
+    names = ("nu", "pin_nu", "ratio", "alpha", "clearance", "strength", "s")
+    spans = {"modulus_ratio" if name == "ratio" else name: _span(cases[name]) for name in names}
+    return {"plane": kind[0], "yielding": kind[1]} | spans
 
 
 def _span(values: Iterable[float]) -> list[float | None]:
