@@ -21,7 +21,8 @@ class Material(Protocol):
     """A constitutive law in the plane; every method is a pure function. What it does not define is that of a material
     without history, to inherit.
 
-    One that ``yields`` can leave its elastic tangent; a body that cannot is assembled once.
+    One that ``yields`` can leave its isotropic `elastic_tangent`, by yielding or otherwise; a body that cannot is
+    assembled once, from that tangent alone.
     """
 
     yields: ClassVar[bool] = False

@@ -88,6 +88,22 @@ class _PlasticBody:
         self.yielding = cells[:0]  # cells that had a point off its elastic tangent at the last update
 
 
+def _check_elastic_tangent(material: Material) -> None:
+    """Raise ValueError for what would be assembled wrongly: an anisotropic elastic tangent, or a response that is not
+    that tangent's though the material does not yield."""
+    C = material.elastic_tangent
+    if not np.allclose(C, [[C[0, 0], C[0, 1], 0], [C[0, 1], C[0, 0], 0], [0, 0, C[2, 2]]], rtol=1e-12, atol=0):
+        raise ValueError(
+            "elastic_tangent of a material must be isotropic; an anisotropic one says yields = True, has an isotropic "
+            "elastic_tangent beside its own, and gives its own from update"
+        )
+    strain = 1e-3 * np.array([[3.0, -1.0, 2.0], [-20.0, 5.0, 10.0]])
+    if not material.yields and not np.allclose(
+        material.update(strain, material.state(2))[0][:, [0, 1, 3]], strain @ C, rtol=1e-9, atol=0
+    ):
+        raise ValueError("a material whose update is not its elastic_tangent's must say yields = True")
+
+
 class Bulk:
     """Internal forces of all bodies in the displacement space ``V`` (blocked, two components): those of the cells that
     ``tags`` give the tags of ``materials``."""
@@ -95,6 +111,8 @@ class Bulk:
     def __init__(self, V: fem.FunctionSpace, tags: MeshTags, materials: Mapping[int, Material]) -> None:
         self.V = V
         self.materials = materials
+        for material in materials.values():
+            _check_elastic_tangent(material)
         self.degree = V.element.basix_element.degree
         rule = bulk_quadrature_degree(self.degree)
         n_owned = V.mesh.topology.index_map(2).size_local
@@ -218,7 +236,7 @@ class Bulk:
         for data in self._plastic.values():
             w, points = data.weight.ravel(), data.points
             stored += float(w @ points.material.energy(data.stress))
-            dissipated += float(w @ points.material.dissipation(points.trial))
+            dissipated += float(w @ np.broadcast_to(points.material.dissipation(points.trial), w.shape))
         if self.stiffness is not None:
             x, force = self.stiffness.createVecs()
             x.array[:] = u[: x.local_size // 2].ravel()

@@ -21,6 +21,7 @@ from archord.geometry.fenicsx import create_vector
 from archord.materials.points import Points
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
+from archord.solver.contact.law import LAWS
 from archord.solver.control import FactorControl, ForceControl
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.linear.choose import choose
@@ -80,7 +81,8 @@ class Equilibrium:
     def _facts(self) -> Facts:
         """What the choice of linear strategies depends on."""
         problem = self.problem
-        frictionless = bool(problem.interactions) and all(i.law == "frictionless" for i in problem.interactions)
+        laws = [i.law for i in problem.interactions]
+        frictionless = bool(laws) and all(law in ("frictionless", LAWS["frictionless"]) for law in laws)
         return Facts(
             self.comm,
             2 * self.V.dofmap.index_map.size_global,

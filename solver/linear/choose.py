@@ -18,6 +18,7 @@ RULES = {
     "substructured": substructured.why_not,
     "lagged": lagged.why_not,
 }
+WHOLE = ("substructured",)  # those that factorise the whole matrix, in the place of MUMPS
 LEFT_OUT: set[str] = set()  # strategies to do without; benchmarks and tests set it
 
 
@@ -43,7 +44,7 @@ class Choice:
     def words(self) -> dict[str, str | dict[str, str]]:
         """The choice for run.json: ``strategy`` names what is used, ``not_used`` has the reasons."""
         used = [name for name, reason in self.why_not.items() if reason is None]
-        if "condensed" not in used and "substructured" not in used:
+        if not {"condensed", *WHOLE} & {*used}:
             used.append("direct")
         return {"strategy": " + ".join(used), "not_used": {n: r for n, r in self.why_not.items() if r is not None}}
 
@@ -53,5 +54,5 @@ def choose(facts: Facts) -> Choice:
     reasons = {name: rule(facts) for name, rule in RULES.items()}
     reasons |= {name: "left out on request" for name in LEFT_OUT & reasons.keys()}
     if reasons["condensed"] is None:
-        reasons |= {name: "the system is condensed" for name in ("substructured", "lagged")}
+        reasons |= {name: "the system is condensed" for name in (*WHOLE, "lagged")}
     return Choice(reasons)

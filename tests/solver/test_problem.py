@@ -103,12 +103,30 @@ def test_a_guess_moves_bodies_rigidly():
     assert not state[:-1].reshape(-1, 2)[y < -0.01].any()
 
 
+class Grained(Elastic):
+    """Twice as stiff upright."""
+
+    @property
+    def elastic_tangent(self):
+        return super().elastic_tangent * np.array([1.0, 2.0, 1.0])
+
+
+class Stiffening(Elastic):
+    """Nonlinear, though it says no word of it."""
+
+    def update(self, strain, state):
+        stress, tangent, state = super().update(strain, state)
+        return stress * (1 + 100 * np.abs(stress).max() / E), tangent, state
+
+
 REFUSED = {
     "different names": {"bodies": [Body("lower", ELASTIC), Body("lower", ELASTIC, "upper")]},
     "no facet set 'top'": {"supports": [Support("base", "top", 1)]},
     "no cell set 'middle'": {"bodies": [Body("middle", ELASTIC)]},
     "'left' belongs to 2 cell sets": {"interactions": [Interaction("joint", ("left", "lower top"))]},
     'use "factor"': {"control": "force", "loads": [Load("lower", (0.0, -1.0))]},
+    "must be isotropic": {"bodies": [Body("lower", Grained(E, NU, "strain"))]},
+    "must say yields": {"bodies": [Body("lower", Stiffening(E, NU, "strain"))]},
 }
 
 
