@@ -34,7 +34,8 @@ class StepFile:
     """
 
     def __init__(self, path: Path, fixed: Arrays, names: list[str], *, after: int = 0, apart: bool = False) -> None:
-        self.path, self.loads, self._apart = path, [], apart
+        self.path, self._apart = path, apart
+        self.loads: list[float] = []
         earlier = list(self._earlier(fixed, names, after)) if after else []
         self._file = _in_memory()
         self._file["accepted"] = 0

@@ -182,11 +182,6 @@ class RigidSurface:
         """As those of a `Surface`: there are none."""
         return np.arange(len(facets)), facets
 
-    @cached_property
-    def _arc_length(self) -> Array:
-        """From the start of the curve to all points, and to the end of each facet ``(n_facets, q + 1)``."""
-        return self.curve.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
-
     def curve_displacement(self, u: Array) -> Array:
         """The displacement of the disc ``(1, 2)``, whatever that of the bodies."""
         return self.motion
