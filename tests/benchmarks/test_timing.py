@@ -88,12 +88,6 @@ def test_what_was_timed_before_an_interruption_is_kept(tmp_path):
         time_all(processes, 3, interrupted(("a", 0)))
 
 
-def test_the_middle_run_has_the_median_time(tmp_path):
-    timing = Timing(named(tmp_path), [Run(s, 0.0, 0, None) for s in (3.0, 1.0, 2.0, 9.0)])
-    assert timing.median == 2.5
-    assert timing.middle.seconds == 2.0
-
-
 def test_a_pair_is_two_sweeps_that_were_solved(tmp_path):
     """Both ranks work: no less processor time than alone for the same cases."""
     said = []
@@ -133,8 +127,11 @@ def test_what_a_strategy_takes_off_is_that_of_the_pair_in_the_middle(tmp_path):
 
 
 def test_the_table_ends_with_the_medians():
+    """Of an even number, the mean of the two in the middle, of which the faster is shown."""
     alone = [Run(s, cpu, 0, None) for s, cpu in ((20.0, 19.0), (30.0, 20.0), (22.0, 18.0))]
     together = [Run(s, cpu, 0, None) for s, cpu in ((10.0, 21.0), (20.0, 22.0), (11.5, 20.0))]
+    middle = Timing(named(Path()), [*alone, Run(90.0, 0.0, 0, None)])
+    assert (middle.median, middle.middle.seconds) == (26.0, 22.0)
     found = sweep_table(alone, together, 2)
     assert found.headings[2] == "2 ranks [s]"
     assert found.rows[-1] == ["median", "22.0", "11.5", "1.91", "19.0", "21.0"]

@@ -37,12 +37,11 @@ def done(folder: Path) -> set[str]:
 
 def until_cases_are_done(process: subprocess.Popen, number: int) -> None:
     """Wait until the process has reported so many cases; fails if it ends before."""
-    assert process.stdout is not None
     for line in process.stdout:
         number -= " done, " in line
         if not number:
             return
-    raise AssertionError(process.stderr.read() if process.stderr else "")
+    raise AssertionError(process.stderr.read())
 
 
 def test_a_killed_sweep_goes_on_where_it_was(whole, tmp_path):
@@ -116,11 +115,9 @@ def test_the_reader_of_the_progress_may_leave(tmp_path):
     """``archord sweep ... | head -1`` solves all cases."""
     file = written(tmp_path, "[grid]\npin.E = [0.5, 0.7, 1.0, 1.82]\n")
     process = started(file, tmp_path / "out")
-    assert process.stdout is not None
     process.stdout.readline()
     process.stdout.close()
-    process.wait(60)
-    assert process.returncode == 0
+    assert process.wait(60) == 0
     assert len(done(tmp_path / "out")) == len(read_sweep(file).distinct) == 4
     assert {row["status"] for row in table(tmp_path / "out" / "cases.csv")} == {"done"}
 
@@ -130,11 +127,11 @@ def test_the_job_script_calls_what_exists(tmp_path):
     root = Path(__file__).parents[2]
     script, file = root / "docs" / "cluster" / "sweep.sbatch", written(tmp_path, TEXT)
     command = ["bash", str(script), file, "-o", str(tmp_path / "out")]
-    plain = subprocess.run([*command, "--dry-run"], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
-    assert plain.returncode == 0, plain.stderr
-    assert plain.stdout.startswith("12 cases; ")
-    task = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_COUNT": "12", "TMPDIR": str(tmp_path)}
-    part = subprocess.run([*command, "-q"], cwd=tmp_path, env=task, capture_output=True, text=True)
-    assert part.returncode == 0, part.stderr
+    task = {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_COUNT": "12", "TMPDIR": str(tmp_path)}
+    for option, environment, said in (("--dry-run", {}, "12 cases; "), ("-q", task, "")):
+        environment = ENVIRONMENT | environment
+        result = subprocess.run([*command, option], cwd=tmp_path, env=environment, capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr
+        assert result.stdout.startswith(said)
     assert len(done(tmp_path / "out")) == 1
     assert not list(tmp_path.glob("archord.*"))  # its scratch is gone
