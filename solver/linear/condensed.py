@@ -8,7 +8,7 @@ contact forces, and ``E`` that puts them in their places. By the formula of Wood
 a system as small as the contact. ``Z`` is found once, for all places that may get a force.
 
 Which points are closed is asked again after each solve: those whose pressure, linearised, would change its sign with
-the increment found open or close, and the small system is solved anew. That is Newton's method for generalised
+the increment found open or close, and the small system is solved again. That is Newton's method for generalised
 equations (Josephy 1979): what is left to its iterations is what is smooth, so that their number does not grow with that
 of the points at the contact's edge.
 """
