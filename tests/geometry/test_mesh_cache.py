@@ -1,4 +1,4 @@
-"""Kept meshes: the same to the last bit as those just made, on any number of ranks, told apart by all that shapes them."""
+"""Kept meshes: the same to the last bit as new ones, on any number of ranks, told apart by all that shapes them."""
 
 import numpy as np
 import pytest
