@@ -12,7 +12,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from archord.report.version import VERSION
+
+__version__ = VERSION
 
 if TYPE_CHECKING:
     from archord.api import load, load_scene, solve

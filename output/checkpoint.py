@@ -18,10 +18,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-import archord
 from archord.geometry.basis import Array
 from archord.output.disk import replace_file
 from archord.presets.measures import Measures, Work
+from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.solver.load_path import Position
 from archord.solver.mesh_order import Arrays, MeshOrder
@@ -47,7 +47,7 @@ class Checkpoint:
     fields: dict[str, Array]
     history: dict[str, Arrays]
     scalars: dict[str, Any] = field(default_factory=dict)
-    version: str = archord.__version__
+    version: str = VERSION
 
 
 @dataclass
@@ -171,8 +171,7 @@ def read(path: Path) -> Checkpoint:
         raise InputError(f"{path}: is damaged or no checkpoint, so that the run cannot be continued.")
     if int(line[1]) > FORMAT:
         raise InputError(
-            f"{path}: has format {int(line[1])}, of a newer archord; this one ({archord.__version__}) reads up to "
-            f"{FORMAT}."
+            f"{path}: has format {int(line[1])}, of a newer archord; this one ({VERSION}) reads up to {FORMAT}."
         )
     body = content[_HEADER:]
     padding = content[line.end() : _HEADER]

@@ -19,11 +19,11 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-import archord
 from archord.output.disk import replace_file
 from archord.presets.joint import Joint
 from archord.presets.joint_report import APART, mesh_facts, model_facts, rough_arcs
 from archord.presets.measures import Measures, energy_balance
+from archord.report.version import VERSION
 from archord.solver.stepping import Step
 from archord.solver.timer import BEFORE_SOLVING
 
@@ -176,7 +176,7 @@ def _finite(value: Any) -> Any:
 
 def _versions() -> dict[str, str]:
     return {
-        "archord": archord.__version__,
+        "archord": VERSION,
         "dolfinx": dolfinx.__version__,
         "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
         "mpi": MPI.Get_library_version().split(",")[0].strip(),

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-import archord
+from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.scene.faults import shortened
 from archord.scene.file import ALTERNATIVES, parse_scene, put, read_targets, resolved
@@ -189,7 +189,7 @@ def same_quantity(key: str) -> list[str]:
 
 def run_name(scene: Scene) -> str:
     """Twelve hexadecimal digits that stand for the resolved scene and the version of archord."""
-    return hashlib.sha256(f"archord {archord.__version__}\n{resolved(scene)}".encode()).hexdigest()[:12]
+    return hashlib.sha256(f"archord {VERSION}\n{resolved(scene)}".encode()).hexdigest()[:12]
 
 
 def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:

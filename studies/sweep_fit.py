@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import archord
 from archord.output.user_file import check_target, writing
 from archord.postprocess.convergence import Refined, group
 from archord.postprocess.curve import RunCurve, read_run
@@ -29,6 +28,7 @@ from archord.postprocess.laws.study import (
     table_of,
     usable,
 )
+from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.studies.cases import Case, read_sweep
 from archord.studies.tables import of_case, result_of
@@ -139,7 +139,7 @@ def _solved(
         raise InputError(f"{folder}: holds no case that can be fitted{f' ({said})' if said else ''}.")
     meshes = sorted({f"{case['mesh']:.3g}" for case in fitted})
     notes = {
-        "archord": archord.__version__,
+        "archord": VERSION,
         "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
         "distinct cases": str(len(distinct)),
         "mesh": f"elements of {' and '.join(meshes)} R on the arcs",
