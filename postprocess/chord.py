@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from archord.materials.material import Array
 from archord.postprocess.run import Run
+from archord.presets.arc import SYMMETRY
 from archord.scene.errors import InputError
 
 
@@ -51,7 +52,7 @@ class ChordPressure:
     @property
     def resultant(self) -> float:
         """Force per unit thickness of the whole joint, both halves."""
-        return 2 * float(self.weight @ self.py)
+        return SYMMETRY * float(self.weight @ self.py)
 
 
 def chord_coordinate(phi: ArrayLike, eps: float, R: float) -> Array:
