@@ -35,7 +35,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     """
     scene.require_mesh()
     g, analysis, by_force = scene.joint, scene.analysis, scene.force_controlled
-    ring, rigid = g.model == "ring", scene.pin.rigid
+    ring, rigid = g.is_ring, scene.pin.rigid
     solids = {"pin": scene.pin.solid, "block": scene.block}
     supports = [Support("axis", "symmetry", 0), *(Support("block", "block held", axis) for axis in (0, 1))]
     if not rigid and not ring:

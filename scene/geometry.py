@@ -62,7 +62,7 @@ class JointGeometry(Section):
         if (self.clearance is None) == (self.relative_clearance is None):
             raise ValueError("clearance|" + one_of("relative_clearance", self.clearance))
         name = "clearance" if self.relative_clearance is None else "relative_clearance"
-        if self.model == "block" and not 1e-6 <= self.dR / self.radius <= 0.5:
+        if not self.is_ring and not 1e-6 <= self.dR / self.radius <= 0.5:
             raise ValueError(f"{name}|must be a clearance: between 1e-6 and 0.5 times the radius")
         if not 1e-6 <= abs(self.dR) / self.radius <= 0.5:
             raise ValueError(f"{name}|must be between 1e-6 and 0.5 times the radius, or minus that")
@@ -73,7 +73,7 @@ class JointGeometry(Section):
             raise ValueError(f"{name}|must be between 1e-4 and 0.5 times the radius")
         if not 1e-4 <= self.size_ratio * self.h / self.radius <= 0.5:
             raise ValueError("size_ratio|must leave the pin's elements between 1e-4 and 0.5 times the radius")
-        if self.edge_angle is not None and self.model == "ring":
+        if self.edge_angle is not None and self.is_ring:
             raise ValueError("edge_angle|is only for the model block")
         if self.edge_angle is not None and self.edge_ratio * self.h / self.radius < 1e-4:
             raise ValueError("edge_ratio|must leave elements of at least 1e-4 times the radius")
@@ -102,14 +102,19 @@ class JointGeometry(Section):
         return self.arc_end * (ring(-1, 1.0) + ring(1, width - 1)) / (math.sqrt(3) / 4)
 
     @property
+    def is_ring(self) -> bool:
+        """Whether the hole's body is a ring under opposite forces, without supports, instead of a held block."""
+        return self.model == "ring"
+
+    @property
     def arc_end(self) -> float:
         """Angle [rad] from the contact axis to which the arcs are modelled: a quarter of a circle, in a ring half."""
-        return math.pi if self.model == "ring" else math.pi / 2
+        return math.pi if self.is_ring else math.pi / 2
 
     @property
     def pin_depth(self) -> float:
         """How far below the hole's centre that of the pin lies at first: they touch, in a ring they are concentric."""
-        return 0.0 if self.model == "ring" else self.dR
+        return 0.0 if self.is_ring else self.dR
 
     @property
     def dR(self) -> float:

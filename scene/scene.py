@@ -91,9 +91,9 @@ class Scene(Section):
         if self.pin.E is not None and not _SOFTEST <= self.pin.E / self.block.E <= 1 / _SOFTEST:
             raise ValueError("pin.E|must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
         name = f"load.{self.load.name}"
-        if self.joint.model == "ring" and not self.force_controlled:
+        if self.joint.is_ring and not self.force_controlled:
             raise ValueError(f'{name}|does not load a joint whose model is "ring"; give force or relative_force')
-        if self.joint.model == "ring" and self.pin.rigid:
+        if self.joint.is_ring and self.pin.rigid:
             raise ValueError('pin.rigid|must be false where joint.model is "ring"')
         largest = max(map(abs, self.targets))
         if self.force_controlled and not largest <= 0.5 * self.E_star * self.joint.radius:
