@@ -200,7 +200,7 @@ class SweepProgress(_Bar):
         self._spent = self._cost_spent = 0.0
         self._done = sum(result.status == "done" for result in ended)
         self._failed = len(ended) - self._done
-        self._running = self._made = self._reused = 0
+        self._running = 0
         if ended and not silent:
             say(f"{len(ended)} of {self._total} cases are there already")
 
@@ -214,8 +214,6 @@ class SweepProgress(_Bar):
         self._done += result.status == "done"
         self._failed += result.status in ("stopped", "failed")
         self.results.append(result)
-        self._made += result.meshes
-        self._reused += result.reused
         cost = self._cost.get(result.run, 0.0)
         self._left = max(0.0, self._left - cost) if len(self.results) < len(self._cost) else 0.0
         self._spent += result.seconds
@@ -236,8 +234,3 @@ class SweepProgress(_Bar):
             left = self._left * self._spent / self._cost_spent / self.workers
             told += f", about {left:.0f} s left" if left < 100 else f", about {left / 60:.0f} min left"
         return told
-
-    @property
-    def meshes(self) -> str:
-        """A sentence about the meshes that were shared."""
-        return f"{self._made} mesh{'' if self._made == 1 else 'es'} made, {self._reused} used again"

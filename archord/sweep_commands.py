@@ -85,8 +85,6 @@ def sweep(
         with SweepProgress(jobs, ended, farm.workers, begun, silent=not show) as progress:
             received = farm.run(jobs, progress.ended, progress.running)
         results = progress.results
-        if show:
-            say(progress.meshes)
 
     def concluded() -> int:
         tables = gather(design, folder, results)

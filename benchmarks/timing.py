@@ -163,7 +163,7 @@ def main(arguments: list[str]) -> int:
         os.sched_setaffinity(0, {int(core)})
     with open("stdout.txt", "w") as out, open("stderr.txt", "w") as err:
         start = perf_counter()
-        environment = os.environ | dict.fromkeys(THREADS, "1")
+        environment = os.environ | dict.fromkeys(THREADS, "1") | {"ARCHORD_KEEP_MESHES": "0"}  # each makes its own
         process = subprocess.Popen(command, stdout=out, stderr=err, env=environment, start_new_session=True)
         late, ended = threading.Event(), False
 

@@ -17,7 +17,7 @@ from dolfinx.mesh import create_mesh, meshtags, meshtags_from_entities
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.mesh_cache import MESHES
+from archord.geometry.mesh_cache import kept_mesh
 from archord.geometry.partition import sector_partitioner
 from archord.geometry.plane_mesh import PlaneMesh
 from archord.geometry.tagged_mesh import TaggedMesh
@@ -58,13 +58,13 @@ def gmsh_to_mesh(
     ``adjust(x, tag)`` moves the nodes ``x`` ``(n, 2)`` of the physical curve ``tag``; without it, second-order edges
     are straight. The mesh is scaled by ``scale`` at the end. An error on rank 0 is raised on every rank. Its sets
     have the names of gmsh's physical groups. ``partitioner`` replaces `sector_partitioner`.
-    ``key`` says all that enters ``build`` and ``adjust``; a mesh that `MESHES` keeps by the same key is used again.
+    ``key`` says all that enters ``build`` and ``adjust``; `kept_mesh` gives the same mesh again.
     """
     made, failure = PlaneMesh.empty(order), None
     if comm.rank == 0:
         drawn = build, adjust, order, refinements
         try:
-            made = MESHES.get((*key, order, refinements), lambda: _made(*drawn)) if key else _made(*drawn)
+            made = kept_mesh((*key, order, refinements), lambda: _made(*drawn)) if key else _made(*drawn)
         except Exception as error:  # raised on all ranks below
             failure = f"gmsh could not mesh the problem: {error}"
     failure = comm.bcast(failure)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import basix
 import numpy as np
@@ -49,6 +51,18 @@ class PlaneMesh:
         kept = used[numbers]
         nodes[number[numbers[kept]]] = x.reshape(-1, 3)[kept, :2]
         return cls(nodes, number[cells], bodies, number[edges], tags, _named_groups(gmsh, 2), _named_groups(gmsh, 1))
+
+    def save(self, path: Path) -> None:
+        """Write the mesh to the .npz file ``path``."""
+        names = json.dumps([self.cell_sets, self.facet_sets])
+        np.savez(path, self.x, self.cells, self.bodies, self.edges, self.tags, np.array(names))
+
+    @classmethod
+    def load(cls, path: Path) -> PlaneMesh:
+        """The mesh that `save` wrote. Raises OSError or ValueError."""
+        with np.load(path) as file:
+            *arrays, names = (file[f"arr_{i}"] for i in range(6))
+        return cls(*arrays, *json.loads(str(names)))
 
     def second_order(self) -> PlaneMesh:
         """This mesh of straight triangles with nodes on the middles of their edges, behind the others."""

@@ -48,7 +48,7 @@ def _loaded(source: Path, libraries: tuple[str, ...]) -> tuple[cffi.FFI, Any]:
     compiler = shlex.split(os.environ.get("CC", "cc"))
     header = source.with_suffix(".h").read_text(encoding="utf-8")
     key = "\0".join([*compiler, *_FLAGS, platform.machine(), header]).encode() + source.read_bytes()
-    path = _cache() / f"{source.stem}-{hashlib.sha256(key).hexdigest()[:16]}.so"
+    path = cache_folder() / f"{source.stem}-{hashlib.sha256(key).hexdigest()[:16]}.so"
     if not path.exists():
         _compile([*compiler, *_FLAGS], source, path, libraries)
     ffi = cffi.FFI()
@@ -61,7 +61,8 @@ def pointer(array: npt.NDArray[Any]) -> Any:
     return _ffi.from_buffer(_TYPES[array.dtype], array)
 
 
-def _cache() -> Path:
+def cache_folder() -> Path:
+    """The user's folder for what is made once and used again; a temporary one where that cannot be written."""
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "archord"
     try:
         folder.mkdir(parents=True, exist_ok=True)

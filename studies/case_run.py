@@ -15,7 +15,6 @@ from typing import Any
 
 from mpi4py import MPI
 
-from archord.geometry.mesh_cache import MESHES
 from archord.output.disk import replace_file
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed, arrived_before
@@ -34,7 +33,7 @@ def solve_case(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[]
 
     ``received`` tells a signal that came while no run took it.
     """
-    begun, made, reused = time.perf_counter(), MESHES.made, MESHES.reused
+    begun = time.perf_counter()
     if comm.size > 1:
         gc.disable()  # destructors of PETSc and dolfinx are collective: all ranks collect at one place, below
     try:
@@ -46,8 +45,6 @@ def solve_case(scene: Scene, folder: Path, comm: MPI.Comm, received: Callable[[]
         found,
         seconds=time.perf_counter() - begun,
         steps=result_of(folder).steps if comm.rank == 0 else 0,
-        meshes=MESHES.made - made,
-        reused=MESHES.reused - reused,
     )
 
 

@@ -17,14 +17,12 @@ from typing import Any, cast
 
 from mpi4py import MPI
 
-from archord.geometry.mesh_cache import MESHES
 from archord.output.ranks import arrived_before
 from archord.solver.interrupt import Interrupt
 from archord.studies.case_run import solve_case
 from archord.studies.sweep import Job
 from archord.studies.tables import Result
 
-_MESHES_KEPT = 4
 _LONG_ENOUGH = 0.5  # over the longest case that waits, for one that suits better
 _BACKOFF = 0.005  # seconds between two looks of idle ranks and of the manager
 
@@ -49,7 +47,6 @@ class Farm:
         iteration. Collective.
         """
         global _here
-        MESHES.capacity = _MESHES_KEPT
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc would end the batch where its reader has seen enough
         gc.collect()
         gc.freeze()  # what the imports made need not be searched after every case
@@ -64,8 +61,6 @@ class Farm:
             finally:
                 _here = None
                 gc.unfreeze()
-                MESHES.capacity = 0
-                MESHES.forget()
             arrived_before(self.comm)  # asleep: those that are done leave their cores to the others
             return max(self.comm.allgather(interrupt.received))
 

@@ -33,7 +33,7 @@ class Result:
     """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be written), "failed"
     (an error), "interrupted", "busy" (another process solves it) or "open" (not solved to its end).
 
-    ``seconds``, ``meshes`` made and meshes ``reused`` are those of this process.
+    ``seconds`` are those of this process.
     """
 
     run: str
@@ -42,8 +42,6 @@ class Result:
     seconds: float = 0.0
     steps: int = 0
     signal: int = 0
-    meshes: int = 0
-    reused: int = 0
 
     @property
     def ended(self) -> bool:

@@ -16,7 +16,6 @@ from archord.benchmarks.cost.work_precision_cases import CASES, meshes
 from archord.benchmarks.cost.work_precision_codes import CALCULIX, Task, Values
 from archord.benchmarks.cost.work_precision_reference import Reference, profile_error, read_reference
 from archord.benchmarks.timing import Timing
-from archord.geometry.mesh_cache import MESHES
 from archord.postprocess.convergence import Limit, extrapolated
 
 Pairs = list[tuple[float, float]]
@@ -132,21 +131,16 @@ def warm_seconds(repeats: int, curves: Sequence[Case] = ()) -> dict[str, list[fl
     """Seconds of each of the ``curves``, or of `warm_curves`, within this process, ``repeats`` times in turn, after one
     solve of each that is not counted: what calibrations and parameter studies pay.
 
-    Meshes are kept, as in a sweep. Raises RuntimeError if one does not get to its end.
+    Raises RuntimeError if one does not get to its end.
     """
     curves = curves or warm_curves()
     found: dict[str, list[float]] = {case.name: [] for case in curves}
-    MESHES.capacity = 4 * len(curves)
-    try:
-        for repeat in range(repeats + 1):
-            for case in curves:
-                with tempfile.TemporaryDirectory() as folder:
-                    start = perf_counter()
-                    case.solve(Path(folder))
-                    seconds = perf_counter() - start
-                if repeat:
-                    found[case.name].append(seconds)
-    finally:
-        MESHES.capacity = 0
-        MESHES.forget()
+    for repeat in range(repeats + 1):
+        for case in curves:
+            with tempfile.TemporaryDirectory() as folder:
+                start = perf_counter()
+                case.solve(Path(folder))
+                seconds = perf_counter() - start
+            if repeat:
+                found[case.name].append(seconds)
     return found

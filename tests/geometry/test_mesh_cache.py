@@ -1,11 +1,12 @@
 """Kept meshes: the same to the last bit as new ones, on any number of ranks, told apart by all that shapes them."""
 
+import os
+
 import numpy as np
 import pytest
 
-from archord.geometry import mesh_cache
+from archord.geometry import fenicsx, mesh_cache
 from archord.geometry.half_ring import half_ring
-from archord.geometry.mesh_cache import MeshCache
 from archord.geometry.quarter_joint import quarter_joint
 from archord.geometry.tagged_mesh import TaggedMesh
 
@@ -14,11 +15,12 @@ RING = {"radius": 2.0, "clearance": 0.02, "outer_radius": 20.0, "element_size": 
 
 
 @pytest.fixture
-def meshes(monkeypatch) -> MeshCache:
-    """A cache of its own for a test, with room for two."""
-    cache = MeshCache(2)
-    monkeypatch.setattr("archord.geometry.fenicsx.MESHES", cache)
-    return cache
+def made(monkeypatch, tmp_path) -> list[tuple]:
+    """A cache of its own for a test; what gmsh made on this rank."""
+    made, make = [], fenicsx._made
+    monkeypatch.setattr(mesh_cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(fenicsx, "_made", lambda *drawn: made.append(drawn) or make(*drawn))
+    return made
 
 
 def content(model: TaggedMesh) -> list[np.ndarray]:
@@ -28,29 +30,29 @@ def content(model: TaggedMesh) -> list[np.ndarray]:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("make", "sizes"), [(quarter_joint, QUARTER), (half_ring, RING)])
+@pytest.mark.parametrize(("mesh", "sizes"), [(quarter_joint, QUARTER), (half_ring, RING)])
 @pytest.mark.parametrize("degree", [2, 3])
-def test_a_kept_mesh_is_the_one_made_anew(comm, meshes, make, sizes, degree):
-    """Every array of it, twice over, as dolfinx may have worked in what it was given; on rank 0 gmsh ran once. Nothing
-    is kept unless asked."""
-    assert mesh_cache.MESHES.capacity == meshes.made == 0
-    meshes.capacity = 0
-    anew = content(make(comm, **sizes, degree=degree))
-    assert (meshes.made, meshes.reused) == (0, 0)
-    meshes.capacity = 2
+def test_a_kept_mesh_is_the_one_that_was_made(comm, made, monkeypatch, mesh, sizes, degree):
+    """Every array and name of it; on rank 0 gmsh ran once, and each time where no mesh is to be kept."""
+    monkeypatch.setenv("ARCHORD_KEEP_MESHES", "0")
+    first = mesh(comm, **sizes, degree=degree)
+    mesh(comm, **sizes, degree=degree)
+    assert len(made) == (2 if comm.rank == 0 else 0)
+    monkeypatch.delenv("ARCHORD_KEEP_MESHES")
     for _ in range(3):
-        for a, b in zip(anew, content(make(comm, **sizes, degree=degree)), strict=True):
+        kept = mesh(comm, **sizes, degree=degree)
+        assert (kept.cell_sets, kept.facet_sets) == (first.cell_sets, first.facet_sets)
+        for a, b in zip(content(first), content(kept), strict=True):
             assert (a == b).all()
-    assert (meshes.made, meshes.reused) == ((1, 2) if comm.rank == 0 else (0, 0))
+    assert len(made) == (3 if comm.rank == 0 else 0)
 
 
-def test_the_size_of_a_joint_does_not_matter_but_all_its_ratios_do(comm, meshes):
+def test_the_size_of_a_joint_does_not_matter_but_all_its_ratios_do(comm, made):
     """In other units it is the same mesh; any other shape or size of elements is another."""
-    meshes.capacity = 100
     first = quarter_joint(comm, **QUARTER).mesh.geometry.x
     twice = quarter_joint(comm, **{k: 2 * v if k != "growth" else v for k, v in QUARTER.items()}).mesh.geometry.x
     assert (twice == 2 * first).all()
-    assert (meshes.made, meshes.reused) == (1, 1)
+    assert len(made) == 1
     for key in ("clearance", "block_size", "element_size", "growth"):
         quarter_joint(comm, **(QUARTER | {key: 1.1 * QUARTER[key]}))
     for options in (
@@ -63,14 +65,38 @@ def test_the_size_of_a_joint_does_not_matter_but_all_its_ratios_do(comm, meshes)
         quarter_joint(comm, **QUARTER, **options)
     for key in RING:
         half_ring(comm, **(RING | {key: 1.1 * RING[key]}))
-    assert (meshes.made, meshes.reused) == (16, 1)
+    assert len(made) == 16
 
 
-def test_the_mesh_not_used_for_longest_is_forgotten(comm, meshes):
+def test_the_mesh_not_used_for_longest_is_forgotten(comm, made, monkeypatch, tmp_path):
+    monkeypatch.setattr(mesh_cache, "_MOST", 2)
     sizes = [QUARTER | {"element_size": size} for size in (0.6, 0.7, 0.8)]
-    made = []
-    for number in (0, 1, 0, 2, 0, 1):
-        before = meshes.made
+    gmsh_ran = []
+    for time, number in enumerate((0, 1, 0, 2, 0, 1)):
+        before = {path: path.stat().st_mtime for path in tmp_path.glob("meshes/*")}
+        calls = len(made)
         quarter_joint(comm, **sizes[number])
-        made.append(meshes.made > before)
-    assert made == [True, True, False, True, False, True]
+        gmsh_ran.append(len(made) > calls)
+        for path in tmp_path.glob("meshes/*"):  # a clock that tells these calls apart
+            if path.stat().st_mtime != before.get(path):
+                os.utime(path, (time, time))
+    assert gmsh_ran == [True, True, False, True, False, True]
+
+
+@pytest.mark.parametrize(
+    "spoil", [lambda path: path.write_bytes(b"x"), lambda path: path.write_bytes(path.read_bytes()[:300])]
+)
+def test_a_file_that_is_no_mesh_is_made_again(comm, made, tmp_path, spoil):
+    first = content(quarter_joint(comm, **QUARTER))
+    (path,) = tmp_path.glob("meshes/*.npz")
+    spoil(path)
+    for a, b in zip(first, content(quarter_joint(comm, **QUARTER)), strict=True):
+        assert (a == b).all()
+    assert len(made) == 2
+
+
+def test_a_folder_that_cannot_be_written_keeps_nothing(comm, made, tmp_path):
+    (tmp_path / "meshes").write_text("a file in its place")
+    for _ in range(2):
+        quarter_joint(comm, **QUARTER)
+    assert len(made) == 2

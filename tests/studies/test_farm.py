@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from archord.benchmarks.case import Case
-from archord.geometry.mesh_cache import MESHES
 from archord.output.history import read_history
 from archord.output.ranks import agreed
 from archord.studies.case_run import solve_case
@@ -44,8 +43,6 @@ def test_each_job_is_solved_once_by_somebody(comm, tmp_path):
     assert sorted(result.run for result in results) == sorted(job.folder.name for job in jobs)
     assert {result.status for result in results} == {"done"}
     assert results[-1].run != jobs[-1].folder.name  # the longest does not end last
-    assert sum(result.meshes for result in results) <= comm.size
-    assert sum(result.meshes + result.reused for result in results) == len(jobs)
     for job in jobs:
         assert report_of(job.folder)["ranks"] == 1
     a, b = alone_and_in(jobs[0], folder)
@@ -108,18 +105,6 @@ def test_failures_do_not_stop_a_farm(comm, tmp_path, monkeypatch):
         by_run = {result.run: result for result in results}
         assert [by_run[job.folder.name].status for job in jobs] == 3 * ["failed"] + 3 * ["done"]
         assert [result_of(job.folder).message for job in jobs] == 3 * ["ValueError: broken"] + 3 * [""]
-
-
-def test_a_farm_keeps_meshes_only_while_it_works(comm, tmp_path):
-    _, jobs = jobs_of(comm, tmp_path, "[grid]\npin.E = [0.5, 1.0]\n")
-    results = []
-    Farm(comm).run(jobs, results.append)
-    assert [(result.meshes, result.reused) for result in results] == [(1, 0), (0, 1)]
-    results.clear()
-    jobs = [Job(job.scene, job.folder.with_name(job.folder.name + "x"), job.cost) for job in jobs[:1]]
-    Farm(comm).run(jobs, results.append)
-    assert (results[0].meshes, results[0].reused) == (1, 0)
-    assert MESHES.capacity == 0
 
 
 def test_a_case_with_an_accuracy_gets_its_meshes_again_after_a_kill_between_two(comm, tmp_path):
