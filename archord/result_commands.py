@@ -10,64 +10,30 @@ import click
 from archord.options import SCENE, argument, file, flag, output, overrides, pictures
 from archord.scene.errors import InputError
 
-_MOST_FITS = 200  # runs of a sweep; an elastic fit takes some milliseconds
-_MOST_FITS = 200  # runs of a sweep; an elastic fit takes some milliseconds
-
 if TYPE_CHECKING:
     from archord.postprocess.deck import Elements
-    from archord.postprocess.run import Run
-    from archord.postprocess.sweep import Sweep
 
 
 @click.command()
 @argument("folder", "RUN|SWEEP", "folder of a run or of a sweep")
-@output("folder for the pictures [the run's]", metavar="DIR")
-@pictures("pictures")
+@output("picture to draw [picture.png in the folder]")
+@pictures("the picture")
 def show(folder: Path, output: Path | None, pictures: bool) -> int:
-    """Print a run's joint, state, history, peaks, cost and warnings, or a sweep's cases; and draw them.
-
-    The pictures of a run are force.png, pressure.png, field.png and iterations.png.
-    """
+    """Print a run's joint, state, history, peaks, cost and warnings, or a sweep's cases; and draw them."""
     from archord.output.folder import is_sweep
-
-    if is_sweep(folder):
-        from archord.postprocess.sweep import Sweep
-
-        return _show_sweep(Sweep(folder), output or folder, pictures)
+    from archord.postprocess.pictures import draw_run, draw_sweep
     from archord.postprocess.run import Run
+    from archord.postprocess.sweep import Sweep
+    from archord.postprocess.tables import run_text, sweep_text
 
-    return _show_run(Run(folder), output or folder, pictures)
-
-
-def _show_run(run: Run, target: Path, pictures: bool) -> int:
-    from archord.postprocess.tables import run_text
-
-    lines = ["no picture: no step was accepted."]
-    if pictures and run.steps:
-        from archord.postprocess.pictures import draw_run
-
-        files, left_out = draw_run(run, target)
-        lines = [*left_out, *map(str, files)]
-    print(run_text(run))
-    if pictures:
-        print("", *lines, sep="\n")
-    return 0
-
-
-def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
-    from archord.postprocess.laws.calibration import winkler_coefficients
-    from archord.postprocess.tables import sweep_text
-
-    lines = ["no picture: no case has an accepted step."]
-    if pictures and sweep.runs:
-        from archord.postprocess.pictures import draw_sweep
-
-        file, left_out = draw_sweep(sweep, target / "sweep.png")
-        lines = [*([left_out] if left_out else []), str(file)]
-    runs = sweep.runs.values() if len(sweep.runs) <= _MOST_FITS else ()
-    print(sweep_text(sweep, winkler_coefficients(run.curve for run in runs)))
-    if pictures:
-        print("", *lines, sep="\n")
+    target = output or folder / "picture.png"
+    if is_sweep(folder):
+        sweep = Sweep(folder)
+        text, drawn = sweep_text(sweep), draw_sweep(sweep, target) if pictures and sweep.runs else None
+    else:
+        run = Run(folder)
+        text, drawn = run_text(run), draw_run(run, target) if pictures and run.steps else None
+    print(text, *([f"\n{drawn}"] if drawn else []), sep="\n")
     return 0
 
 
@@ -78,21 +44,19 @@ def _show_sweep(sweep: Sweep, target: Path, pictures: bool) -> int:
 def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
     """Compare runs with the first: P, p0 and eps at common displacements, scenes, cost; and draw them.
 
-    Where R, dR or E* differ, they are compared in dimensionless form, too.
+    Where units, R, dR or E* differ, they are compared in dimensionless form.
     """
     from archord.postprocess.comparison import compare_runs
     from archord.postprocess.run import Run
-    from archord.postprocess.tables import comparison_text
+    from archord.postprocess.tables import comparison_text, names_of
 
     comparison = compare_runs([Run(folder) for folder in folders])
+    text = comparison_text(comparison)
     if pictures:
-        from archord.postprocess.pictures import draw_comparison
+        from archord.postprocess.pictures import draw_runs
 
-        draw_comparison(comparison.runs, comparison.names, output, absolute=bool(comparison.absolute),
-                        dimensionless=bool(comparison.dimensionless))  # fmt: skip
-    print(comparison_text(comparison))
-    if pictures:
-        print(f"\n{output}")
+        text += f"\n\n{draw_runs(comparison.runs, names_of(comparison.runs), output)}"
+    print(text)
     return 0
 
 
@@ -111,27 +75,16 @@ def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, f
     if vtk is None and csv is None:
         raise InputError("export: give --vtk DIR, --csv DIR or both.")
     run = Run(folder)
-    files: list[Path] = []
-    left_out: list[str] = []
     if vtk is not None:
         from archord.postprocess.export import export_vtk
 
-        files += export_vtk(run, vtk, step, force=force)
+        collection, *files = export_vtk(run, vtk, step, force=force)
+        print(f"{collection}\n{len(files)} .vtu files beside it, {files[0].name} to {files[-1].name}")
     if csv is not None:
         from archord.postprocess.export import export_csv
 
-        tables, left_out = export_csv(run, csv, step, force=force)
-        files += tables
-    for line in (*left_out, *_shortened(files)):
-        print(line)
+        print(*export_csv(run, csv, step, force=force), sep="\n")
     return 0
-
-
-def _shortened(files: list[Path]) -> list[str]:
-    """The first files and how many there are, if they are many."""
-    few = [str(file) for file in files if file.suffix != ".vtu"]
-    vtu = [file for file in files if file.suffix == ".vtu"]
-    return few + ([f"{len(vtu)} .vtu files beside it, {vtu[0].name} to {vtu[-1].name}"] if vtu else [])
 
 
 @click.command()
@@ -139,9 +92,10 @@ def _shortened(files: list[Path]) -> list[str]:
 @output("file to draw [RUN/picture.png]")
 def picture(folder: Path, output: Path | None) -> int:
     """Draw a run: plastic zone, contact pressure, P(delta)."""
-    from archord.postprocess.pictures import draw
+    from archord.postprocess.pictures import draw_run
+    from archord.postprocess.run import Run
 
-    print(draw(folder, output))
+    print(draw_run(Run(folder), output or folder / "picture.png"))
     return 0
 
 
@@ -163,8 +117,8 @@ def export_deck(scene: Path, output: Path | None, elements: Elements, overrides:
     from archord.scene.file import files_read, load_scene
 
     checked = load_scene(scene, overrides)
-    if checked.joint.model != "block":
-        raise InputError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
+    if checked.joint.is_ring:
+        raise InputError(f'{scene}: joint.model = "ring" cannot be exported; only "block" can.')
     path = output or Path(f"{scene.stem}.inp")
     check_target(path, files_read(scene, overrides), force=force)
     write_deck(checked, path, elements)

@@ -93,14 +93,10 @@ def read_columns(path: Path) -> Columns:
     """The columns of the history.csv ``path`` by name without unit. Raises `InputError` if it is none."""
     try:
         columns = read_history(path)
-        present = [columns[name] for name in _NEEDED if name in columns]
-        finite = np.isfinite(present).all()
-        if finite and len(present) < len(_NEEDED):
-            raise KeyError("columns")
+        if not np.isfinite([columns[name] for name in _NEEDED]).all():
+            raise ValueError("numbers that are not finite")
     except (ValueError, IndexError, KeyError, OSError):
         raise InputError(f"{path}: cannot be read as the history of a run.") from None
-    if not finite:
-        raise InputError(f"{path}: holds numbers that are not finite.")
     return columns
 
 

@@ -17,7 +17,6 @@ import numpy as np
 
 from archord.output.step_file import step_name
 from archord.output.user_file import check_output, make_folder, writing
-from archord.postprocess.arc import SIDES, undeformed
 from archord.postprocess.fields import Fields
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
@@ -28,9 +27,9 @@ if TYPE_CHECKING:
 _DATA_OF_ARC = ("pressure", "raw_pressure", "gap", "angle", "s")
 
 
-def export_csv(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> tuple[list[Path], list[str]]:
-    """Write history.csv, contact.csv (all steps) and nodes and cells of ``step`` (the last) into ``folder``, which is
-    made if need be; the files, and a sentence for what is left out. Columns are headed ``name [unit]``.
+def export_csv(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> list[Path]:
+    """Write history.csv, contact.csv (all steps) and, of a run with fields, nodes and cells of ``step`` (the last) into
+    ``folder``, which is made if need be; returns the files. Columns are headed ``name [unit]``.
 
     Raises `InputError` if the run has no such step, a file of it is damaged, or one that would be written is there
     already and ``force`` is not given.
@@ -39,29 +38,26 @@ def export_csv(run: Run, folder: Path, step: int | None = None, *, force: bool =
 
     number = run.number(step)
     tables = {"history.csv": run.history, "contact.csv": _contact_of_all_steps(run)}
-    left_out = []
     if run.scene.output.fields:
         fields = run.fields(number)
         tables[f"nodes_{step_name(number)}.csv"] = node_frame(fields, run.scene)
         tables[f"cells_{step_name(number)}.csv"] = cell_frame(fields, run.scene)
-    else:
-        left_out.append("no nodes and cells: the run was solved with output.fields = false.")
     files = [folder / name for name in tables]
     _check_new(files, folder, force)
     for file, table in zip(files, tables.values(), strict=True):
         with writing(file):
             with_headings(table).to_csv(file, index=False, float_format="%.12g", lineterminator="\n")
-    return files, left_out
+    return files
 
 
 def _contact_of_all_steps(run: Run) -> pd.DataFrame:
     """The contact with step and delta before it."""
     import pandas as pd
 
-    parts = [run.pressure(n).assign(step=n, delta=run.columns["delta"][n - 1]) for n in range(1, run.steps + 1)]
-    table = pd.concat(parts, ignore_index=True)
-    table.attrs["units"] = parts[0].attrs["units"] | {"delta": run.scene.units.length}
-    return table[["step", "delta", *table.columns[:-2]]]
+    parts = {(n, delta): run.pressure(n) for n, delta in enumerate(run.columns["delta"], 1)}
+    table = pd.concat(parts, names=["step", "delta"]).reset_index(level=[0, 1])
+    table.attrs["units"] = run.pressure().attrs["units"] | {"delta": run.scene.units.length}
+    return table
 
 
 def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> list[Path]:
@@ -107,26 +103,15 @@ def _bodies(fields: Fields) -> dict:
 def _contact(run: Run, step: int) -> dict:
     """The integration points of the arcs, joined by lines within each facet, and their data; ``side`` is 1 on the pin
     and 2 on the hole."""
-    arcs = run.contact(step)
-    points = {side: undeformed(arc, side, run.scene) for side, arc in arcs.items()}
-    lines, start = [], 0
-    for arc in arcs.values():
-        numbers = start + np.arange(arc.angle.size).reshape(arc.angle.shape)
-        lines.append(np.stack([numbers[:, :-1], numbers[:, 1:]], axis=-1).reshape(-1, 2))
-        start += arc.angle.size
-    moved = [arc.coordinates - points[side] for side, arc in arcs.items()]
-    data = {name: np.concatenate([getattr(arc, name).ravel() for arc in arcs.values()]) for name in _DATA_OF_ARC}
-    sides = [np.full(arc.angle.size, SIDES.index(side) + 1, dtype=np.int8) for side, arc in arcs.items()]
+    table = run.pressure(step)
+    facet, side = table["facet"].to_numpy(), (table["side"] == "hole").to_numpy(np.int8) + 1
+    first = np.flatnonzero((np.diff(facet) == 0) & (np.diff(side) == 0))
+    data = {name: table[name].to_numpy() for name in _DATA_OF_ARC}
     return {
-        "points": _flat(list(points.values())),
-        "cells": [("line", np.concatenate(lines))],
-        "point_data": {"displacement": _flat(moved), "side": np.concatenate(sides), **data},
+        "points": np.pad(table[["x", "y"]], ((0, 0), (0, 1))),
+        "cells": [("line", np.stack([first, first + 1], axis=1))],
+        "point_data": {"displacement": np.pad(table[["ux", "uy"]], ((0, 0), (0, 1))), "side": side, **data},
     }
-
-
-def _flat(parts: Sequence[np.ndarray]) -> np.ndarray:
-    """Points ``(n, 3)`` of all sides."""
-    return np.pad(np.concatenate([values.reshape(-1, 2) for values in parts]), ((0, 0), (0, 1)))
 
 
 def _check_new(files: Sequence[Path], folder: Path, force: bool) -> None:

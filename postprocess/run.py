@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+_KNOWN = {"status", "message", "warnings", "versions", "seconds", "totals", "steps"}  # keys of a run.json
+_WHOLE = ("step", "iterations", "cutbacks")  # columns of whole numbers
+
+
 class Run:
     """The run in ``folder``, as it was when this was made; a run that still goes on is loaded again to see more.
 
@@ -41,8 +45,7 @@ class Run:
         self.columns: Columns = read_columns(self.folder / "history.csv")
         self.scene: Scene = load_scene(self.folder / "scene.toml")
         self.summary: dict[str, Any] = _read_report(self.folder / "run.json")
-        self.status, self.message = str(self.summary["status"]), str(self.summary["message"])
-        self.warnings: list[str] = list(self.summary["warnings"])
+        self.status, self.message, self.warnings = (self.summary[key] for key in ("status", "message", "warnings"))
         self.steps = len(self.columns["step"])
 
     def __repr__(self) -> str:
@@ -53,9 +56,10 @@ class Run:
     @cached_property
     def history(self) -> pd.DataFrame:
         """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of every column."""
-        from archord.postprocess.frames import history_frame
+        from archord.postprocess.frames import read_frame
 
-        return history_frame(self.folder / "history.csv", self.columns)
+        table = read_frame(self.folder / "history.csv").head(self.steps)
+        return table.astype(dict.fromkeys((name for name in table if name not in _WHOLE), float))
 
     @cached_property
     def curve(self) -> RunCurve:
@@ -106,8 +110,8 @@ class Run:
 def _read_report(path: Path) -> dict[str, Any]:
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
-        if not {"status", "message", "warnings", "versions", "seconds", "totals", "steps"} <= report.keys():
-            raise KeyError("keys")
-    except (OSError, ValueError, KeyError, AttributeError):
+        if not report.keys() >= _KNOWN:
+            raise ValueError("keys")
+    except (OSError, ValueError, AttributeError):
         raise InputError(f"{path}: cannot be read as the report of a run.") from None
     return report

@@ -8,49 +8,71 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from archord.postprocess.comparison import Compared, Comparison, differing_keys
-from archord.postprocess.curve import gap_name
+from archord.postprocess.comparison import COMPARED, Comparison, differing_keys
 from archord.postprocess.run import Run
-from archord.postprocess.sweep import Sweep, short
+from archord.postprocess.sweep import Sweep
 from archord.report.table import Table
-from archord.scene.scene import Scene
 from archord.scene.sections import Pin, Solid
 
-_MOST_STEPS, _MOST_CASES, _MOST_LOADS = 40, 60, 20  # rows of a table
+_MOST = 40  # rows of a table
 _LONGEST = 40  # characters of a value
-_ROUND_OFF = 1e-12
+_PARTS = 5  # parts of a run's time that are told
+_LAST = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "steps", "iterations", "cutbacks", "seconds")
+# what `comparison_text` says of each run
+_OF_A_RUN = {
+    "status": lambda run: run.status,
+    "steps": lambda run: f"{run.steps} of {len(run.scene.targets)}",
+    "dofs": lambda run: run.summary.get("mesh", {}).get("dofs", "-"),
+    "ranks": lambda run: run.summary.get("ranks", "-"),
+    "iterations": lambda run: run.summary["totals"].get("newton_iterations", "-"),
+    "seconds": lambda run: f"{run.summary['seconds'].get('total', math.nan):.1f}",
+    "archord": lambda run: run.summary["versions"].get("archord", "-"),
+}
 
 
 def run_text(run: Run) -> str:
     """State, joint, history, peaks, cost and warnings of a run."""
-    said = {"running": "running, or killed (if no archord works there, --restart continues it)"}
-    state = f"{run.folder}: {said.get(run.status, run.status)}; {run.steps} of {len(run.scene.targets)} steps"
+    words = {"running": "running, or killed (if no archord works there, --restart continues it)"}
+    state = f"{run.folder}: {words.get(run.status, run.status)}; {run.steps} of {len(run.scene.targets)} steps"
     parts = [f"{state}: {run.message}" if run.message else state, _named(_joint(run))]
     if run.steps:
-        parts += [f"{_history(run)}{_cut(_MOST_STEPS, run.steps, 'steps', run.folder / 'history.csv')}"]
-        parts += [_named({"largest": _peaks(run)})]
-    return "\n\n".join(map(str, (*parts, _named(_cost(run)))))
+        parts += [
+            _thinned(_history(run), run.folder / "history.csv"),
+            _named([("largest", peak) for peak in _peaks(run)]),
+        ]
+    return "\n\n".join([*parts, _named(_cost(run))])
 
 
-def sweep_text(sweep: Sweep, k: dict[str, float]) -> str:
-    """Cases of a sweep by status, what was varied, where they ended, and why some did not; ``k`` is Winkler's
-    coefficient by the name of the run, of those that have one."""
-    cases = f"{len(sweep)} case{'s' if len(sweep) != 1 else ''}"
-    lines = [f"{sweep.folder}: {cases}: {sweep.states}"]
-    if same := [f"{h} = {sweep.rows[0][h] or '-'}" for h in sweep.varied if h not in sweep.moving]:
+def sweep_text(sweep: Sweep) -> str:
+    """Cases of a sweep by status, what was varied, where they ended, and why some did not."""
+    lines = [f"{sweep.folder}: {len(sweep)} case{'s' if len(sweep) != 1 else ''}: {sweep.states}"]
+    cases, units = sweep.cases, sweep.cases.attrs["units"]
+    if same := [f"{key} = {_cell(cases[key].iloc[0])}" for key in sweep.keys if key not in sweep.moving]:
         lines += [f"in all cases: {', '.join(same)}"]
-    table = f"{_cases(sweep, k)}{_cut(_MOST_CASES, len(sweep), 'cases', sweep.folder / 'cases.csv')}"
-    lines += ["", table, *(f"case {row['case']}: {row['message']}" for row in sweep.rows if row["message"])]
-    return "\n".join((*lines, *(f"case {case}: {fault}" for case, fault in sweep.unreadable.items())))
+    names = ["case", "run", *sweep.moving, "status", *(name for name in _LAST if name in cases)]
+    table = Table(*(f"{name} [{units[name]}]" if name in units else name for name in names))
+    for row in cases[names].itertuples(index=False):
+        table.add(*map(_cell, row))
+    lines += ["", _thinned(table, sweep.folder / "cases.csv")]
+    said = zip(cases["case"], cases["message"], strict=True)
+    return "\n".join([*lines, *(f"case {case}: {message}" for case, message in said if message)])
 
 
 def comparison_text(comparison: Comparison) -> str:
     """Each quantity of all runs at common loads, the keys in which the scenes differ, and what the runs cost."""
-    parts = [f"{_quantity(compared, comparison.names)}" for compared in comparison.compared]
-    names, rows = comparison.names, differing_keys([run.scene for run in comparison.runs])
+    names = names_of(comparison.runs)
+    parts = [_thinned(_differences(comparison, name, names), "history.csv") for name in COMPARED]
+    rows = differing_keys([run.scene for run in comparison.runs])
     keys = ([key, *(_shortened(value) or "-" for value in values)] for key, values in rows.items())
     scenes = Table("key", *names, rows=keys, left=1 + len(names)) if rows else "scenes: the same in every key"
-    return "\n\n".join(map(str, (*parts, "\n".join(_notes(comparison)), scenes, _runs(comparison))))
+    runs = Table("", *names, rows=([n, *map(get, comparison.runs)] for n, get in _OF_A_RUN.items()), left=1)
+    return "\n\n".join(map(str, (*parts, _note(comparison), scenes, runs)))
+
+
+def names_of(runs: Iterable[Run]) -> list[str]:
+    """Names of the runs' folders; their paths where two of the names are the same."""
+    names = [run.folder.resolve().name for run in runs]
+    return names if len(set(names)) == len(names) else [str(run.folder) for run in runs]
 
 
 def first_of_each_kind(warnings: list[str]) -> list[str]:
@@ -61,69 +83,53 @@ def first_of_each_kind(warnings: list[str]) -> list[str]:
     return list(first.values())
 
 
-def _named(lines: dict[str, list[str]]) -> Table:
-    """Names on the left and their lines on the right."""
-    rows = ((name if k == 0 else "", text) for name, texts in lines.items() for k, text in enumerate(texts))
-    return Table("", "", rows=rows, left=2)
+def _named(lines: Iterable[tuple[str, str]]) -> str:
+    """Names on the left, each only once, and their lines on the right."""
+    table, last = Table("", "", left=2), ""
+    for name, text in lines:
+        table.add("" if name == last else name, text)
+        last = name
+    return str(table)
 
 
-def _shown(n: int, most: int) -> list[int]:
-    """Up to ``most`` of ``n`` rows, evenly spaced, first and last included."""
-    return list(range(n)) if n <= most else sorted({round(k * (n - 1) / (most - 1)) for k in range(most)})
+def _thinned(table: Table, whole: object) -> str:
+    """Up to 40 rows of the ``table``, evenly spaced, first and last included, and where the ``whole`` of it is."""
+    n = len(table.rows)
+    if n <= _MOST:
+        return str(table)
+    table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, _MOST)]
+    return f"{table}\n{_MOST} of {n} rows; {whole} has all of them"
 
 
-def _cut(most: int, n: int, what: str, file: object) -> str:
-    """A line below a table that shows ``most`` of ``n`` rows; nothing if it shows all."""
-    return f"\n{most} of {n} {what}; {file} has all of them" if n > most else ""
+def _joint(run: Run) -> Iterable[tuple[str, str]]:
+    scene, mesh, ranks = run.scene, run.summary.get("mesh", {}), run.summary.get("ranks", 1)
+    g, a, length, stress = scene.joint, scene.analysis, scene.units.length, scene.units.stress
+    yield "joint", f"{g.model}, R = {g.radius:g} {length}, dR = {g.dR:g} {length}, dR/R = {g.dR / g.radius:g}"
+    yield "joint", f"plane {a.plane}, contact {a.kinematics}, E* = {scene.E_star:g} {stress}"
+    yield "pin", _body(scene.pin, stress)
+    yield "block", f"{_body(scene.block, stress)}, size {g.W:g} {length}"
+    size = f"{mesh.get('cells', '?')} curved triangles of degree {a.degree}, {mesh.get('dofs', '?')} dofs"
+    yield "mesh", f"{size}, {ranks} rank{'s' if ranks != 1 else ''}"
 
 
-def _number(value: float, largest: float) -> str:
-    """``value`` with six digits; what is round-off beside the ``largest`` of its kind is 0."""
-    return f"{0.0 if abs(value) < _ROUND_OFF * abs(largest) else value:.6g}"
-
-
-def _joint(run: Run) -> dict[str, list[str]]:
-    scene, mesh = run.scene, run.summary.get("mesh", {})
-    g, a, unit = scene.joint, scene.analysis, scene.units
-    facets = " + ".join(f"{n} on the {side}" for side, n in mesh.get("contact_facets", {}).items())
-    ranks = run.summary.get("ranks", 1)
-    return {
-        "joint": [
-            f"{g.model}, R = {g.radius:g} {unit.length}, dR = {g.dR:g} {unit.length}, dR/R = {g.dR / g.radius:g}, "
-            f"{'outer radius' if g.model == 'ring' else 'block'} {g.W:g} {unit.length}",
-            f"plane {a.plane}, contact {a.kinematics}, integrated on {a.integration}, E* = {scene.E_star:g} "
-            f"{unit.stress}",
-        ],
-        "pin": [_body(scene.pin, scene)],
-        "block": [_body(scene.block, scene)],
-        "mesh": [
-            f"{mesh.get('cells', '?')} curved triangles of degree {a.degree}, {mesh.get('dofs', '?')} dofs, "
-            f"contact facets: {facets or '?'}; {ranks} rank{'s' if ranks != 1 else ''}"
-        ],
-    }
-
-
-def _body(body: Pin | Solid, scene: Scene) -> str:
+def _body(body: Pin | Solid, stress: str) -> str:
     if isinstance(body, Pin) and body.rigid:
         return "rigid"
-    unit = scene.units.stress
-    text = f"E = {body.E:g} {unit}, nu = {body.nu:g}"
+    text = f"E = {body.E:g} {stress}, nu = {body.nu:g}"
     if body.yield_stress is None:
         return f"{text}, elastic"
-    hardening = f"hardening {body.hardening:g} {unit}" if body.hardening else "perfectly plastic"
-    return f"{text}, yield stress {body.yield_stress:g} {unit} ({body.yield_stress / scene.E_star:.3g} E*), {hardening}"
+    return f"{text}, yield stress {body.yield_stress:g} {stress}, hardening {body.hardening or 0:g} {stress}"
 
 
 def _history(run: Run) -> Table:
     """The steps: load, force, pressure, angle, plastic strain, cost."""
     unit, h = run.scene.units, run.columns
-    largest = {name: max(map(abs, values)) for name, values in h.items()}
     table = Table("step", f"delta [{unit.length}]", "delta/dR", f"P [{unit.force}]", "P/(E* R)", f"p0 [{unit.stress}]",
                   "p0/E*", "eps [°]", "PEEQ max", "iterations", "cutbacks", "seconds")  # fmt: skip
-    for k in _shown(run.steps, _MOST_STEPS):
+    for k in range(run.steps):
         table.add(
             f"{h['step'][k]:g}",
-            *(_number(h[name][k], largest[name]) for name in ("delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*")),
+            *(f"{h[name][k]:.6g}" for name in ("delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*")),
             f"{math.degrees(h['eps'][k]):.2f}",
             f"{h['peeq_max'][k]:.2e}",
             *(f"{h[name][k]:g}" for name in ("iterations", "cutbacks")),
@@ -132,149 +138,71 @@ def _history(run: Run) -> Table:
     return table
 
 
-def _peaks(run: Run) -> list[str]:
+def _peaks(run: Run) -> Iterable[str]:
     """Largest values over the run, and where it first yielded."""
-    unit, h, scene = run.scene.units, run.columns, run.scene
-    R, dR, E = scene.joint.radius, scene.joint.dR, scene.E_star
-    gap = gap_name(dR)
-
-    def at(k: int) -> str:
-        return f"step {h['step'][k]:g} (delta = {h['delta'][k] / abs(dR):.4g} {gap})"
-
-    (P, p0, eps, peeq), places = zip(*((max(h[n]), int(np.argmax(h[n]))) for n in ("P", "p0", "eps", "peeq_max")),
-                                     strict=True)  # fmt: skip
-    lines = [
-        f"P = {P:.6g} {unit.force} = {P / (E * R):.5g} E* R, {P / (E * abs(dR)):.5g} E* {gap} at {at(places[0])}",
-        f"p0 = {p0:.6g} {unit.stress} = {p0 / E:.5g} E* at {at(places[1])}",
-        f"eps = {math.degrees(eps):.6g}° = {eps:.5g} rad at {at(places[2])}",
-    ]
-    if peeq > 0:
-        first = next(k for k, value in enumerate(h["peeq_max"]) if value > 0)
-        lines.append(f"PEEQ = {peeq:.3g} at {at(places[3])}; first seen at {at(first)}")
-    elif scene.plastic:
-        lines.append("PEEQ = 0: nothing has yielded")
-    return lines
+    unit, h = run.scene.units, run.columns
+    for name, of in {"P": unit.force, "p0": unit.stress, "eps": "rad", "peeq_max": ""}.items():
+        k = int(np.argmax(h[name]))
+        yield f"{name} = {h[name][k]:.6g} {of}".rstrip() + f" at step {h['step'][k]:g}"
+    if any(h["peeq_max"]):
+        yield f"plastic strain first at step {h['step'][np.flatnonzero(h['peeq_max'])[0]]:g}"
 
 
-def _cost(run: Run) -> dict[str, list[str]]:
+def _cost(run: Run) -> Iterable[tuple[str, str]]:
     """Iterations, errors, seconds by part, memory, versions, warnings."""
     report, totals = run.summary, run.summary["totals"]
-    count, cuts = totals.get("newton_iterations", 0), totals.get("cutbacks", 0)
-    solver = [
-        f"{count} Newton iterations ({count / max(1, run.steps):.1f} a step, "
-        f"{max(run.columns['iterations'], default=0):g} at most), {cuts} cutback{'s' if cuts != 1 else ''}, "
-        f"{totals.get('factorisations', 0)} factorisations, {totals.get('residual_evaluations', 0)} residuals"
-    ]
+    counts = [f"{value:g} {name.replace('_', ' ')}" for name, value in totals.items() if isinstance(value, int)]
+    yield "solver", ", ".join(counts)
     known = {name: value for name, value in report.get("error_estimates", {}).items() if value is not None}
     if known:
-        solver.append(", ".join(f"{name.replace('_', ' ')} {value:.1e}" for name, value in known.items()))
+        yield "errors", ", ".join(f"{name.replace('_', ' ')} {value:.1e}" for name, value in known.items())
     seconds = dict(report["seconds"])
-    total = seconds.pop("total", 0.0)
-    parts = sorted(seconds.items(), key=lambda item: -item[1])[:5]
-    cost = [f"{total:.1f} in all: {', '.join(f'{name} {value:.1f}' for name, value in parts)}"]
+    total, parts = seconds.pop("total", 0.0), sorted(seconds.items(), key=lambda item: -item[1])[:_PARTS]
+    yield "seconds", f"{total:.1f} in all: {', '.join(f'{name} {value:.1f}' for name, value in parts)}"
     if memory := report.get("peak_memory"):
-        cost.append(f"{max(memory) / 1e6:.0f} MB of memory at most{' on a rank' if len(memory) > 1 else ''}")
-    shown = first_of_each_kind(run.warnings)
-    warnings = [f"{w}." for w in shown] or ["none"]
-    if len(run.warnings) > len(shown):
-        warnings.append(f"({len(run.warnings)} in all; run.json has them)")
-    made = f"{report.get('started', '?')}; {', '.join(f'{name} {v}' for name, v in report['versions'].items())}"
-    restarts = [f"{r['when']} after step {r['after_step'] - 1}" for r in report.get("restarts", [])]
-    return {"solver": solver, "seconds": cost, "made": [made], "warnings": warnings, "restarts": restarts}
+        yield "memory", f"{max(memory) / 1e6:.0f} MB at most on a rank"
+    yield "made", f"{report.get('started', '?')}; {', '.join(f'{name} {v}' for name, v in report['versions'].items())}"
+    for restart in report.get("restarts", []):
+        yield "restarts", f"{restart['when']} after step {restart['after_step'] - 1}"
+    for warning in first_of_each_kind(run.warnings) or ["none"]:
+        yield "warnings", warning
 
 
-def _cases(sweep: Sweep, k: dict[str, float]) -> Table:
-    """One row a case: varied keys, status, the last step's load, force, pressure, angle and strain, k, and the cost."""
-    wanted = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max")
-    values = [h for name in wanted for h in sweep.headings if h.partition(" [")[0] == name]
-    cost = [name for name in ("steps", "iterations", "cutbacks", "seconds [s]") if name in sweep.headings]
-    titles = [{"eps [rad]": "eps [°]", "peeq_max": "PEEQ max"}.get(h, h) for h in values]
-    headings = ["case", "run", *map(short, sweep.moving), "status", *titles, *(["k"] if k else [])]
-    table = Table(*headings, *(name.split(" [")[0] for name in cost))
-    for n in _shown(len(sweep), _MOST_CASES):
-        row = sweep.rows[n]
-        fitted = [f"{k[row['run']]:.4f}" if row["run"] in k else "-"] if k else []
-        table.add(
-            row["case"], row["run"], *(row[heading] or "-" for heading in sweep.moving), row["status"],
-            *(_last(heading, row[heading]) for heading in values), *fitted, *(_last(name, row[name]) for name in cost),
-        )  # fmt: skip
-    return table
-
-
-def _last(heading: str, text: str) -> str:
-    if not text:
-        return "-"
-    if heading == "eps [rad]":
-        return f"{math.degrees(float(text)):.2f}"
-    return f"{float(text):.3g}" if heading in ("peeq_max", "seconds [s]") else f"{float(text):.6g}"
-
-
-def _quantity(compared: Compared, names: list[str]) -> Table:
+def _differences(comparison: Comparison, quantity: str, names: list[str]) -> Table:
     """One row a load: the quantity of each run, and its relative difference to the first; ~ marks interpolated
-    values. Of many rows some 20, with those of the largest differences."""
-    unit = f" [{compared.unit}]" if compared.unit else ""
+    values."""
     others = [heading for name in names[1:] for heading in (name, "difference")]
-    table = Table(compared.load_name, f"{compared.quantity}{unit}: {names[0]}", *others)
-    relative, largest = compared.relative, np.abs(compared.values).max(initial=0.0)
-    worst = [int(np.nanargmax(sizes)) for sizes in np.abs(relative[1:]) if np.isfinite(sizes).any()]
-    rows = sorted({*_shown(len(compared.load), _MOST_LOADS), *worst})
-    for k in rows:
-        row = [f"{compared.load[k]:.6g}"]
-        for r, value in enumerate(compared.values[:, k]):
-            row.append(("~" if compared.interpolated[r, k] else "") + _number(float(value), largest))
-            row += [_percent(relative[r, k], "+")] if r else []
-        table.add(*row)
-    shown = "" if len(rows) == len(compared.load) else f"{len(rows)} of {len(compared.load)}"
-    table.add(shown, "largest difference", *(cell for size in compared.largest[1:] for cell in ("", _percent(size))))
+    table = Table(comparison.labels["delta"], f"{comparison.labels[quantity]}: {names[0]}", *others)
+    relative, marks = comparison.relative(quantity), np.where(comparison.interpolated, "~", "")
+    for k, load in enumerate(comparison.delta):
+        first, *values = (
+            f"{mark}{v:.6g}" for mark, v in zip(marks[:, k], comparison.values[quantity][:, k], strict=True)
+        )
+        pairs = zip(values, map(_percent, relative[1:, k]), strict=True)
+        table.add(f"{load:.6g}", first, *(cell for pair in pairs for cell in pair))
+    largest = np.abs(np.nan_to_num(relative[1:])).max(axis=1)
+    table.add("", "largest difference", *(cell for size in largest for cell in ("", _percent(size))))
     return table
 
 
-def _percent(relative: float, sign: str = "") -> str:
+def _percent(relative: float) -> str:
     """A relative difference in percent, with three digits; "-" where there is none."""
-    return "-" if np.isnan(relative) else f"{100 * relative:{sign}.3g} %" if relative else "0 %"
+    return "-" if np.isnan(relative) else f"{100 * relative:.3g} %"
 
 
-def _notes(comparison: Comparison) -> Iterable[str]:
-    """What the reader of the tables must know, a sentence each."""
+def _note(comparison: Comparison) -> str:
+    """How the runs were compared."""
     if comparison.step_by_step:
-        yield "compared step by step: all runs went through the same delta/dR."
-    elif any(len(run.curve.first_loading().delta) < run.steps for run in comparison.runs):
-        yield "compared up to the first unloading: the runs went different ways, on which the rest depends."
-    if any(part.interpolated.any() for part in comparison.compared):
-        yield "~: interpolated between steps by a monotone cubic."
-    if not comparison.absolute:
-        units = {f"{run.scene.units.length}, {run.scene.units.stress}" for run in comparison.runs}
-        reason = f"units differ ({'; '.join(sorted(units))})" if len(units) > 1 else "no displacement is common to all"
-        yield f"compared in dimensionless form alone: {reason}."
-    unfinished = [n for n, run in zip(comparison.names, comparison.runs, strict=True) if run.status != "done"]
-    if unfinished:
-        yield f"not finished: {', '.join(unfinished)}."
+        return "compared step by step: all runs went through the same displacements."
+    note = "compared over the first loading of all runs, at displacements of the first"
+    return f"{note}; ~: between steps, by a monotone cubic." if comparison.interpolated.any() else f"{note}."
 
 
-def _runs(comparison: Comparison) -> Table:
-    """State, size, iterations, seconds and versions of every run; of versions those in which they differ."""
-    table = Table("", *comparison.names, left=1)
-    for name, get in _ROWS_OF_RUNS.items():
-        table.add(name, *(get(run) for run in comparison.runs))
-    versions = [run.summary["versions"] for run in comparison.runs]
-    for name in dict.fromkeys(name for one in versions for name in one):
-        values = [str(one.get(name, "-")) for one in versions]
-        if name == "archord" or len(set(values)) > 1:
-            table.add(name, *values)
-    return table
-
-
-_ROWS_OF_RUNS = {
-    "status": lambda run: run.status,
-    "steps": lambda run: f"{run.steps} of {len(run.scene.targets)}",
-    "dofs": lambda run: run.summary.get("mesh", {}).get("dofs", "-"),
-    "ranks": lambda run: run.summary.get("ranks", "-"),
-    "iterations": lambda run: run.summary["totals"].get("newton_iterations", "-"),
-    "cutbacks": lambda run: run.summary["totals"].get("cutbacks", "-"),
-    "seconds": lambda run: f"{run.summary['seconds'].get('total', math.nan):.1f}",
-    "MB per rank": lambda run: f"{max(peak) / 1e6:.0f}" if (peak := run.summary.get("peak_memory")) else "-",
-    "warnings": lambda run: len(run.warnings),
-}
+def _cell(value: object) -> str:
+    """A value of a table; "-" where there is none."""
+    if isinstance(value, float):
+        return "-" if math.isnan(value) else f"{value:.6g}"
+    return str(value)
 
 
 def _shortened(text: str) -> str:

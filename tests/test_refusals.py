@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from archord.postprocess.curve import _NEEDED
 from tests.test_cli import SCENE, archord
 
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
@@ -106,7 +107,7 @@ REPORT = "run/run.json: cannot be read as the report of a run."
         ("history.csv", 0, HISTORY),
         ("history.csv", 30, HISTORY),
         ("history.csv", "step,delta\n1", HISTORY),
-        ("history.csv", "delta,P,p0,eps,peeq_max\n1,nan,1,1,0\n", "run/history.csv: holds numbers that are not "),
+        ("history.csv", f"{','.join(_NEEDED)}\n{','.join(['nan'] * len(_NEEDED))}\n", HISTORY),
         ("scene.toml", 25, "run/scene.toml: is not valid TOML: "),
     ],
 )

@@ -3,7 +3,6 @@ contact pressure, which is measured."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -181,18 +180,3 @@ def fit_plateau(
     flats = np.concatenate(flat)
     c, limits = mean.estimate(0, confidence, error), (float(flats.min()), float(flats.max()))
     return CurveFit("plateau", None, c, mean.r2, mean.dof, tuple(residuals), len(orders), limits, tuple(orders))
-
-
-def winkler_coefficients(runs: Iterable[RunCurve]) -> dict[str, float]:
-    """Winkler's k from P(delta) by the name of the run folder, of runs that have not yielded: the fit of those takes
-    milliseconds."""
-    found = {}
-    for run in runs:
-        if run.scene.joint.model == "block" and run.folder and not run.peeq_max.any():
-            try:
-                k = calibrate([run.loading()]).joint.P.k
-            except InputError:
-                continue
-            if k is not None:
-                found[run.folder.name] = k.value
-    return found

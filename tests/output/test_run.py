@@ -16,7 +16,7 @@ from archord.output.folder import APART, CHECKPOINT, FILES, PICTURES, claim_fold
 from archord.output.history import read_history
 from archord.output.restart import plan_extension
 from archord.output.run import solve_scene
-from archord.postprocess.pictures import draw
+from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, resolved
 from tests.solver.solving import scene
@@ -53,7 +53,7 @@ def test_every_step_tells_what_it_cost(run):
 
 
 def test_a_run_without_fields_is_the_same_but_for_them(tmp_path):
-    """The same curves, byte for byte but for the clock; nothing to draw, in one sentence."""
+    """The same curves, byte for byte but for the clock; none to read, in one sentence."""
     for name, fields in (("with", True), ("without", False)):
         (tmp_path / name).mkdir()
         solve_scene(scene(0.2, 2, output={"fields": fields}), tmp_path / name, MPI.COMM_SELF)
@@ -65,7 +65,7 @@ def test_a_run_without_fields_is_the_same_but_for_them(tmp_path):
     assert there - here == {"fields.xdmf", "fields.h5", "fields"}
     assert not here - there
     with pytest.raises(InputError, match=r"without: has no fields: it was solved with output\.fields = false\."):
-        draw(tmp_path / "without")
+        Run(tmp_path / "without").fields()
 
 
 def test_history_holds_units_and_dimensionless_forms(run):
