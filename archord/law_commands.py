@@ -105,9 +105,8 @@ def law(
     if plot is not None:
         from archord.output.user_file import check_target
         from archord.postprocess.laws.law_report import draw_laws
-        from archord.scene.file import files_read
 
-        check_target(plot, files_read(scene, overrides) if scene else [], force=True)
+        check_target(plot, [scene] if scene else [], force=True)
         print(_warned(draw_laws, chosen, joint, plot, rows, to, outside))
         return 0
     _warned(_print_table, chosen, joint, rows, to, points, outside, units)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -137,17 +136,13 @@ def _estimate(scene: Scene, outcome: Outcome) -> str:
 
 
 @click.command()
-@flag("--schema", "print the JSON schema of scene files")
 @flag("--example", "print a commented example")
 @flag("--reference", "print all keys as Markdown tables")
-def scene(schema: bool, example: bool, reference: bool) -> int:
+def scene(example: bool, reference: bool) -> int:
     """Print what a scene file may hold."""
-    if schema + example + reference != 1:
-        raise click.UsageError("choose one of --schema, --example and --reference")
+    if example == reference:
+        raise click.UsageError("choose one of --example and --reference")
     from archord.scene import reference as pages
 
-    if schema:
-        print(json.dumps(pages.schema(), indent=2))
-    else:
-        print(pages.example() if example else pages.reference(), end="")
+    print(pages.example() if example else pages.reference(), end="")
     return 0

@@ -124,7 +124,7 @@ def group(runs: list[RunCurve]) -> list[Refined]:
 def _without_mesh(scene: Scene) -> tuple:
     """Everything of a scene but its element size and its words."""
     g, analysis = scene.joint, scene.analysis
-    sizes = (g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.target)
+    sizes = (g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.targets[-1])
     rounded = tuple(float(f"{size:.9g}") for size in sizes)
     return (*rounded, tuple(scene.load.leg_steps), tuple(scene.load.legs),
             scene.pin.model_dump_json(), scene.block.model_dump_json(),

@@ -41,7 +41,7 @@ def model_facts(joint: Joint) -> dict[str, Any]:
     return {
         "E_star": scene.E_star,
         "clearance": scene.joint.dR,
-        "target": scene.target,
+        "target": scene.targets[-1],
         "plastic": joint.bulk.plastic,
         "pin": "rigid" if scene.pin.rigid else "deformable",
         "contact_shares": [pair.share for pair in joint.contact.pairs],

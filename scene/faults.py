@@ -7,16 +7,13 @@ import json
 import re
 from typing import Any
 
-from archord.scene.keys import Section, limits, toml_value
+from archord.scene.keys import Section, toml_value
 
 _MOST_SENTENCES = 20
-_SIGNS = {">": "greater than", "≥": "at least", "<": "less than", "≤": "at most"}
-_RULES = {
-    "float_type_or_list": "must be a number or a list of numbers",
-    "int_type_or_list": "must be a whole number or a list of them",
-    "too_short": "must not be empty",
-    "too_long": "must not have more than {max_length} entries",
-    "literal_error": "must be {expected}",
+_PHRASES = {
+    "missing": "is missing",
+    "extra_forbidden": "is not a known key; {hint}{kind} are {known}",
+    "model_type": "must be a section, [{name}]",
     "float_type": "must be a number",
     "int_type": "must be a whole number",
     "bool_type": "must be true or false",
@@ -24,21 +21,22 @@ _RULES = {
     "string_too_short": "must not be empty",
     "string_pattern_mismatch": "must be one line of text",
     "finite_number": "must be a finite number",
-    "missing": "is missing",
-    "model_type": "must be a section, [{name}]",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "literal_error": "must be {expected}",
+    "too_short": "must not be empty",
 }
 
 
 def in_sentences(
     errors: list[Any], data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]
 ) -> str:
-    """The ``errors`` of checking ``data`` against ``model``, a line each; ``origin`` says which keys are not from
+    """The first ``errors`` of checking ``data`` against ``model``, a line each; ``origin`` says which keys are not from
     ``source``, and where they are from."""
-    errors = _meant(errors, data)
-    sentences = [_sentence(error, data, model, source, origin) for error in errors[:_MOST_SENTENCES]]
-    if len(errors) > _MOST_SENTENCES:
-        sentences.append(f"{source}: has {len(errors) - _MOST_SENTENCES} more faults like these.")
-    return "\n".join(sentences)
+    meant = [error for error in errors if _of_given_kind(error["loc"], data)]
+    return "\n".join(_sentence(error, data, model, source, origin) for error in meant[:_MOST_SENTENCES])
 
 
 def shortened(text: str, length: int = 80) -> str:
@@ -46,55 +44,42 @@ def shortened(text: str, length: int = 80) -> str:
     return text if len(text) <= length else f"{text[: length - 20]} ... {text[-15:]}"
 
 
-def _meant(errors: list[Any], data: dict[str, Any]) -> list[Any]:
-    """The errors, less those of the kind that was not given where a key may be one number or a list."""
-    out: dict[tuple, Any] = {}
-    for error in errors:
-        section, key, *rest = [*error["loc"], None, None][: max(2, len(error["loc"]))]
-        if not rest:
-            out[error["loc"]] = error
-            continue
-        listed = isinstance(data[section][key], list)
-        if str(rest[0]).startswith("list") == listed:
-            error = {**error, "loc": (section, key), "entry": rest[1] if len(rest) > 1 else None}
-            if error["type"] in ("float_type", "int_type") and not listed:
-                error["type"] = f"{error['type']}_or_list"
-            out.setdefault((section, key), error)
-    return list(out.values())
+def _of_given_kind(location: tuple, data: dict[str, Any]) -> bool:
+    """Whether a fault in a key that may be one value or a list of them is of the kind that was given."""
+    if len(location) < 3:
+        return True
+    section, key, kind = location[:3]
+    return str(kind).startswith("list") == isinstance(data[section][key], list)
 
 
 def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]) -> str:
-    location, kind, context = [str(part) for part in error["loc"]], error["type"], error.get("ctx", {})
-    said = None
-    if kind == "value_error":
+    place, inner = list(error["loc"][:2]), error["loc"][2:]  # section and key, and where in its value
+    context = dict(error.get("ctx", {}))
+    if error["type"] == "value_error":
         name, said = str(context["error"]).split("|", 1)
-        location += name.split(".")
-    key = ".".join(map(_key_shown, location))
+        place += name.split(".")
+    else:
+        if error["type"] == "extra_forbidden":
+            context |= _known_keys(model, place)
+        said = _PHRASES.get(error["type"], error["msg"]).format(**context, name=place[-1])
     value: Any = data
-    for part in location:
+    for part in place:
         value = value.get(part) if isinstance(value, dict) else None
-    where = next((said_in for name, said_in in origin.items() if name == key or name.startswith(f"{key}.")), source)
+    key = ".".join(map(_key_shown, place))
+    where = next((by for name, by in origin.items() if f"{name}.".startswith(f"{key}.")), source)
     shown = "" if value is None or isinstance(value, dict) or where != source else f" = {shortened(toml_value(value))}"
-    if error.get("entry") is not None:
-        shown += f": entry {error['entry'] + 1}"
-    if said is None and kind == "extra_forbidden":
-        allowed = list(_section(model, location).model_fields)
-        near = difflib.get_close_matches(location[-1], allowed, 1)
-        hint = f"did you mean {near[0]}? " if near else ""
-        said = f"is not a known key; {hint}{'Sections' if len(location) == 1 else 'Keys'} are {', '.join(allowed)}"
-    elif said is None and kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
-        schema = _section(model, location).model_json_schema()["properties"][location[-1]]
-        said = f"must be {' and '.join(f'{_SIGNS[sign]} {value:g}' for sign, value in limits(schema))}"
-    elif said is None:
-        said = _RULES.get(kind, error["msg"]).format(**{**context, "name": key})
-    return f"{where}: {key}{shown} {said}."
+    entry = f": entry {inner[-1] + 1}" if inner and isinstance(inner[-1], int) else ""
+    return f"{where}: {key}{shown}{entry} {said}."
 
 
-def _section(model: Any, location: list[str]) -> Any:
-    """The class of the section that holds the key at ``location``."""
-    for part in location[:-1]:
+def _known_keys(model: Any, place: list[str]) -> dict[str, str]:
+    """What may stand in the ``place`` of an unknown key or section, and which of it may be meant."""
+    for part in place[:-1]:
         model = model.model_fields[part].annotation
-    return model
+    known = list(model.model_fields)
+    near = difflib.get_close_matches(place[-1], known, 1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    return {"known": ", ".join(known), "kind": "Sections" if len(place) == 1 else "Keys", "hint": hint}
 
 
 def _key_shown(part: str) -> str:

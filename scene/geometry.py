@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from archord.scene.keys import Positive, Section, key, one_of
+from archord.scene.keys import Positive, Section, key, require
 
 _WIDEST = 1e6  # block_size over R
 _MOST_CELLS = 1e6  # triangles: some 10 GB, and minutes for a mesh generator that is not parallel
@@ -22,35 +22,30 @@ class JointGeometry(Section):
         "held at its outer edge, loaded by a force at the pin's core (Persson's joint)",
         default="block",
     )
-
     radius: float = key("radius R of the pin", "length", gt=0, example=10.0)
     clearance: float | None = key(
-        "radial clearance dR = hole radius - pin radius, 1e-6 to 0.5 times R; in a ring also negative (interference)",
-        "length",
-        default=None,
+        "dR = hole radius - pin radius, 1e-6 to 0.5 R; in a ring also negative", "length", default=None, other=0.05
     )
     relative_clearance: float | None = key("dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005)
     block_size: Positive | None = key(
-        "width and depth of the block or radius of the ring, at least the hole's diameter, at most 1e6 R; 100 R "
-        "if absent",
+        "width and depth of the block, or radius of the ring: from the hole's diameter to 1e6 R; 100 R if absent",
         "length",
         default=None,
+        other=1000.0,
     )
     element_size: Positive | None = key(
-        "edge length of the elements on the arcs, 1e-4 to 0.5 times R", "length", default=None
+        "edge length of the elements on the arcs, 1e-4 to 0.5 times R", "length", default=None, other=0.4
     )
     relative_element_size: Positive | None = key(
         "element_size / R, instead of element_size: 1e-4 to 0.5; 0.04 if both are absent", default=None, example=0.04
     )
     size_ratio: float = key(
-        "element size on the pin's arc over that on the hole's, which then is element_size",
-        default=1.0,
-        ge=0.01,
-        le=100,
+        "element size on the pin's arc over element_size, which is that on the hole's", default=1.0, ge=0.01, le=100
     )
     edge_angle: float | None = key(
-        "semi-angle [rad] at which the contact is to end: elements on the arcs shrink toward it; not in a ring",
+        "block: angle [rad] at which the contact will end; elements shrink toward it",
         default=None,
+        other=1.0,
         gt=0,
         lt=math.pi / 2,
     )
@@ -59,35 +54,31 @@ class JointGeometry(Section):
 
     @model_validator(mode="after")
     def _geometry(self) -> JointGeometry:
-        if (self.clearance is None) == (self.relative_clearance is None):
-            raise ValueError("clearance|" + one_of("relative_clearance", self.clearance))
-        name = "clearance" if self.relative_clearance is None else "relative_clearance"
-        if not self.is_ring and not 1e-6 <= self.dR / self.radius <= 0.5:
-            raise ValueError(f"{name}|must be a clearance: between 1e-6 and 0.5 times the radius")
-        if not 1e-6 <= abs(self.dR) / self.radius <= 0.5:
-            raise ValueError(f"{name}|must be between 1e-6 and 0.5 times the radius, or minus that")
-        if self.element_size is not None and self.relative_element_size is not None:
-            raise ValueError("element_size|must not be given together with relative_element_size")
-        if not 1e-4 <= self.h / self.radius <= 0.5:
-            name = "element_size" if self.element_size is not None else "relative_element_size"
-            raise ValueError(f"{name}|must be between 1e-4 and 0.5 times the radius")
-        if not 1e-4 <= self.size_ratio * self.h / self.radius <= 0.5:
-            raise ValueError("size_ratio|must leave the pin's elements between 1e-4 and 0.5 times the radius")
-        if self.edge_angle is not None and self.is_ring:
-            raise ValueError("edge_angle|is only for the model block")
-        if self.edge_angle is not None and self.edge_ratio * self.h / self.radius < 1e-4:
-            raise ValueError("edge_ratio|must leave elements of at least 1e-4 times the radius")
-        if 2 * (self.radius + self.dR) > self.W:
-            raise ValueError("block_size|must be at least twice the radius of the hole")
-        if self.W / self.radius > _WIDEST:
-            raise ValueError(f"block_size|must not exceed {_WIDEST:g} times the radius")
-        if self.expected_cells > _MOST_CELLS:
-            name = "relative_element_size" if self.element_size is None else "element_size"
-            raise ValueError(
-                f"{name}|with growth = {self.growth:g} would make about {self.expected_cells:.0e} triangles, and "
-                f"{_MOST_CELLS:.0e} are allowed; choose larger elements or a larger growth"
-            )
+        dR, h = self.dR / self.radius, self.h / self.radius
+        name = self._given("clearance")
+        require(getattr(self, name) is not None, "clearance", "is missing (or relative_clearance)")
+        require(dR > 0 or self.is_ring, name, "must be positive: only a ring may have an interference")
+        require(1e-6 <= abs(dR) <= 0.5, name, "must be between 1e-6 and 0.5 times the radius, in a ring or minus that")
+        name = self._given("element_size")
+        require(1e-4 <= h <= 0.5, name, "must be between 1e-4 and 0.5 times the radius")
+        on_pin = self.size_ratio * h
+        require(1e-4 <= on_pin <= 0.5, "size_ratio", "must leave the pin elements of 1e-4 to 0.5 times the radius")
+        require(self.edge_angle is None or not self.is_ring, "edge_angle", "is only for the model block")
+        holds = 2 * (self.radius + self.dR) <= self.W
+        require(holds, "block_size", "must be at least twice the radius of the hole")
+        require(self.W / self.radius <= _WIDEST, "block_size", f"must not exceed {_WIDEST:g} times the radius")
+        cells, most = self.expected_cells, f"{_MOST_CELLS:.0e}"
+        require(
+            cells <= _MOST_CELLS, name, f"with growth = {self.growth:g} makes {cells:.0e} of at most {most} triangles"
+        )
         return self
+
+    def _given(self, name: str) -> str:
+        """The key that holds the length ``name``: itself, or the ratio to R in its place."""
+        absolute = getattr(self, name) is not None
+        both = absolute and getattr(self, f"relative_{name}") is not None
+        require(not both, name, f"must not be given together with relative_{name}")
+        return name if absolute else f"relative_{name}"
 
     @property
     def expected_cells(self) -> float:

@@ -8,30 +8,23 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 LINE = r"^[^\x00-\x1f]*$"  # a pattern: text on one line
-SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 Positive = Annotated[float, Field(gt=0)]
 
 
-def key(description: str, unit: str = "", *, default: Any = ..., example: Any = None, **limits: Any) -> Any:
-    """A documented key: its unit is the scene's unit of that kind, `example` is what ``--example`` shows."""
-    extra: Any = {"unit": unit} if unit else {}
-    example = default if example is None else example
-    return Field(default, description=description, examples=[example], json_schema_extra=extra, **limits)
+def key(
+    description: str, unit: str = "", *, default: Any = ..., example: Any = None, other: Any = None, **limits: Any
+) -> Any:
+    """A documented key; its ``unit`` is the scene's unit of that kind. ``--example`` shows ``example``, by default the
+    ``default``, or commented out what ``other`` scenes may say."""
+    shown = example if other is None else other
+    extra: Any = {"unit": unit, "shown": default if shown is None else shown, "hidden": other is not None}
+    return Field(default, description=description, json_schema_extra=extra, **limits)
 
 
-def one_of(other: str, value: float | None) -> str:
-    """What is wrong with a key that is absent, or given, as its alternative ``other`` is."""
-    return f"is missing (or {other})" if value is None else f"must not be given together with {other}"
-
-
-def given(schema: dict[str, Any]) -> dict[str, Any]:
-    """The JSON schema of a key that may be absent, when it is not."""
-    return next((s for s in schema.get("anyOf", []) if s.get("type") != "null"), schema)
-
-
-def limits(schema: dict[str, Any]) -> list[tuple[str, float]]:
-    """The limits in the JSON schema of a key: ``>`` or another sign, and the number."""
-    return [(sign, given(schema)[name]) for name, sign in SIGNS.items() if name in given(schema)]
+def require(holds: bool, name: str, said: str) -> None:
+    """Raise ValueError unless it ``holds`` what is ``said`` of the key ``name``."""
+    if not holds:
+        raise ValueError(f"{name}|{said}")
 
 
 def toml_value(value: Any) -> str:

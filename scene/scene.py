@@ -14,9 +14,9 @@ from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from archord.materials.elasticity import contact_modulus
 from archord.scene.errors import InputError
-from archord.scene.faults import in_sentences, shortened
+from archord.scene.faults import in_sentences
 from archord.scene.geometry import JointGeometry
-from archord.scene.keys import Section, key, toml_value
+from archord.scene.keys import Section, key, require
 from archord.scene.sections import Analysis, Load, Output, Pin, Solid, Stepping, Units
 
 _RANGE = 1e-30, 1e30  # of lengths and moduli; powers of them must not leave the range of numbers
@@ -24,13 +24,7 @@ FORMAT = 1  # version of the scene format: rises when a scene gets a meaning tha
 _SOFTEST = 1e-8  # ratio of the moduli
 _WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
 # what an accuracy chooses
-CHOSEN = (
-    ("joint", "element_size"),
-    ("joint", "relative_element_size"),
-    ("joint", "growth"),
-    ("stepping", "initial"),
-    ("stepping", "maximum"),
-)
+CHOSEN = ("joint.element_size", "joint.relative_element_size", "joint.growth", "stepping.initial", "stepping.maximum")
 
 
 class Scene(Section):
@@ -50,64 +44,53 @@ class Scene(Section):
     stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
     output: Output = Field(default_factory=Output, description="what is written")
 
-    def __init__(self, **sections: Any) -> None:
+    def __init__(self, source: str = "scene", origin: Mapping[str, str] | None = None, /, **sections: Any) -> None:
+        """Check ``sections`` as read from ``source``; ``origin`` names another source of some keys."""
         data = plain(sections)
-        load = data.get("load")
-        if isinstance(load, dict) and "path" in load:
-            raise InputError(
-                f'scene: load.path = "{load["path"]}" is for scene files alone; give the list of its targets instead.'
-            )
-        self._fill(data, "scene", {})
-
-    def _fill(self, data: dict[str, Any], source: str, origin: dict[str, str]) -> None:
-        """Take the keys of ``data``. Raises `InputError`."""
-        _check_format(data, source)
+        version = data.get("format", FORMAT)
+        if isinstance(version, int) and version > FORMAT:  # it may hold anything else that is unknown here
+            raise InputError(f"{source}: format = {version} is for a newer archord; this one reads format {FORMAT}.")
         try:
             super().__init__(**data)
         except ValidationError as error:
-            raise InputError(in_sentences(error.errors(), data, Scene, source, origin)) from None
+            raise InputError(in_sentences(error.errors(), data, Scene, source, dict(origin or {}))) from None
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        for section, chosen in CHOSEN if self.analysis.accuracy is not None else ():
+        joint, pin, block, load = self.joint, self.pin, self.block, f"load.{self.load.name}"
+        for name in CHOSEN if self.analysis.accuracy is not None else ():
+            section, key = name.split(".")
             given: BaseModel = getattr(self, section)
-            if chosen in given.model_fields_set and getattr(given, chosen) is not None:
-                raise ValueError(
-                    f"{section}.{chosen}|must not be given together with analysis.accuracy, which chooses it"
-                )
-        if self.pin.rigid and self.analysis.integration == "pin":
-            raise ValueError(
-                'analysis.integration|must be "block" or "both": a rigid pin has no contact edge to integrate'
-            )
-        sizes = {"joint.radius": self.joint.radius, "block.E": self.block.E, "pin.E": self.pin.E}
-        for name, size in sizes.items():
-            if size is not None and not _RANGE[0] <= size <= _RANGE[1]:
-                raise ValueError(f"{name}|must be between 1e-30 and 1e30; choose other units")
-        for name, body in (("pin", self.pin), ("block", self.block)):
-            if body.E is not None and body.yield_stress is not None and body.yield_stress < _WEAKEST * body.E:
-                raise ValueError(f"{name}.yield_stress|must be at least {_WEAKEST:g} times {name}.E")
-            if body.E is not None and body.hardening > body.E / _WEAKEST:
-                raise ValueError(f"{name}.hardening|must not exceed {1 / _WEAKEST:g} times {name}.E")
-        if self.pin.E is not None and not _SOFTEST <= self.pin.E / self.block.E <= 1 / _SOFTEST:
-            raise ValueError("pin.E|must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
-        name = f"load.{self.load.name}"
-        if self.joint.is_ring and not self.force_controlled:
-            raise ValueError(f'{name}|does not load a joint whose model is "ring"; give force or relative_force')
-        if self.joint.is_ring and self.pin.rigid:
-            raise ValueError('pin.rigid|must be false where joint.model is "ring"')
-        largest = max(map(abs, self.targets))
-        if self.force_controlled and not largest <= 0.5 * self.E_star * self.joint.radius:
-            raise ValueError(f"{name}|must not exceed half E* R ({0.5 * self.E_star * self.joint.radius:g})")
-        if not self.force_controlled and not largest <= 0.5 * self.joint.radius:
-            raise ValueError(f"{name}|must not exceed half the radius ({0.5 * self.joint.radius:g})")
+            free = key not in given.model_fields_set or getattr(given, key) is None
+            require(free, name, "must not be given together with analysis.accuracy, which chooses it")
+        said = 'must be "block" or "both": a rigid pin has no contact edge to integrate'
+        require(not pin.rigid or self.analysis.integration != "pin", "analysis.integration", said)
+        for name, size in {"joint.radius": joint.radius, "block.E": block.E, "pin.E": pin.E}.items():
+            allowed = size is None or _RANGE[0] <= size <= _RANGE[1]
+            require(allowed, name, "must be between 1e-30 and 1e30; choose other units")
+        for name, body in {"pin": pin.solid, "block": block}.items():
+            if body is not None:
+                strong = body.yield_stress is None or body.yield_stress >= _WEAKEST * body.E
+                require(strong, f"{name}.yield_stress", f"must be at least {_WEAKEST:g} times {name}.E")
+                allowed = body.hardening <= body.E / _WEAKEST
+                require(allowed, f"{name}.hardening", f"must not exceed {1 / _WEAKEST:g} times {name}.E")
+        alike = pin.rigid or _SOFTEST <= pin.E / block.E <= 1 / _SOFTEST
+        require(alike, "pin.E", "must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
+        if joint.is_ring:
+            said = 'does not load a joint whose model is "ring"; give force or relative_force'
+            require(self.force_controlled, load, said)
+            require(not pin.rigid, "pin.rigid", 'must be false where joint.model is "ring"')
+        scale = self.E_star if self.force_controlled else 1.0
+        largest, most = max(map(abs, self.targets)), 0.5 * scale * joint.radius
+        what = "E* R" if self.force_controlled else "the radius"
+        require(largest <= most, load, f"must not exceed half {what} ({most:g})")
         return self
 
     def require_mesh(self) -> None:
         """Raise `InputError` if the scene leaves its mesh to `archord.studies.accuracy`."""
         if self.analysis.accuracy is not None:
             raise InputError(
-                f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; give joint.element_size and "
-                "joint.growth instead, or solve to that accuracy (archord solve, solve_to_accuracy)."
+                f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; give element_size."
             )
 
     @property
@@ -132,11 +115,6 @@ class Scene(Section):
         return out
 
     @property
-    def target(self) -> float:
-        """The load at the end of the path."""
-        return self.targets[-1]
-
-    @property
     def monotonic(self) -> bool:
         """Whether the load only grows."""
         targets = [0.0, *self.targets]
@@ -154,12 +132,9 @@ class Scene(Section):
         return self.pin.yield_stress is not None or self.block.yield_stress is not None
 
 
-def parse_scene(data: dict[str, Any], source: str = "scene", origin: dict[str, str] | None = None) -> Scene:
-    """Check scene ``data`` as read from ``source``; ``origin`` names another source of some keys. Raises
-    `InputError`."""
-    scene = Scene.__new__(Scene)
-    scene._fill(data, source, origin or {})
-    return scene
+def parse_scene(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> Scene:
+    """The scene of ``data`` read from ``source``, or as ``origin`` says of its keys, elsewhere. Raises `InputError`."""
+    return Scene(source, origin, **data)
 
 
 def plain(value: Any) -> Any:
@@ -171,13 +146,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(part) for part in value]
     return value.tolist() if hasattr(value, "tolist") else value
-
-
-def _check_format(data: dict[str, Any], source: str) -> None:
-    """Look at the version first: a newer scene may hold anything else that is unknown here. Raises `InputError`."""
-    version = data.get("format", FORMAT)
-    said = f"{source}: format = {shortened(toml_value(version))}"
-    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
-        raise InputError(f"{said} must be a whole number, the version of the scene format: {FORMAT}.")
-    if version > FORMAT:
-        raise InputError(f"{said} is newer than this archord, which reads format {FORMAT}; use a newer archord.")

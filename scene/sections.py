@@ -9,12 +9,15 @@ from pydantic import Field, model_validator
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.material import Material, Plane
-from archord.scene.keys import LINE, Positive, Section, key
+from archord.scene.keys import LINE, Positive, Section, key, require
 
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
-Targets = float | Annotated[list[float], Field(min_length=1, max_length=10_000)]
-Steps = Annotated[int, Field(ge=1, le=10_000)]
-_NU = -0.999, 0.499999  # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
+# shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
+Ratio = Annotated[float, Field(ge=-0.999, le=0.499999)]
+_FORCE = {("MPa", "mm"): "N/mm", ("Pa", "m"): "N/m"}
+_MOST = 10_000  # output steps
+Targets = float | Annotated[list[float], Field(min_length=1)]
+Steps = Annotated[int, Field(ge=1, le=_MOST)]
 
 
 class Units(Section):
@@ -26,34 +29,27 @@ class Units(Section):
     @property
     def force(self) -> str:
         """Unit of force per unit thickness."""
-        return {("mm", "MPa"): "N/mm", ("m", "Pa"): "N/m"}.get(
-            (self.length, self.stress), f"{self.stress} {self.length}"
-        )
+        return _FORCE.get((self.stress, self.length), f"{self.stress} {self.length}")
 
     @property
     def energy(self) -> str:
         """Unit of energy per unit thickness."""
-        return {("mm", "MPa"): "N", ("m", "Pa"): "N"}.get((self.length, self.stress), f"{self.stress} {self.length}2")
+        force = _FORCE.get((self.stress, self.length))
+        return force.split("/")[0] if force else f"{self.stress} {self.length}2"
 
 
-class _Strength(Section):
+class Solid(Section):
+    """Isotropic elastic solid, elastic-plastic (J2, linear hardening) with a yield stress."""
+
     yield_stress: Positive | None = key("yield stress; elastic if absent", "stress", default=None, example=300.0)
-    hardening: float = key(
-        "hardening modulus d(yield stress)/d(PEEQ); 0: perfect plasticity", "stress", default=0.0, ge=0
-    )
+    hardening: float = key("modulus d(yield stress)/d(PEEQ); 0: perfect plasticity", "stress", default=0.0, ge=0)
+    E: Positive = key("Young's modulus", "stress", example=210000.0)
+    nu: Ratio = key("Poisson's ratio", example=0.3)
 
     @model_validator(mode="after")
     def _plasticity(self):
-        if self.yield_stress is None and self.hardening > 0:
-            raise ValueError("hardening|needs a yield_stress")
+        require(self.yield_stress is not None or self.hardening == 0, "hardening", "needs a yield_stress")
         return self
-
-
-class Solid(_Strength):
-    """Isotropic elastic solid, elastic-plastic (J2, linear hardening) with a yield stress."""
-
-    E: Positive = key("Young's modulus", "stress", example=210000.0)
-    nu: float = key("Poisson's ratio", ge=_NU[0], le=_NU[1], example=0.3)
 
     def material(self, plane: Plane) -> Material:
         """The constitutive law: `Elastic`, or `J2Material` if there is a yield stress."""
@@ -64,70 +60,62 @@ class Solid(_Strength):
         return J2Material(self.E, self.nu, plane, LinearHardening(self.yield_stress, self.hardening))
 
 
-class Pin(_Strength):
+class Pin(Solid):
     """The pin: a solid like the block, or rigid."""
 
-    E: Positive | None = key("Young's modulus", "stress", default=None, example=210000.0)
-    nu: float | None = key("Poisson's ratio", default=None, ge=_NU[0], le=_NU[1], example=0.3)
-    rigid: bool = key("a rigid pin: no mesh, no other key", default=False)
+    E: Positive | None = key("Young's modulus", "stress", default=None, example=210000.0)  # type: ignore[assignment]
+    nu: Ratio | None = key("Poisson's ratio", default=None, example=0.3)  # type: ignore[assignment]
+    rigid: bool = key("a rigid pin: no mesh, no other key", default=False, other=True)
 
     @model_validator(mode="after")
     def _rigid_or_solid(self) -> Pin:
-        for name in type(self).model_fields:  # in their order, which that of a set is not
-            if self.rigid and name != "rigid" and name in self.model_fields_set and getattr(self, name):
-                raise ValueError(f"{name}|is not for a rigid pin")
+        for name in ("yield_stress", "hardening", "E", "nu"):
+            given = name in self.model_fields_set and getattr(self, name)
+            require(not (self.rigid and given), name, "is not for a rigid pin")
         for name in ("E", "nu"):
-            if not self.rigid and getattr(self, name) is None:
-                raise ValueError(f"{name}|is missing (or set rigid = true)")
+            require(self.rigid or getattr(self, name) is not None, name, "is missing (or set rigid = true)")
         return self
 
     @property
     def solid(self) -> Solid | None:
         """The pin as a solid; None if it is rigid."""
-        return None if self.rigid else Solid.model_validate(self.model_dump(exclude={"rigid"}))
+        return None if self.rigid else self
 
 
 class Load(Section):
     """The displacement of the pin, from first touch, or the force on it: a ramp to a target, or to several in turn."""
 
     displacement: Targets | None = key(
-        "displacement delta of the pin, in clearances dR, at most R/2: the target, or a list of targets in turn",
-        default=None,
-        example=2.0,
+        "displacement delta of the pin over dR, at most R/2: a target, or a list of them", default=None, example=2.0
     )
     displacement_absolute: Targets | None = key(
-        "displacement delta of the pin, instead of displacement", "length", default=None
+        "displacement delta of the pin, instead of displacement", "length", default=None, other=0.1
     )
     force: Targets | None = key(
-        "force P on the whole pin per unit thickness, instead of a displacement", "force", default=None
+        "force P on the whole pin per unit thickness, instead of a displacement", "force", default=None, other=1000.0
     )
-    relative_force: Targets | None = key("P/(E* R), instead of force", default=None)
+    relative_force: Targets | None = key("P/(E* R), instead of force", default=None, other=0.01)
     path: str | None = key(
-        "CSV file with the targets, instead of a list: one column, headed by one of the four names above; each row is "
-        "one step unless steps is given",
+        "CSV file of targets: one column headed by one of the names above; by default one step each",
         default=None,
+        other="cycle.csv",
         min_length=1,
         pattern=LINE,
     )
-    core_radius: float = key(
-        "ring: radius of the core over which the force is spread, over R", default=0.1, ge=0.01, le=0.5
-    )
+    core_radius: float = key("ring: radius over R of the core that the force acts on", default=0.1, ge=0.01, le=0.5)
     steps: Steps | Annotated[list[Steps], Field(min_length=1)] = key(
-        "equal output steps up to each target: one number for all, or a list with one for each", default=20
+        "output steps up to each target: one number for all, or a list with one for each", default=20
     )
 
     @model_validator(mode="after")
     def _one_load(self) -> Load:
-        given = [name for name in LOADS if getattr(self, name) is not None]
-        if len(given) > 1:
-            raise ValueError(f"{given[0]}|must not be given together with {given[1]}")
-        if not given:
-            raise ValueError(f"displacement|is missing (or {', '.join(LOADS[1:])}, path)")
-        n = len(self.legs)
-        if isinstance(self.steps, list) and len(self.steps) != n:
-            raise ValueError(f"steps|must have one number for each of the {n} targets of {self.name}")
-        if sum(self.leg_steps) > 10_000:
-            raise ValueError("steps|must not add up to more than 10000 steps")
+        given = [name for name in (*LOADS, "path") if getattr(self, name) is not None]
+        require(len(given) > 0, "displacement", f"is missing (or {', '.join(LOADS[1:])}, path)")
+        require(len(given) == 1, given[0], f"must not be given together with {' and '.join(given[1:])}")
+        require(self.path is None, "path", "is for scene files alone; give the list of its targets instead")
+        each = f"must have one number for each of the {len(self.legs)} targets of {self.name}"
+        require(len(self.leg_steps) == len(self.legs), "steps", each)
+        require(sum(self.leg_steps) <= _MOST, "steps", f"must not add up to more than {_MOST} steps")
         return self
 
     @property
@@ -152,29 +140,24 @@ class Analysis(Section):
 
     plane: Literal["strain", "stress"] = key("plane strain or plane stress", default="strain")
     kinematics: Literal["current", "reference"] = key(
-        "contact pairs: closest points on the deformed curves, or fixed pairs of the touching configuration",
-        default="current",
+        "pairs in contact: closest points on the deformed curves, or fixed ones where they touch", default="current"
     )
     integration: Literal["both", "pin", "block"] = key(
         "whose contact edge carries the integral: both halves (unbiased), or one side's alone", default="both"
     )
     gamma_factor: float = key(
-        "Nitsche's gamma over the trace constant of each contact cell; coercive above 0.25",
-        default=0.5,
-        ge=1e-3,
-        le=1e6,
+        "Nitsche's gamma over the trace constant of a contact cell; coercive above 0.25", default=0.5, ge=1e-3, le=1e6
     )
     accuracy: float | None = key(
-        "relative error of P (of delta under a force) to reach, 1e-5 to 0.1: element_size, growth and the length of "
-        "the steps are chosen accordingly, and the error is estimated",
+        "relative error of P (of delta under a force) to reach by a choice of element_size, growth and step length",
         default=None,
+        other=0.001,
         ge=1e-5,
         le=0.1,
     )
     degree: Literal[2, 3] = key("polynomial degree of displacements and of the curved geometry", default=2)
     coarse_start: bool = key(
-        "take the guess for every step from a coarser mesh, where the mesh is fine; false is for comparison",
-        default=True,
+        "on a fine mesh, take the guess for every step from a coarser one; false is for comparison", default=True
     )
     tolerance: float = key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
     max_iterations: int = key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
@@ -192,8 +175,8 @@ class Stepping(Section):
 
     @model_validator(mode="after")
     def _ordered(self) -> Stepping:
-        if not self.minimum <= self.initial <= self.maximum:
-            raise ValueError("initial|must be between stepping.minimum and stepping.maximum")
+        ordered = self.minimum <= self.initial <= self.maximum
+        require(ordered, "initial", "must be between stepping.minimum and stepping.maximum")
         return self
 
 

@@ -152,11 +152,7 @@ def test_a_reader_that_has_seen_enough_ends_the_command_without_a_word(tmp_path,
         assert process.wait(120) == code
 
 
-def test_scene_prints_schema_and_example(tmp_path):
-    """The schema is JSON and names every section; the example solves."""
-    schema = json.loads(archord("scene", "--schema", cwd=tmp_path).stdout)
-    sections = {"units", "joint", "pin", "block", "analysis", "load", "stepping", "output"}
-    assert set(schema["properties"]) == {"format", *sections}
+def test_scene_prints_an_example_that_solves(tmp_path):
     example = archord("scene", "--example", cwd=tmp_path)
     (tmp_path / "example.toml").write_text(example.stdout)
     archord("solve", "example.toml", *COARSE, cwd=tmp_path)

@@ -29,7 +29,7 @@ def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
             assert all(line.startswith(str(path)) and line.endswith(".") and len(line) < 1000 for line in lines), number
         else:
             again = parse_scene(tomllib.loads(resolved(scene)))
-            assert (again.target, again.E_star, again.joint.h) == (scene.target, scene.E_star, scene.joint.h), number
+            assert (again.targets, again.E_star, again.joint.h) == (scene.targets, scene.E_star, scene.joint.h), number
     assert kinds == set(KINDS)
     assert 30 < refused < 140
 

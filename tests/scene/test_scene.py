@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
-from archord.scene.reference import TOP_LEVEL, example, reference
+from archord.scene.reference import example, reference
 from archord.scene.scene import Scene
 
 
@@ -30,26 +30,24 @@ def basic() -> dict:
         ("joint", "radius", True, "scene: joint.radius = true must be a number."),
         ("joint", "radius", float("nan"), "scene: joint.radius = NaN must be a finite number."),
         ("joint", "radius", float("inf"), "scene: joint.radius = Infinity must be a finite number."),
-        (
-            "joint",
-            "relative_clearance",
-            0.0,
-            "= 0.0 must be a clearance: between 1e-6 and 0.5 times the radius.",
-        ),
-        ("joint", "relative_clearance", 0.9, "must be a clearance: between 1e-6 and 0.5 times the radius."),
+        ("joint", "relative_clearance", 0.0, "= 0.0 must be positive: only a ring may have an interference."),
+        ("joint", "relative_clearance", 0.9, "must be between 1e-6 and 0.5 times the radius, in a ring or minus that."),
         ("joint", "clearance", 0.05, "= 0.05 must not be given together with relative_clearance."),
+        ("joint", "edge_angle", 0.0, "must be greater than 0."),
         ("joint", "element_size", 20.0, "must be between 1e-4 and 0.5 times the radius."),
         ("joint", "block_size", 15.0, "must be at least twice the radius of the hole."),
         ("joint", "raduis", 1.0, "did you mean radius?"),
-        ("block", "nu", 0.5, "scene: block.nu = 0.5 must be at least -0.999 and at most 0.499999."),
+        ("block", "nu", 0.5, "scene: block.nu = 0.5 must be at most 0.499999."),
         ("block", "rigid", True, "is not a known key"),
         ("block", "hardening", 1.0, "needs a yield_stress."),
         ("block", "yield_stress", 0.0, "must be greater than 0."),
         ("block", "yield_stress", 1e-30, "must be at least 1e-07 times block.E."),
         ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
         ("pin", "rigid", True, "is not for a rigid pin."),
-        ("load", "steps", 2.5, "must be a whole number or a list of them."),
-        ("load", "steps", 0, "must be at least 1 and at most 10000."),
+        ("load", "steps", 2.5, "must be a whole number."),
+        ("load", "steps", 0, "must be at least 1."),
+        ("load", "steps", [4, "x"], '= [4, "x"]: entry 2 must be a whole number.'),
+        ("load", "steps", [4, 5], "= [4, 5] must have one number for each of the 1 targets of displacement."),
         ("load", "displacement", 200.0, "must not exceed half the radius (5)."),
     ],
 )
@@ -68,27 +66,35 @@ def test_a_bad_value_is_refused_in_one_sentence(section, key, value, said):
 @pytest.mark.parametrize("section", ["joint", "pin", "block", "load"])
 def test_a_missing_section_is_named(section):
     """Sections without defaults are required."""
-    data = basic()
-    del data[section]
     with pytest.raises(InputError, match=f"{section} is missing"):
-        parse_scene(data)
+        parse_scene({name: table for name, table in basic().items() if name != section})
 
 
-def test_files_that_are_no_scenes(tmp_path):
-    """Unreadable, not TOML, not text: one sentence each that names the file."""
-    bad = tmp_path / "bad.toml"
-    bad.write_text("[joint\n")
-    binary = tmp_path / "binary.toml"
-    binary.write_bytes(b"\xff\xfe\x00")
-    for path, said in (
-        (bad, "is not valid TOML"),
-        (binary, "UTF-8"),
-        (tmp_path, "cannot be read"),
-        ("nope", "cannot be read"),
-    ):
-        with pytest.raises(InputError, match=said) as caught:
-            load_scene(path)
-        assert str(caught.value).startswith(str(path))
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "cannot be read"),
+        (b"\xff\xfe\x00", "UTF-8"),
+        (b"[joint\n", "is not valid TOML"),
+        (b"x = " + b"9" * 5000, "is not valid TOML"),
+        (b"x = " + b"[" * 20000, "is not valid TOML"),
+        (b"date = 0000-00-00", "is not valid TOML"),
+        (b"".join(b"k%d = 1\n" % i for i in range(3000)), "k0 = 1 is not a known key"),
+        (b"x" * 5000 + b" = 1", "is not a known key"),
+        (b'"a\\nb" = 1', r'"a\\nb" = 1 is not a known key'),
+    ],
+    ids=["folder", "binary", "section", "digits", "brackets", "date", "keys", "long key", "two-line key"],
+)
+def test_files_that_are_no_scenes_are_refused_briefly(tmp_path, content, said):
+    """In sentences that name the file."""
+    path = tmp_path if content is None else tmp_path / "scene.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=said) as caught:
+        load_scene(path)
+    lines = str(caught.value).splitlines()
+    assert len(lines) <= 20
+    assert all(line.startswith(str(path)) and len(line) < 400 for line in lines)
 
 
 def test_overrides_replace_values_and_alternatives(tmp_path):
@@ -114,17 +120,12 @@ def test_the_resolved_scene_is_the_same_scene():
         {"pin": {"rigid": True}},
         {"block": {"E": 1.0, "nu": 0.2, "yield_stress": 0.01, "hardening": 0.1}},
     ):
-        scene = parse_scene(basic() | change)
-        again = parse_scene(tomllib.loads(resolved(scene)))
-        for a, b in ((scene, again),):
-            assert (a.joint.dR, a.joint.h, a.joint.W, a.target, a.E_star) == (
-                b.joint.dR,
-                b.joint.h,
-                b.joint.W,
-                b.target,
-                b.E_star,
-            )
-            assert (a.pin.solid, a.block, a.analysis, a.load) == (b.pin.solid, b.block, b.analysis, b.load)
+        a = parse_scene(basic() | change)
+        b = parse_scene(tomllib.loads(resolved(a)))
+        assert tomllib.loads(resolved(a))["format"] == 1
+        assert (a.joint.dR, a.joint.h, a.joint.W) == (b.joint.dR, b.joint.h, b.joint.W)
+        assert (a.targets, a.E_star) == (b.targets, b.E_star)
+        assert (a.pin.solid, a.block, a.analysis, a.load) == (b.pin.solid, b.block, b.analysis, b.load)
 
 
 def test_the_example_shows_every_key_and_loads():
@@ -132,8 +133,8 @@ def test_the_example_shows_every_key_and_loads():
     text = example()
     parse_scene(tomllib.loads(text))
     for section, info in Scene.model_fields.items():
-        if section in TOP_LEVEL:
-            assert f"\n{section} = " in text
+        if section == "format":
+            assert "\nformat = 1 " in text
             continue
         assert f"[{section}]" in text
         for key, field in info.annotation.model_fields.items():
@@ -158,7 +159,7 @@ def test_a_mesh_of_too_many_triangles_is_refused():
     """With the key to change; the sizes that are used are far below."""
     data = basic()
     data["joint"] |= {"relative_element_size": 1e-4, "growth": 0.01}
-    with pytest.raises(InputError, match=r"relative_element_size = 0.0001 with growth = 0.01 would make about .e\+06"):
+    with pytest.raises(InputError, match=r"relative_element_size = 0.0001 with growth = 0.01 makes .e\+06"):
         parse_scene(data)
     data["joint"] |= {"growth": 0.25}
     assert parse_scene(data).joint.expected_cells < 1e6
@@ -169,47 +170,14 @@ def test_a_scene_of_a_newer_format_is_refused_for_that_alone(value):
     """Whatever else it holds, which may mean something there."""
     with pytest.raises(InputError) as caught:
         parse_scene(basic() | {"format": value, "friction": {"mu": 0.1}})
-    assert str(caught.value) == (
-        f"scene: format = {value} is newer than this archord, which reads format 1; use a newer archord."
-    )
+    assert str(caught.value) == f"scene: format = {value} is for a newer archord; this one reads format 1."
 
 
-@pytest.mark.parametrize("value", [1.0, True, "1", 0, -1, [1], {"a": 1}])
+@pytest.mark.parametrize("value", ["1", 0, -1, [1], {"a": 1}])
 def test_a_format_that_is_no_version_is_refused(value):
     """A version is a whole number from 1."""
-    with pytest.raises(InputError, match=r"^scene: format = .* must be a whole number, the version .*: 1\.$"):
+    with pytest.raises(InputError, match=r"^scene: format( = .*)? must be 1\.$"):
         parse_scene(basic() | {"format": value})
-
-
-def test_scenes_say_their_format_when_written():
-    """The resolved scene does; where it is not said it is 1."""
-    assert parse_scene(basic()) == parse_scene(basic() | {"format": 1})
-    assert tomllib.loads(resolved(parse_scene(basic())))["format"] == 1
-    assert tomllib.loads(example())["format"] == 1
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"x = " + b"9" * 5000, "is not valid TOML"),
-        (b"x = " + b"[" * 20000, "are nested too deeply"),
-        (b"a." * 100000 + b"b = 1", "dotted parts"),
-        (b"['a'" + b" . 'a'" * 100000 + b"]", "dotted parts"),
-        (b"# " + b"x" * 1000000, "larger than 1 MB"),
-        (b"".join(b"k%d = 1\n" % i for i in range(3000)), r"has 2984 more faults like these\."),
-        (b"x" * 5000 + b" = 1", "is not a known key"),
-        (b'"a\\nb" = 1', r'"a\\nb" = 1 is not a known key'),
-        (b"date = 0000-00-00", "is not valid TOML"),
-    ],
-    ids=["digits", "brackets", "dots", "header", "comment", "keys", "long key", "two-line key", "date"],
-)
-def test_monstrous_files_are_refused_briefly(tmp_path, content, said):
-    """In time and in words."""
-    path = tmp_path / "scene.toml"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=said) as caught:
-        load_scene(path)
-    assert all(line.startswith(str(path)) and len(line) < 400 for line in str(caught.value).splitlines())
 
 
 def test_a_byte_order_mark_and_carriage_returns_change_nothing(tmp_path):
@@ -235,16 +203,12 @@ def test_whether_a_scene_is_accepted_does_not_depend_on_its_units(length, stress
 
     def accepted(L: float, S: float) -> tuple[bool, float]:
         data = {
-            "joint": {
-                "radius": 10.0 * L,
-                "clearance": 10.0**clearance * L,
-                "element_size": 10.0**size * L,
-                "growth": growth,
-            },
+            "joint": {"radius": 10.0 * L, "clearance": 10.0**clearance * L, "element_size": 10.0**size * L},
             "pin": {"E": S, "nu": 0.3, "yield_stress": 1e-3 * S},
             "block": {"E": 10.0**soft * S, "nu": 0.2},
             "load": {"displacement": 10.0**delta},
         }
+        data["joint"]["growth"] = growth
         try:
             return True, parse_scene(data).joint.expected_cells
         except InputError:

@@ -198,21 +198,21 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
         ),
         (
             "[grid]\njoint.relative_clearance = [0.005, 0.9]\nload.steps = [1, 2, 3]",
-            "case 4 and 2 more: joint.relative_clearance = 0.9 must be a clearance: between 1e-6 and 0.5 "
-            "times the radius.",
+            "case 4 and 2 more: joint.relative_clearance = 0.9 must be between 1e-6 and 0.5 "
+            "times the radius, in a ring or minus that.",
         ),
         (
             "[grid]\nload.steps = [1, 1.5]\npin.E = [1.82, -1.0]",
             "case 2 and 1 more: pin.E = -1.0 must be greater than 0.",
-            "case 3 and 1 more: load.steps = 1.5 must be a whole number or a list of them.",
+            "case 3 and 1 more: load.steps = 1.5 must be a whole number.",
         ),
         (
             '[grid]\nload.steps = [3, "a = b c", 4, "d", 2.5]',
-            'case 2 and 2 more: load.steps = "a = b c" must be a whole number or a list of them.',
+            'case 2 and 2 more: load.steps = "a = b c" must be a whole number.',
         ),
         (
             "grid.pin.E = [1.0, 2.0]\n[latin_hypercube]\nnumber = 30\nranges = { load.steps = [5, 6] }",
-            "every case: load.steps = NUMBER must be a whole number or a list of them.",
+            "every case: load.steps = NUMBER must be a whole number.",
         ),
         (
             f"[grid]\npin.E = {[1.0] * 400}\nload.steps = {[1] * 400}",
@@ -247,7 +247,7 @@ def test_a_fault_of_the_base_names_its_file(tmp_path):
     scene = tomllib.loads(Path(ELASTIC).read_text())
     scene["block"]["nu"] = 0.7
     (tmp_path / "base.toml").write_text(tomli_w.dumps(scene))
-    fault = "block.nu = 0.7 must be at least -0.999 and at most 0.499999."
+    fault = "block.nu = 0.7 must be at most 0.499999."
     by_base = f"FILE: every case, by its base {tmp_path}/base.toml: {fault}"
     assert faults(tmp_path, "[grid]\npin.nu = [0.1, 0.2]", "base.toml") == [by_base]
     assert faults(tmp_path, "[grid]\nblock.nu = [0.7]", "base.toml") == [f"FILE: every case: {fault}"]
