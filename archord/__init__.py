@@ -17,15 +17,11 @@ from archord.report.version import VERSION
 __version__ = VERSION
 
 if TYPE_CHECKING:
-    from archord.api import load, load_scene, solve
+    from archord.api import InputError, Run, Scene, Sweep, load, load_scene, solve
     from archord.geometry.fenicsx import gmsh_to_mesh
     from archord.materials.elasticity import Elastic
     from archord.materials.hardening import LinearHardening
     from archord.materials.j2 import J2Material
-    from archord.postprocess.run import Run
-    from archord.postprocess.sweep import Sweep
-    from archord.scene.errors import InputError
-    from archord.scene.scene import Scene
     from archord.solver.problem import Body, Interaction, Load, Problem, Support
     from archord.solver.system import System
 
@@ -35,13 +31,6 @@ __all__ = [
     "Support", "Sweep", "System", "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
-    "Run": "archord.postprocess.run",
-    "Scene": "archord.scene.scene",
-    "InputError": "archord.scene.errors",
-    "Sweep": "archord.postprocess.sweep",
-    "load": "archord.api",
-    "load_scene": "archord.api",
-    "solve": "archord.api",
     "gmsh_to_mesh": "archord.geometry.fenicsx",
     "Elastic": "archord.materials.elasticity",
     "J2Material": "archord.materials.j2",
@@ -53,11 +42,11 @@ _HOME = {
 
 def __getattr__(name: str) -> Any:
     """Import what is asked for (PEP 562)."""
-    if name not in _HOME:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib
 
-    value = getattr(importlib.import_module(_HOME[name]), name)
+    value = getattr(importlib.import_module(_HOME.get(name, "archord.api")), name)
     globals()[name] = value
     return value
 

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import atexit
 import logging
-import shutil
 import signal
-import tempfile
-import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,22 +30,18 @@ def load(folder: str | Path) -> Any:
     return Sweep(folder) if is_sweep(folder) else Run(folder)
 
 
-def load_scene(path: str | Path, changes: Sequence[str] | Mapping[str, Any] = ()) -> Scene:
-    """Read and check a scene file, with ``changes`` like ``{"joint.clearance": 0.01}`` or as the command line has them,
-    ``["joint.clearance=0.01"]``; None or nothing behind the sign drops a key.
+def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> Scene:
+    """Read and check a scene file, with ``changes`` like ``{"joint.clearance": 0.01}``; None drops a key.
 
     Raises `InputError` with one sentence per fault.
     """
-    if isinstance(changes, str):
-        raise InputError(f"changes = {changes!r}: must be a list of them, or a dictionary.")
-    if isinstance(changes, Mapping):
-        changes = [f"{key}={'' if value is None else toml_value(plain(value))}" for key, value in changes.items()]
-    return load_scene_file(path, list(changes))
+    given = {key: "" if value is None else toml_value(plain(value)) for key, value in (changes or {}).items()}
+    return load_scene_file(path, [f"{key}={value}" for key, value in given.items()])
 
 
 def solve(
     scene: Scene | str | Path,
-    folder: str | Path | None = None,
+    folder: str | Path,
     *,
     force: bool = False,
     progress: bool = False,
@@ -58,7 +50,6 @@ def solve(
     """Solve ``scene`` (or the scene file of that name) into ``folder``, and give back the run. Collective over ``comm``
     (all ranks).
 
-    Without a ``folder`` the results are temporary: they go with the returned run, under MPI with rank 0's process.
     An occupied folder is refused without ``force``. ``progress`` reports steps on rank 0 as ``archord solve`` does. A
     run that could not reach its end has the status "stopped", and the logger "archord" warns of it; its accepted steps
     stay.
@@ -68,47 +59,19 @@ def solve(
     """
     from mpi4py import MPI
 
-    from archord.output.folder import claim_folder
-    from archord.output.ranks import agreed
     from archord.progress import solve_and_report
 
     comm = MPI.COMM_WORLD if comm is None else comm
 
-    def claimed() -> tuple[Scene, Path]:
-        checked = scene if isinstance(scene, Scene) else load_scene(scene)
-        target = Path(tempfile.mkdtemp(prefix="archord-")) if folder is None else Path(folder)
-        if target.is_dir() and any(target.iterdir()) and not force:
-            raise InputError(f"{target}: is not empty; choose another folder, or overwrite a run in it: force=True.")
-        claim_folder(target, force)
-        return checked, target
+    def checked() -> Scene:
+        return scene if isinstance(scene, Scene) else load_scene(scene)
 
-    checked, target = agreed(comm, claimed)
-    if folder is None and comm.rank == 0 and comm.size > 1:
-        atexit.register(shutil.rmtree, target, ignore_errors=True)
-    try:
-        outcome = solve_and_report(checked, target, comm, silent=not progress)
-        run = _read(target, outcome.message)
-    except BaseException:
-        if folder is None and comm.rank == 0:
-            shutil.rmtree(target, ignore_errors=True)
-        raise
-    if folder is None and comm.size == 1:
-        weakref.finalize(run, shutil.rmtree, target, ignore_errors=True)
+    _, outcome = solve_and_report(checked, Path(folder), comm, force=force, silent=not progress)
     if outcome.status == "interrupted":
         if outcome.signal == signal.SIGINT:
             raise KeyboardInterrupt(outcome.message)
         raise SystemExit(128 + outcome.signal)
     if outcome.status == "stopped" and comm.rank == 0:
         # not warnings.warn: importing ffcx sends warnings to a logger that shows nothing
-        logging.getLogger("archord").warning("archord: %s: %s.", target, outcome.message)
-    return run
-
-
-def _read(folder: Path, message: str) -> Run:
-    """The run in ``folder``; RuntimeError with ``message``, if that tells why there is nothing to read."""
-    try:
-        return Run(folder)
-    except InputError:
-        if message:
-            raise RuntimeError(message) from None
-        raise
+        logging.getLogger("archord").warning("archord: %s: %s.", folder, outcome.message)
+    return Run(folder)

@@ -65,15 +65,10 @@ def _run(arguments: list[str], begun: float) -> int:
         if launcher_rank() == 0:
             error.show()
         return error.exit_code
-    except click.exceptions.Abort:
-        return 130
-    except BrokenPipeError:
-        return _unread(arguments)
-    except SystemExit as error:
-        if isinstance(error.__context__, BrokenPipeError):  # click makes exit code 1 of it
-            return _unread(arguments)
-        raise
-    except KeyboardInterrupt:
+    except (BrokenPipeError, SystemExit):  # the reader, like head, has seen enough; click makes one of the other
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE if arguments[0] in COLLECTIVE else 0  # what solves is not done
+    except (KeyboardInterrupt, click.exceptions.Abort):
         _say("archord: interrupted.")
         return 130
     except InputError as error:
@@ -81,12 +76,6 @@ def _run(arguments: list[str], begun: float) -> int:
         return 2
     except Exception as error:
         return _fail(error)
-
-
-def _unread(arguments: list[str]) -> int:
-    """The exit code where the reader of the output, like head, has seen enough: only what solves is not done then."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 128 + signal.SIGPIPE if arguments and arguments[0] in COLLECTIVE else 0
 
 
 def _say(text: str) -> None:

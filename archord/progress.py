@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from time import perf_counter
@@ -152,19 +153,30 @@ class _MeshProgress(Progress):
 
 
 def solve_and_report(
-    scene: Scene,
+    load: Callable[[], Scene],
     folder: Path,
     comm: MPI.Comm,
     *,
+    force: bool,
     silent: bool,
     start: Start | None = None,
     begun: float | None = None,
     **options: Any,
-) -> Outcome:
-    """Solve ``scene`` into ``folder``, or go on from ``start``, and report it on rank 0 unless ``silent``. Collective.
+) -> tuple[Scene, Outcome]:
+    """Solve the scene that ``load`` gives rank 0 into ``folder``, claimed by ``force`` if it has to be, or go on from
+    ``start``, and report it on rank 0 unless ``silent``. Collective.
 
     If this process is for it alone, it has ``begun`` at that time of `perf_counter`.
     """
+    from archord.output.folder import claim_folder
+    from archord.output.ranks import agreed
+
+    def claimed() -> Scene:
+        scene = load()
+        claim_folder(folder, force)
+        return scene
+
+    scene = agreed(comm, claimed)
     from archord.solver.timer import Timer
     from archord.studies.accuracy import solve_as_asked  # with all of dolfinx: bad input is told before
 
@@ -181,7 +193,7 @@ def solve_and_report(
     with report:
         outcome = solve_as_asked(scene, folder, comm, start=start, **calls, **options)
     report.finish(outcome)
-    return outcome
+    return scene, outcome
 
 
 class SweepProgress(_Bar):

@@ -6,15 +6,14 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from archord.options import SCENE, flag, output, overrides, quiet
 
 if TYPE_CHECKING:
-    from archord.output.restart import Plan, Start
-    from archord.output.run import Outcome
+    from archord.output.restart import Plan
     from archord.scene.scene import Scene
 
 
@@ -43,23 +42,26 @@ def solve(
 
     With --restart and --extend, the run folder may stand in the place of the scene.
     """
-    if restart + extend + force > 1:
-        raise click.UsageError("choose one of --force, --restart and --extend")
-    folder = scene if (restart or extend) and scene.is_dir() else output or Path("runs") / scene.stem
-    if restart or extend:
-        planned = _planned(scene, overrides, output, folder, extend=extend)
-        if not quiet:
-            print(f"{planned.said}.", flush=True)
-        if planned.finished:
-            return 0
-        return _solve(lambda: planned.scene, folder, True, debug, quiet, begun, planned.start)
     from archord.scene.file import load_scene
 
-    return _solve(lambda: load_scene(scene, overrides), folder, force, debug, quiet, begun)
+    if restart + extend + force > 1:
+        raise click.UsageError("choose one of --force, --restart and --extend")
+    if not (restart or extend):
+        folder = output or Path("runs") / scene.stem
+        return _solve(lambda: load_scene(scene, overrides), folder, begun, quiet, force=force, debug=debug)
+    if output is not None and scene.is_dir():
+        raise click.UsageError("-o does not go with a run folder")
+    folder, file = (scene, scene / "scene.toml") if scene.is_dir() else (output or Path("runs") / scene.stem, scene)
+    planned = _planned(lambda: load_scene(file, overrides), folder, extend=extend)
+    if not quiet:
+        print(f"{planned.said}.", flush=True)
+    if planned.finished:
+        return 0
+    return _solve(lambda: planned.scene, folder, begun, quiet, force=True, debug=debug, start=planned.start)
 
 
-def _planned(source: Path, overrides: tuple[str, ...], output: Path | None, folder: Path, *, extend: bool) -> Plan:
-    """How the run in ``folder`` goes on, with the scene of ``source``, a scene file or the folder itself. Collective.
+def _planned(load: Callable[[], Scene], folder: Path, *, extend: bool) -> Plan:
+    """How the run in ``folder`` goes on, with the scene that ``load`` gives rank 0. Collective.
 
     Raises `InputError` on every rank if it cannot.
     """
@@ -67,50 +69,19 @@ def _planned(source: Path, overrides: tuple[str, ...], output: Path | None, fold
 
     from archord.output.ranks import agreed
     from archord.output.restart import plan_extension, plan_restart  # on all ranks: it imports PETSc
-    from archord.scene.errors import InputError
-    from archord.scene.file import load_scene
 
-    def plan() -> Plan:
-        if source.is_dir() and output is not None and output.resolve() != source.resolve():
-            raise InputError(f"-o {output}: does not go with a run folder, {source}.")
-        scene = load_scene(source / "scene.toml" if source.is_dir() else source, overrides)
-        if scene.analysis.accuracy is not None:
-            raise InputError(
-                f"{source}: analysis.accuracy = {scene.analysis.accuracy:g} does not go with --restart and --extend; "
-                f"the last mesh of the run goes on with archord solve {folder} --restart."
-            )
-        return plan_extension(folder, scene) if extend else plan_restart(folder, scene)
-
-    return agreed(MPI.COMM_WORLD, plan)
+    return agreed(MPI.COMM_WORLD, lambda: (plan_extension if extend else plan_restart)(folder, load()))
 
 
-def _solve(
-    load: Callable[[], Scene],
-    folder: Path,
-    force: bool,
-    debug: bool,
-    quiet: bool,
-    begun: float,
-    start: Start | None = None,
-) -> int:
+def _solve(load: Callable[[], Scene], folder: Path, begun: float, quiet: bool, **options: Any) -> int:
     """Solve the scene that ``load`` gives rank 0 into ``folder`` on all ranks and report; returns the exit code.
-
-    ``start`` continues the run in ``folder``.
-    """
+    ``options`` as for `solve_and_report`."""
     from mpi4py import MPI
 
-    from archord.output.folder import claim_folder
-    from archord.output.ranks import agreed
     from archord.progress import solve_and_report
 
-    def claimed() -> Scene:
-        scene = load()
-        claim_folder(folder, force)
-        return scene
-
     comm = MPI.COMM_WORLD
-    scene = agreed(comm, claimed)
-    outcome = solve_and_report(scene, folder, comm, silent=quiet, start=start, debug=debug, begun=begun)
+    scene, outcome = solve_and_report(load, folder, comm, silent=quiet, begun=begun, **options)
     if outcome.warnings:
         from archord.postprocess.tables import first_of_each_kind
 
@@ -120,19 +91,12 @@ def _solve(
         print(f"archord: {outcome.message}.", file=sys.stderr)
         print(f"archord: {outcome.status}; {len(outcome.steps)} accepted steps are in {folder}.", file=sys.stderr)
     elif comm.rank == 0 and not quiet:
-        took = f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s"
-        print(f"{took}{_estimate(scene, outcome)}, results in {folder}")
+        said = f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s"
+        if outcome.accuracy is not None and outcome.accuracy.estimated is not None:
+            name, asked = "delta" if scene.force_controlled else "P", outcome.accuracy.asked
+            said += f", estimated error of {name} {outcome.accuracy.estimated:.1e} (asked {asked:g})"
+        print(f"{said}, results in {folder}")
     return {"done": 0, "stopped": 3, "interrupted": 128 + outcome.signal}[outcome.status]
-
-
-def _estimate(scene: Scene, outcome: Outcome) -> str:
-    """What a run that was asked for an accuracy says of it."""
-    accuracy = outcome.accuracy
-    if accuracy is None or accuracy.estimated is None:
-        return ""
-    parts = f"mesh {accuracy.mesh_error:.1e}, steps {accuracy.step_error:.1e}; " if scene.plastic else ""
-    name = "delta" if scene.force_controlled else "P"
-    return f", estimated error of {name} {accuracy.estimated:.1e} ({parts}asked {accuracy.asked:g})"
 
 
 @click.command()

@@ -86,7 +86,7 @@ def test_an_accuracy_is_reached_mesh_by_mesh(tmp_path):
     assert [line.split()[0] for line in lines[-5:-1]] == ["1", "2", "3", "4"]
     assert "estimated error of P" in lines[-1]
     again = archord("solve", SCENE, *asked, "--restart", cwd=tmp_path, code=2)
-    assert "analysis.accuracy = 0.05 does not go with --restart" in again.stderr
+    assert "was solved with analysis.accuracy = absent, the scene says 0.05" in again.stderr
     again = archord("solve", "runs/steel_pin", "--restart", cwd=tmp_path)
     assert again.stdout.endswith("is finished: nothing to do.\n")
 

@@ -67,7 +67,7 @@ def test_two_ranks_are_continued_by_three(tmp_path, whole):
 
 REFUSED = [
     (["run", "--restart", "--set", "pin.nu=0.31"], "run: was solved with pin.nu = 0.3, the scene says 0.31;"),
-    (["run", "--restart", "-o", "other"], "-o other: does not go with a run folder, run."),
+    (["run", "--restart", "-o", "other"], "-o does not go with a run folder"),
     (["run", "--restart", "--extend"], "choose one of --force, --restart and --extend"),
     (["run", "--extend", "--set", "load.displacement=1"], "run: ends at 0.1 already;"),
     (["nothing", "--restart"], "nothing: cannot be read: No such file or directory."),
