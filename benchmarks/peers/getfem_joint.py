@@ -14,19 +14,18 @@ Needs Debian's python3-getfem and python3-gmsh, and nothing of archord but `join
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
+import getfem as gf
 import numpy as np
-from joint_script import BLOCK, DR, ITERATIONS, LAME, MU, PIN, SIGY, NoConvergence, axis_pressure, main, mesh_bodies
+from joint_script import BLOCK, DR, ITERATIONS, LAME, MU, PIN, SIGY, axis_pressure, main, mesh_bodies
 
-TOLERANCE, FAR = 1e-10, 1e2
 ARC, LOADED, AXIS = 1, 2, 3  # regions; LOADED is the pin's top and the block's held edge
 
 
 def mesh_body(body: tuple[float, float], size: float, growth: float):
     """The pin or the block as a GetFEM mesh of second-order triangles with its regions."""
-    points, cells = mesh_bodies(gmsh, size, growth, body)
+    points, cells = mesh_bodies(size, growth, body)
     # gmsh: corners, then midpoints; GetFEM: row by row.
     cells = cells[:, [0, 3, 1, 5, 4, 2]]
     made = gf.Mesh("empty", 2)
@@ -43,17 +42,13 @@ class Joint:
 
     def __init__(self, size: float, growth: float, order: int, plastic: bool) -> None:
         self.md = md = gf.Model("real")
-        self.meshes = {name: mesh_body(body, size, growth) for name, body in (("pin", PIN), ("block", BLOCK))}
         self.laws: list[tuple] = []
         self.kept: list = []  # a model does not keep what it consists of alive
         for name, value in (("lambda", LAME), ("mu", MU), ("sigY", 1e9), ("r", 1 / size)):
             md.add_initialized_data(name, [value])
-        for name, mesh in self.meshes.items():
-            u = f"u_{name}"
-            mf = gf.MeshFem(mesh, 2)
-            mf.set_fem(gf.Fem("FEM_PK(2,2)"))
-            mim = gf.MeshIm(mesh, gf.Integ("IM_TRIANGLE(2)"))
-            self.kept += [mf, mim]
+        meshes = {name: mesh_body(body, size, growth) for name, body in (("pin", PIN), ("block", BLOCK))}
+        for name, mesh in meshes.items():
+            u, mf, mim = f"u_{name}", self._space(mesh, 2), self._points(mesh, 2)
             md.add_fem_variable(u, mf)
             if plastic:
                 md.add_fem_data(f"Previous_{u}", mf)
@@ -67,31 +62,34 @@ class Joint:
                 md.add_small_strain_elastoplasticity_brick(*self.laws[-1])
             else:
                 md.add_isotropic_linearized_elasticity_brick(mim, u, "lambda", "mu")
-            self._held(name, "axis", AXIS)
+            self._hold(mesh, name, "axis", AXIS)
         md.add_Dirichlet_condition_with_simplification("u_block", LOADED)
-        self._held("pin", "top", LOADED)
+        self._hold(meshes["pin"], "pin", "top", LOADED)
 
-        self.arc_mim = gf.MeshIm(self.meshes["pin"], gf.Integ("IM_TRIANGLE(6)"))
-        self.multipliers = gf.MeshFem(self.meshes["pin"], 2)
-        self.multipliers.set_fem(gf.Fem("FEM_PK(2,1)"))
+        self.arc, self.multipliers = self._points(meshes["pin"], 6), self._space(meshes["pin"], 2, degree=1)
         md.add_filtered_fem_variable("pressure", self.multipliers, ARC)
         contact = md.add_integral_large_sliding_contact_brick_raytracing("r", 20 * DR)
-        md.add_slave_contact_boundary_to_large_sliding_contact_brick(contact, self.arc_mim, ARC, "u_pin", "pressure")
-        mim = gf.MeshIm(self.meshes["block"], gf.Integ("IM_TRIANGLE(6)"))
-        md.add_master_contact_boundary_to_large_sliding_contact_brick(contact, mim, ARC, "u_block")
-        self.kept.append(mim)
+        md.add_slave_contact_boundary_to_large_sliding_contact_brick(contact, self.arc, ARC, "u_pin", "pressure")
+        hole = self._points(meshes["block"], 6)
+        md.add_master_contact_boundary_to_large_sliding_contact_brick(contact, hole, ARC, "u_block")
         self.dofs, self.zero = md.nbdof(), md.from_variables()
 
-    def _held(self, name: str, what: str, region: int) -> None:
+    def _space(self, mesh, components: int, degree: int = 2):
+        self.kept.append(gf.MeshFem(mesh, components))
+        self.kept[-1].set_fem(gf.Fem(f"FEM_PK(2,{degree})"))
+        return self.kept[-1]
+
+    def _points(self, mesh, degree: int):
+        self.kept.append(gf.MeshIm(mesh, gf.Integ(f"IM_TRIANGLE({degree})")))
+        return self.kept[-1]
+
+    def _hold(self, mesh, name: str, what: str, region: int) -> None:
         """Prescribe the normal displacement on a straight edge, with multipliers."""
-        mf = gf.MeshFem(self.meshes[name], 1)
-        mf.set_fem(gf.Fem("FEM_PK(2,2)"))
-        mim = gf.MeshIm(self.meshes[name], gf.Integ("IM_TRIANGLE(4)"))
-        self.kept += [mf, mim]
         force, value = f"{what}_force_{name}", f"{what}_{name}"
-        self.md.add_filtered_fem_variable(force, mf, region)
+        self.md.add_filtered_fem_variable(force, self._space(mesh, 1), region)
         self.md.add_initialized_data(value, [0.0])
-        self.md.add_normal_Dirichlet_condition_with_multipliers(mim, f"u_{name}", force, region, value)
+        points = self._points(mesh, 4)
+        self.md.add_normal_Dirichlet_condition_with_multipliers(points, f"u_{name}", force, region, value)
 
     def elastic(self, delta: float):
         """The state at ``delta`` of bodies that do not yield; from then on they do."""
@@ -104,18 +102,14 @@ class Joint:
         return found
 
     def solve(self, guess, delta: float):
-        """Equilibrium with the pin's top at ``-delta`` from the state ``guess`` on: state and iterations."""
+        """State of equilibrium from ``guess`` on, and iterations."""
         self.md.set_variable("top_pin", [-delta])
         self.md.to_variables(guess)
-        try:
-            iterations, converged = self.md.solve(
-                "max_iter", ITERATIONS, "max_res", TOLERANCE, "diverged_res", FAR, "lsolver", "mumps",
-                "lsearch", "simplest", "alpha min", 0.3,
-            )  # fmt: skip
-        except RuntimeError as error:
-            raise NoConvergence(str(error)) from None
+        limits = ("max_iter", ITERATIONS, "max_res", 1e-10, "diverged_res", 1e2)
+        search = ("lsolver", "mumps", "lsearch", "simplest", "alpha min", 0.3)
+        iterations, converged = self.md.solve(*limits, *search)
         if not converged:
-            raise NoConvergence
+            raise RuntimeError("no equilibrium")
         return self.md.from_variables(), int(iterations)
 
     def commit(self) -> None:
@@ -125,23 +119,14 @@ class Joint:
 
     def results(self) -> dict[str, float | None]:
         """Force of the whole joint, and pressure on the axis from the multipliers."""
-        force = 2 * gf.asm("generic", self.arc_mim, 0, "pressure(2)", ARC, self.md)
+        force = 2 * gf.asm("generic", self.arc, 0, "pressure(2)", ARC, self.md)
         x, y = self.multipliers.basic_dof_nodes()[:, self.multipliers.basic_dof_on_region(ARC)][:, ::2]
         pressure = np.hypot(*self.md.variable("pressure").reshape(-1, 2).T)
         return {"P": float(force), "p0": axis_pressure(np.arctan2(x, -y - DR), pressure)}
 
 
-def version() -> str:
-    """Of the library: the Python package carries none."""
-    return next(iter(re.findall(r"libgetfem\.so\.(\S+)", Path("/proc/self/maps").read_text())), "unknown")
-
-
 if __name__ == "__main__":
-    try:
-        import getfem as gf
-        import gmsh
-    except ImportError as missing:
-        sys.exit(f"GetFEM cannot run here: {missing}")
     gf.util_trace_level(0)
     gf.util_warning_level(0)
-    sys.exit(main(Joint, "current", version))
+    version = re.search(r"libgetfem\.so\.(\S+)", Path("/proc/self/maps").read_text())  # the Python package has none
+    main(Joint, "current", version[1] if version else "unknown")

@@ -2,15 +2,21 @@
 
 They need nothing of archord, and start with ``python3 skfem_joint.py --case plastic --steps 20 --output r.json``.
 Units: R = 1, E* = 1. Plane strain, small strains; perfect J2 plasticity.
+
+Each has a class ``Joint(size, growth, order, plastic)``: half of the joint below the pin's diameter, discretised, with
+``dofs``, the unloaded state ``zero`` (a state holds all displacements, and can be added and multiplied by numbers) and
+
+- ``elastic(delta)``: the state with the pin's top at ``-delta`` of bodies that do not yield; from then on they do,
+- ``solve(guess, delta)``: state and iterations from a state that has its prescribed displacements, or RuntimeError,
+- ``commit()``: take over the plastic strain of the state that was solved last,
+- ``results()``: P of the whole joint in that state and, where the code tells, p0.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,41 +24,18 @@ R, DR, WIDTH, NU = 1.0, 0.005, 100.0, 0.3
 E = 2 * (1 - NU**2)
 MU, LAME = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
 SIGY = 0.002
+PENALTY = 1e5  # pressure per depth: a usual pressure E* dR/R goes 1e-5 dR deep
 ITERATIONS, CUTS = 25, 6
+TOLERANCE, FAR = 1e-8, 1e3  # of `newton`: residuals over the reaction
 PIN, BLOCK = (-DR, R), (0.0, R + DR)  # height of the centre, and radius
 
 
-class NoConvergence(RuntimeError):
-    """A solve that found no equilibrium."""
-
-
-class Joint(Protocol):
-    """Half of the joint below the pin's diameter, discretised by one of the codes, with ``dofs`` unknowns.
-
-    A state is whatever can be added and multiplied by numbers; it holds all displacements. ``zero`` is the unloaded
-    one. The pin's top is at ``-delta``.
-    """
-
-    dofs: int
-    zero: Any
-
-    def elastic(self, delta: float) -> Any:
-        """The state of the joint of bodies that do not yield; from then on they do."""
-
-    def solve(self, guess: Any, delta: float) -> tuple[Any, int]:
-        """State of equilibrium and iterations from ``guess`` on. Raises `NoConvergence`."""
-
-    def commit(self) -> None:
-        """Accept the plastic strain of the state that `solve` found last."""
-
-    def results(self) -> dict[str, float | None]:
-        """P of the whole joint and, where the code tells, p0 of the last state."""
-
-
-def mesh_bodies(gmsh, size: float, growth: float, *bodies: tuple[float, float]):
+def mesh_bodies(size: float, growth: float, *bodies: tuple[float, float]):
     """Second-order triangles of `PIN`, `BLOCK` or both, nodes on the circles: nodes ``(n, 2)`` and elements ``(m, 6)``,
     corners before midpoints. Elements have ``size`` on the arcs and grow by ``growth`` times the distance from there.
     """
+    import gmsh
+
     gmsh.initialize(interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
     geo = gmsh.model.geo
@@ -85,7 +68,19 @@ def axis_pressure(angle, pressure) -> float | None:
     return float(np.polyfit(angle[near] ** 2, pressure[near], 1)[1]) if near.sum() > 2 else None
 
 
-def load(joint: Joint, steps: int, delta: float) -> int:
+def newton(error, improve) -> int:
+    """Full steps ``improve()`` until ``error()``, the residual over the reaction, is small; returns their number."""
+    for iteration in range(ITERATIONS):
+        residual = error()
+        if iteration and residual < TOLERANCE:
+            return iteration
+        if iteration and not residual < FAR:
+            break
+        improve()
+    raise RuntimeError("no equilibrium")
+
+
+def load(joint, steps: int, delta: float) -> int:
     """Press the pin down by ``delta`` in equal steps, cut where need be; returns the iterations."""
     state, t, iterations, cut = joint.zero, 0.0, 0, 0
     rate = steps * (joint.elastic(delta / steps) - state)
@@ -94,10 +89,10 @@ def load(joint: Joint, steps: int, delta: float) -> int:
             dt = min(step / steps - t, 0.5**cut / steps)
             try:
                 new, count = joint.solve(state + dt * rate, (t + dt) * delta)
-            except NoConvergence:
+            except RuntimeError:
                 cut, iterations = cut + 1, iterations + ITERATIONS
                 if cut > CUTS:
-                    raise NoConvergence(f"no equilibrium beyond {t * delta / DR:.3f} dR") from None
+                    raise RuntimeError(f"no equilibrium beyond {t * delta / DR:.3f} dR") from None
                 continue
             joint.commit()
             rate, state, t = (new - state) / dt, new, t + dt
@@ -105,32 +100,21 @@ def load(joint: Joint, steps: int, delta: float) -> int:
     return iterations
 
 
-def main(
-    joint: Callable[[float, float, int, bool], Joint],
-    kinematics: str,
-    version: Callable[[], str],
-    orders: tuple[int, ...] = (2,),
-) -> int:
-    """Solve what the command line says with ``joint(size, growth, order, plastic)``; returns the exit code."""
+def main(joint, kinematics: str, version: str, orders: tuple[int, ...] = (2,)) -> None:
+    """Solve what the command line says with the class ``joint``."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--case", choices=["elastic", "plastic"], default="elastic")
     parser.add_argument("--size", type=float, default=0.04, help="edge length on the arcs over R")
-    parser.add_argument("--growth", type=float, help="growth of the edges per distance; min(0.25, 6.25 size) if absent")
     parser.add_argument("--order", type=int, choices=orders, default=2)
     parser.add_argument("--steps", type=int, default=2, help="equal steps to delta = 2 dR")
     parser.add_argument("--output", type=Path, default=Path("result.json"))
-    parser.add_argument("--probe", action="store_true", help="print the version if installed, else exit with 1")
+    parser.add_argument("--probe", action="version", version=version, help="print the code's version")
     options = parser.parse_args()
-    if options.probe:
-        print(version())
-        return 0
-    growth = options.growth or min(0.25, 6.25 * options.size)
-    made = joint(options.size, growth, options.order, options.case == "plastic")
+    made = joint(options.size, min(0.25, 6.25 * options.size), options.order, options.case == "plastic")
     result: dict = {"kinematics": kinematics, "P": None, "p0": None, "eps": None, "iterations": 0, "failed": None}
     try:
         result["iterations"] = load(made, options.steps, 2 * DR)
         result |= made.results()
-    except NoConvergence as error:
+    except RuntimeError as error:
         result["failed"] = str(error)
     options.output.write_text(json.dumps(result | {"dofs": made.dofs}), encoding="utf-8")
-    return 0

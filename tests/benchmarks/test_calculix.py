@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +13,7 @@ from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.calculix import (
     SecondOpinion,
     areas,
-    plastic_strain,
+    peeq_integral,
     process,
     read_contact_pressure,
     read_printed,
@@ -53,11 +50,10 @@ def test_tables_have_their_names_times_and_rows(printed, mesh):
 
 def test_forces_are_the_whole_joints_and_balance(printed):
     """Twice the printed reaction, downward positive; pin and block opposite; growing with the steps."""
-    pin, block = step_forces(printed, "PIN_TOP", 1.0), step_forces(printed, "BLOCK_HELD", 1.0)
+    pin, block = step_forces(printed, "PIN_TOP"), step_forces(printed, "BLOCK_HELD")
     line = next(line for line in (REFERENCE / "calculix.dat").read_text().splitlines() if "E-03" in line)
     assert pin[0] == -2 * float(line.split()[1])
     np.testing.assert_allclose(pin, -block, rtol=1e-6)
-    np.testing.assert_allclose(step_forces(printed, "PIN_TOP", 0.1), 10 * pin)
     assert 0 < pin[0] < pin[1]
 
 
@@ -67,19 +63,17 @@ def test_of_increments_the_end_of_the_step_counts():
         f"\n total force (fx,fy,fz) for set TOP and time  {time}\n\n   1.0-101 {force} -2.5E-20\n"
         for time, force in (("0.2500000E+00", -9.0), ("0.9999990E+00", -1.0), ("0.1000000E+01", -2.0), ("2.0", -3.0))
     )
-    assert step_forces(read_printed(text), "TOP", 1.0).tolist() == [4.0, 6.0]
-    assert step_forces(read_printed(text), "BOTTOM", 1.0).size == 0
+    assert step_forces(read_printed(text), "TOP").tolist() == [4.0, 6.0]
+    assert step_forces(read_printed(text), "BOTTOM").size == 0
     assert read_printed(text)[0].rows[0, 0] == 1e-101
 
 
 def test_uniform_plastic_strain_integrates_to_the_area(printed, mesh):
-    """PEEQ 1 everywhere gives twice the area of the half model; an elastic run has none; the largest is one of them."""
+    """PEEQ 1 everywhere gives twice the area of the half model; an elastic run has none."""
     ones = [type(b)(b.quantity, b.name, b.time, np.c_[b.rows[:, :2], np.ones(len(b.rows))]) for b in printed[4:]]
-    assert plastic_strain(ones, mesh) == pytest.approx((1.0, 2 * areas(mesh).sum()))
-    assert plastic_strain(printed[:4], mesh) == (0.0, 0.0)
-    largest, integral = plastic_strain(printed, mesh)
-    assert largest == max(b.rows[:, 2].max() for b in printed[4:])
-    assert 0 < integral < largest * 2 * areas(mesh).sum()
+    assert peeq_integral(ones, mesh) == pytest.approx(2 * areas(mesh).sum())
+    assert peeq_integral(printed[:4], mesh) == 0
+    assert 0 < peeq_integral(printed, mesh) < max(b.rows[:, 2].max() for b in printed[4:]) * 2 * areas(mesh).sum()
 
 
 def test_contact_pressure_is_the_penetration_times_the_slope(mesh):
@@ -99,18 +93,9 @@ def test_contact_pressure_is_the_penetration_times_the_slope(mesh):
 def test_the_axis_pressure_of_an_even_parabola_is_its_top():
     """Exactly, whatever its curvature; without pressure there is none."""
     angle = np.linspace(0, np.pi / 2, 40)
-    opinion = SecondOpinion(np.ones(1), 0.0, angle, 3.0 - 0.5 * angle**2, 0.0, 0.0, 1)
+    opinion = SecondOpinion(1.0, angle, 3.0 - 0.5 * angle**2, 0.0, 1)
     assert opinion.p0 == pytest.approx(3.0)
     assert np.isnan(replace(opinion, pressure=np.zeros(40)).p0)
-
-
-def test_without_calculix_the_sentence_says_how_to_get_it(tmp_path):
-    """Exit code 2, one line."""
-    command = [sys.executable, "-m", "archord.benchmarks.peers.calculix"]
-    environment = os.environ | {"PATH": str(tmp_path)}
-    result = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (2, "", 1)
-    assert "ARCHORD_TARGET=peers docker/run" in result.stderr
 
 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed (image target peers)")
@@ -130,7 +115,6 @@ def test_calculix_agrees(tmp_path, elements, yield_stress, pin, plane, tolerance
     opinion = run_once(process(scene, deck_mesh(scene, elements), tmp_path)).result
     (tmp_path / "run").mkdir()
     last = solve_scene(scene, tmp_path / "run").steps[-1]
-    assert opinion.force_balance < 1e-3
     assert pytest.approx(last.P, rel=tolerance) == opinion.P
     if elements == "quadratic":
         assert opinion.p0 == pytest.approx(last.p0, rel=0.02)

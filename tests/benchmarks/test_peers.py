@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import functools
 import json
-import os
 import subprocess
 import sys
 from importlib import import_module
+from types import ModuleType
 
 import numpy as np
 import pytest
 
-from archord.benchmarks.peers.installed import CASES, PACKAGES, PEERS, PLACE, Peer, installed, probe
+from archord.benchmarks.peers.installed import PEERS, Peer, installed, probe
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 
@@ -22,7 +22,6 @@ FORCE = {
     "elastic": {"reference": 0.0127596, "current": 0.0127785},
     "plastic": {"reference": 0.00668, "current": 0.006692},
 }
-MODULES = {"scikit-fem": "skfem", "GetFEM": "getfem", "NGSolve": "ngsolve"}
 
 
 @functools.cache
@@ -35,7 +34,7 @@ def test_every_peer_has_a_series_of_growing_cost_for_both_cases():
     assert len({peer.label for peer in PEERS}) == len({peer.script for peer in PEERS}) == len(PEERS)
     for peer in PEERS:
         assert peer.script.is_file()
-        assert set(peer.series) == set(CASES)
+        assert set(peer.series) == set(FORCE)
         for meshes in peer.series.values():
             assert list(meshes) == sorted(meshes, key=lambda mesh: (mesh[1], -mesh[0]))
             assert len(set(meshes)) == len(meshes) >= 3
@@ -58,21 +57,7 @@ def test_only_what_answers_is_listed(tmp_path):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.label)
-def test_a_script_without_its_code_says_so(tmp_path, peer):
-    """Exit code 1 and one line, with --probe and without."""
-    blocked = tmp_path / f"{MODULES[peer.label]}.py"
-    blocked.write_text(f"raise ImportError('no {blocked.stem}')\n")
-    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-    for option in ("--probe", "--size=0.16"):
-        command = [sys.executable, str(peer.script), option]
-        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-        assert (done.returncode, done.stdout) == (1, "")
-        assert done.stderr.count("\n") == 1
-        assert peer.label in done.stderr
-
-
-@pytest.mark.parametrize("label", MODULES)
+@pytest.mark.parametrize("label", [peer.label for peer in PEERS])
 @pytest.mark.parametrize(
     ("case", "mesh", "steps", "tolerance"), [("elastic", 0, 2, 1e-2), ("elastic", 1, 2, 1e-3), ("plastic", 0, 20, 1e-2)]
 )
@@ -95,6 +80,7 @@ def test_the_force_is_that_of_its_kinematics(tmp_path, label, case, mesh, steps,
 def test_return_map_of_scikit_fems_peer(monkeypatch):
     """Stress, tangent and plastic strain are those of archord's perfectly plastic material, below yield and beyond."""
     monkeypatch.syspath_prepend(str(PEERS[0].script.parent))  # scripts find each other there
+    monkeypatch.setitem(sys.modules, "skfem", ModuleType("skfem"))
     script, sigy = import_module("joint_script"), 0.02
     strain = np.random.default_rng(1).normal(size=(40, 2, 3)) * 0.01
     stress, tangent, history = import_module("skfem_joint").return_map(strain, np.zeros((40, 2, 4)), sigy)
@@ -104,11 +90,3 @@ def test_return_map_of_scikit_fems_peer(monkeypatch):
     np.testing.assert_allclose(stress.reshape(80, 3), expected[:, [0, 1, 3]], rtol=0, atol=1e-12 * sigy)
     np.testing.assert_allclose(tangent.reshape(80, 3, 3), modulus, rtol=0, atol=1e-12 * script.E)
     np.testing.assert_allclose(history.reshape(80, 4), state.plastic_strain, rtol=0, atol=1e-14)
-
-
-def test_the_environment_is_the_checkouts_own():
-    """Where nothing else looks for packages, and git does not look; every package with its version."""
-    root = PLACE.parents[1]
-    assert (root / "pyproject.toml").is_file()
-    assert PLACE.parent.name in (root / ".gitignore").read_text().replace("/", "").split()
-    assert all(package.count("==") == 1 for package in PACKAGES)
