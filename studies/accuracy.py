@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -23,11 +24,9 @@ from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
 from archord.presets.joint import Joint
-from archord.presets.measures import Measures
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupt, Interrupted
-from archord.solver.timer import Timer
 from archord.studies.mesh_family import RATIO, MeshFamily
 
 MOST_SUBSTEPS = 64
@@ -65,18 +64,24 @@ class Accuracy:
     levels: tuple[Level, ...]
 
 
+def solve_as_asked(
+    scene: Scene, folder: Path, comm: MPI.Comm, *, start: Start | None = None, **options: Any
+) -> Outcome:
+    """`solve_to_accuracy` where ``scene`` asks for an accuracy and no run goes on, else `solve_scene`. Collective."""
+    if scene.analysis.accuracy is None or start is not None:
+        return solve_scene(scene, folder, comm, start=start, **options)
+    return solve_to_accuracy(scene, folder, comm, **options)
+
+
 def solve_to_accuracy(
     scene: Scene,
     folder: Path,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
-    debug: bool = False,
-    timer: Timer | None = None,
-    begun: float | None = None,
+    interrupt: Interrupt | None = None,
     on_start: Callable[[Joint], None] = lambda joint: None,
-    on_step: Callable[[Measures], None] = lambda measures: None,
-    on_attempt: Callable[[float, int], None] = lambda load, iterations: None,
     on_level: Callable[[Level], None] = lambda level: None,
+    **options: Any,
 ) -> Outcome:
     """Solve ``scene``, which has an ``analysis.accuracy``, into ``folder``; the other arguments are those of
     `solve_scene`. Collective.
@@ -86,20 +91,11 @@ def solve_to_accuracy(
     shortest steps allowed do not do, a warning says so. A mesh on which the scene cannot be solved ends everything, as
     does an interrupt. Raises what `solve_scene` raises.
     """
-    with Interrupt() as interrupt:
-        options = {"debug": debug, "on_start": on_start, "on_step": on_step, "on_attempt": on_attempt}
-        search = _Search(scene, folder, comm, on_level, {**options, "interrupt": interrupt})
-        search.run({"timer": timer, "begun": begun})
+    with nullcontext(interrupt) if interrupt else Interrupt() as interrupt:
+        search = _Search(scene, folder, comm, on_start, on_level, {**options, "interrupt": interrupt})
+        with suppress(_End):
+            search.refine()
         return search.finish()
-
-
-def solve_as_asked(
-    scene: Scene, folder: Path, comm: MPI.Comm, *, start: Start | None = None, **options: Any
-) -> Outcome:
-    """`solve_to_accuracy` where ``scene`` asks for an accuracy and no run goes on, else `solve_scene`. Collective."""
-    if scene.analysis.accuracy is None or start is not None:
-        return solve_scene(scene, folder, comm, start=start, **options)
-    return solve_to_accuracy(scene, folder, comm, **options)
 
 
 class _End(Exception):
@@ -114,44 +110,40 @@ class _Search:
         scene: Scene,
         folder: Path,
         comm: MPI.Comm,
+        on_start: Callable[[Joint], None],
         on_level: Callable[[Level], None],
         options: dict[str, Any],
     ) -> None:
         if scene.analysis.accuracy is None:
             raise InputError("analysis.accuracy is missing.")
-        self.scene, self.folder, self.comm, self.on_level, self.options = scene, folder, comm, on_level, options
+        self.scene, self.folder, self.comm, self.options = scene, folder, comm, options
+        self.on_start, self.on_level = on_start, on_level
         self.asked = scene.analysis.accuracy
         self.family = MeshFamily(scene, self.asked / 2 if scene.plastic else self.asked)
         self.begun = perf_counter()
         self.levels: list[Level] = []
         self.outcome: Outcome | None = None
-        self.substeps = 1
+        self.substeps, self.dofs = 1, 0
         self.mesh_error: float | None = None
         self.step_error: float | None = None if scene.plastic else 0.0
-        self.curves: list[Curve] = []  # in steps of the final length, on the meshes that resolve the contact
 
-    def run(self, first: dict[str, Any]) -> None:
-        """Solve until the estimate is as small as asked, no finer mesh is allowed, or a run does not get to its end;
-        ``first`` are options of the first run alone."""
-        self.options_now = self.options | first
-        try:
-            for mesh in count():
-                curve, level = self._solve(mesh, self.substeps)
-                if curve is None:
-                    self._tell(level)
-                    continue
-                if self.step_error is None:
-                    curve, level = self._choose_steps(mesh, curve, level)
-                self.curves.append(curve)
-                self.mesh_error = mesh_error(self.curves, RATIO)
-                self._tell(replace(level, mesh_error=self.mesh_error))
-                if self.mesh_error is not None and self.mesh_error <= self._left_for_the_mesh():
-                    break
-        except _End:
-            pass
-
-    def _left_for_the_mesh(self) -> float:
-        return max(self.asked - (self.step_error or 0.0), self.asked / 2)
+    def refine(self) -> None:
+        """Solve until the estimate is as small as asked. Raises `_End` if no finer mesh is allowed, or a run does not
+        get to its end."""
+        curves: list[Curve] = []  # in steps of the final length, on the meshes that resolve the contact
+        for mesh in count():
+            curve, level = self._solve(mesh, self.substeps)
+            if curve is None:
+                self._tell(level)
+                continue
+            if self.step_error is None:
+                curve, level = self._choose_steps(mesh, curve, level)
+            curves.append(curve)
+            self.mesh_error = mesh_error(curves, RATIO)
+            self._tell(replace(level, mesh_error=self.mesh_error))
+            left = max(self.asked - (self.step_error or 0.0), self.asked / 2)
+            if self.mesh_error is not None and self.mesh_error <= left:
+                return
 
     def _choose_steps(self, mesh: int, curve: Curve, level: Level) -> tuple[Curve, Level]:
         """Halve the steps until what they err by is at most half of what was asked; the curve with these steps."""
@@ -160,11 +152,11 @@ class _Search:
             if finer is None:
                 raise _End
             error = step_error(curve, finer)
-            if 4 * error <= self.asked:
+            self.step_error = 2 * error
+            if 2 * self.step_error <= self.asked:
                 self._tell(replace(finer_level, step_error=error))
-                self.step_error = 2 * error
-                return curve, replace(level, step_error=2 * error)
-            self._tell(replace(level, step_error=2 * error))
+                return curve, replace(level, step_error=self.step_error)
+            self._tell(replace(level, step_error=self.step_error))
             curve, level, self.substeps, self.step_error = finer, finer_level, 2 * self.substeps, error
             if 2 * error <= self.asked or self.substeps >= MOST_SUBSTEPS:
                 return curve, replace(level, step_error=error)
@@ -181,35 +173,31 @@ class _Search:
             raise _End
         if scene is None:
             raise _End
-        begun, dofs = perf_counter(), 0
-
-        def started(joint: Joint) -> None:
-            nonlocal dofs
-            dofs = joint.n_dofs
-            self.options["on_start"](joint)
-
-        outcome = solve_scene(scene, self.folder, self.comm, **(self.options_now | {"on_start": started}))
-        self.outcome, self.options_now = outcome, self.options
+        begun, geometry = perf_counter(), scene.joint
+        self.outcome = outcome = solve_scene(scene, self.folder, self.comm, on_start=self._started, **self.options)
         steps = outcome.steps
         if outcome.status != "done" and not outcome.unseen:
             raise _End
-        by_force, touched = scene.force_controlled, any(m.contact_area for m in steps)
+        area = max(m.contact_area for m in steps)
         # P is round-off where nothing touches
-        curve = self.comm.bcast([m.delta if by_force else m.P if touched else 0.0 for m in steps])
-        geometry = scene.joint
+        values = [m.delta if scene.force_controlled else m.P if area else 0.0 for m in steps]
+        curve = self.comm.bcast(values)
         level = Level(
             mesh=mesh + 1,
             element_size=geometry.h / geometry.radius,
             growth=geometry.growth,
             substeps=substeps,
-            dofs=dofs,
+            dofs=self.dofs,
             last=curve[-1],
             seconds=round(perf_counter() - begun, 4),
             iterations=sum(m.iterations for m in steps),
         )
-        facets = max(m.contact_area for m in steps) / 2 / geometry.h / max(1.0, geometry.size_ratio)
-        pressed = max(m.delta for m in steps) > 0
-        return curve if facets >= _FEWEST_FACETS or not pressed else None, level
+        resolved = area / 2 / geometry.h / max(1.0, geometry.size_ratio) >= _FEWEST_FACETS
+        return curve if resolved or max(m.delta for m in steps) <= 0 else None, level
+
+    def _started(self, joint: Joint) -> None:
+        self.dofs = joint.n_dofs
+        self.on_start(joint)
 
     def _tell(self, level: Level) -> None:
         self.levels.append(level)
@@ -218,36 +206,34 @@ class _Search:
     def finish(self) -> Outcome:
         """Note in run.json how accurate the last run is; the outcome. Collective."""
         assert self.outcome is not None
-        outcome = self.outcome
-        known = outcome.status == "done" and self.mesh_error is not None and self.step_error is not None
-        estimated = self.mesh_error + self.step_error if known else None  # type: ignore[operator]
+        done = self.outcome.status == "done"
+        estimated = None
+        if done and self.mesh_error is not None and self.step_error is not None:
+            estimated = self.mesh_error + self.step_error
         accuracy = Accuracy(
             asked=self.asked,
             estimated=estimated,
-            mesh_error=self.mesh_error if known else None,
-            step_error=self.step_error if known else None,
+            mesh_error=None if estimated is None else self.mesh_error,
+            step_error=None if estimated is None else self.step_error,
             substeps=self.substeps,
             seconds=round(perf_counter() - self.begun, 4),
             levels=tuple(self.levels),
         )
-        warnings = [*outcome.warnings]
-        short = estimated is None or estimated > self.asked
-        if outcome.status == "done" and short and self.comm.rank == 0:
+        warnings = [*self.outcome.warnings]
+        if done and (estimated is None or estimated > self.asked) and self.comm.rank == 0:
             warnings.append(self._shortfall(accuracy))
-        outcome = replace(outcome, warnings=warnings, accuracy=accuracy)
+        outcome = replace(self.outcome, warnings=warnings, accuracy=accuracy)
         try:
-            agreed(self.comm, lambda: self._note(outcome))
+            agreed(self.comm, lambda: self._note(outcome, accuracy))
         except WriteError as error:
-            if outcome.status == "done":
+            if done:
                 outcome = replace(outcome, status="stopped", message=str(error))
         return outcome
 
-    def _note(self, outcome: Outcome) -> None:
+    def _note(self, outcome: Outcome, accuracy: Accuracy) -> None:
         path = self.folder / "run.json"
         with naming(path):
             content = json.loads(path.read_text(encoding="utf-8"))
-        accuracy = outcome.accuracy
-        assert accuracy is not None
         content |= {"status": outcome.status, "message": outcome.message, "warnings": outcome.warnings}
         content["accuracy"] = asdict(accuracy)
         content["error_estimates"] |= {"mesh": accuracy.mesh_error, "steps": accuracy.step_error}

@@ -6,7 +6,6 @@ import copy
 import hashlib
 import itertools
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,18 +15,13 @@ import numpy as np
 
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
-from archord.scene.faults import shortened
 from archord.scene.file import ALTERNATIVES, parse_scene, put, read_targets, resolved
-from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
-from archord.studies.sweep_file import LatinHypercube, Overrides, SweepFile, flattened, load_sweep
+from archord.studies.sweep_file import ABSENT, LatinHypercube, Overrides, SweepFile, flattened, load_sweep
 
-ABSENT = "none"  # the value that drops a key, so that its default holds
 MOST_CASES = 100_000
 _MOST_SENTENCES = 20
 _DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm
-_VALUE = re.compile(r"""^(\S+) = (?:"(?:[^"\\]|\\.)*"|\[.*?\]|\{.*?\}|\S+)""")
-_MARK = "\0"  # the source of a scene, which is told apart later
 
 
 @dataclass(frozen=True)
@@ -62,44 +56,9 @@ class Sweep:
         return list({case.run: case for case in reversed(self.cases)}.values())[::-1]
 
 
-def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
-    """Read the sweep file ``path``, with ``overrides`` of its base, and check the scene of every case.
-
-    Raises `InputError` with one sentence per fault.
-    """
-    path = Path(path)
-    file = load_sweep(path, overrides)
-    try:
-        found = factors(file)
-        rows = combinations(found)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    keys = list(dict.fromkeys(key for factor in found for key in factor.keys))
-    for override in overrides:
-        name = override.partition("=")[0].strip()
-        varied = next((key for key in keys if key in same_quantity(name)), None)
-        if varied:
-            by = path if varied == name else f"{path} as {varied}"
-            raise InputError(f"--set {override}: is varied by {by} already.")
-    cases: list[Case] = []
-    faults: dict[str, list[int]] = {}
-    for number, row in enumerate(rows, 1):
-        try:
-            scene = _scene(file.base, row, path)
-        except InputError as error:
-            for sentence in str(error).splitlines():
-                faults.setdefault(sentence, []).append(number)
-        else:
-            cases.append(Case(number, row, scene, run_name(scene)))
-    if faults:
-        given = [*keys, *(override.partition("=")[0].strip() for override in overrides)]
-        raise InputError("\n".join(_told(faults, path, len(rows), file.base_file, given)))
-    return Sweep(path, file, keys, cases)
-
-
 @dataclass(frozen=True)
 class Factor:
-    """One factor of the product: ``choices`` of overrides, and the section of the sweep file they come ``from``."""
+    """One factor of the product: ``choices`` of overrides, and their ``source`` in the sweep file."""
 
     source: str
     choices: list[Overrides]
@@ -110,14 +69,49 @@ class Factor:
         return list(dict.fromkeys(key for choice in self.choices for key in choice))
 
 
-def factors(sweep: SweepFile) -> list[Factor]:
-    """What is multiplied, the slowest first: list, zip, each key of the grid, Latin hypercube.
+def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
+    """Read the sweep file ``path``, with ``overrides`` of its base, and check the scene of every case.
 
-    Raises `InputError` if two of them vary the same key, or a key cannot be one of a scene.
+    Raises `InputError` with one sentence per fault.
     """
+    path = Path(path)
+    file = load_sweep(path, overrides)
+    varied = factors(file)
+    given = {override.partition("=")[0].strip(): None for override in overrides}
+    try:
+        _check_keys([*varied, Factor("--set", [given])])
+        rows = combinations(varied)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    cases: list[Case] = []
+    faults: dict[str, list[int]] = {}
+    for number, row in enumerate(rows, 1):
+        try:
+            scene = _scene(file.base, row, path)
+        except InputError as error:
+            for sentence in str(error).splitlines():
+                faults.setdefault(sentence.removeprefix(f"{path}: "), []).append(number)
+        else:
+            cases.append(Case(number, row, scene, run_name(scene)))
+    if faults:
+        told = [f"{path}: {_which(numbers, len(rows))}: {sentence}" for sentence, numbers in faults.items()]
+        if len(told) > _MOST_SENTENCES:
+            told[_MOST_SENTENCES:] = [f"{path}: has {len(told) - _MOST_SENTENCES} more faults."]
+        raise InputError("\n".join(told))
+    return Sweep(path, file, list(dict.fromkeys(key for factor in varied for key in factor.keys)), cases)
+
+
+def _which(numbers: list[int], total: int) -> str:
+    if len(numbers) == total:
+        return "every case"
+    return f"case {numbers[0]}" + (f" and {len(numbers) - 1} more" if len(numbers) > 1 else "")
+
+
+def factors(sweep: SweepFile) -> list[Factor]:
+    """What is multiplied, the slowest first: list, zip, each key of the grid, Latin hypercube."""
     found = []
     if sweep.list_:
-        found.append(Factor("[[list]]", [dict(choice) for choice in sweep.list_]))
+        found.append(Factor("[[list]]", sweep.list_))
     if sweep.zip:
         rows = zip(*sweep.zip.values(), strict=True)
         found.append(Factor("[zip]", [flattened(dict(zip(sweep.zip, row, strict=True))) for row in rows]))
@@ -125,7 +119,6 @@ def factors(sweep: SweepFile) -> list[Factor]:
         found.append(Factor("[grid]", [flattened({key: value}) for value in values]))
     if sweep.latin_hypercube is not None:
         found.append(Factor("[latin_hypercube]", samples(sweep.latin_hypercube)))
-    _check_keys(found)
     return found
 
 
@@ -144,9 +137,8 @@ def samples(hypercube: LatinHypercube) -> list[Overrides]:
     ends[log] = np.log(ends[log])
     values = ends[:, 0] + points * (ends[:, 1] - ends[:, 0])
     values[:, log] = np.exp(values[:, log])
-    return [
-        {key: float(f"{value:.{_DIGITS}g}") for key, value in zip(hypercube.ranges, row, strict=True)} for row in values
-    ]
+    rounded = [[float(f"{value:.{_DIGITS}g}") for value in row] for row in values]
+    return [dict(zip(hypercube.ranges, row, strict=True)) for row in rounded]
 
 
 def combinations(found: list[Factor]) -> list[Overrides]:
@@ -156,35 +148,28 @@ def combinations(found: list[Factor]) -> list[Overrides]:
     """
     number = math.prod(len(factor.choices) for factor in found)
     if number > MOST_CASES:
-        product = " x ".join(f"{len(factor.choices)}" for factor in found)
-        raise InputError(f"has {number} cases ({product}); {MOST_CASES} are allowed.")
+        raise InputError(f"has {number} cases; {MOST_CASES} are allowed.")
     rows = itertools.product(*(factor.choices for factor in found))
     return [dict(itertools.chain.from_iterable(choice.items() for choice in row)) for row in rows]
 
 
 def _check_keys(found: list[Factor]) -> None:
-    source: dict[str, tuple[str, str]] = {}
+    """Raise `InputError` for a key that no scene has or that cannot vary, and for a quantity that two factors give."""
+    source: dict[tuple[str, str], str] = {}
     for factor in found:
+        own: dict[tuple[str, str], str] = {}
         for key in factor.keys:
             section, _, name = key.partition(".")
             if not name or "." in name:
-                value = shortened(toml_value(next(choice[key] for choice in factor.choices if key in choice)), 60)
-                raise InputError(f"{factor.source} {key} = {value}: must read section.key, like joint.clearance.")
-            if section == "units":
+                raise InputError(f"{factor.source} {key}: must read section.key, like joint.clearance.")
+            if section == "units" and factor.source != "--set":
                 raise InputError(f"{factor.source} {key}: cannot vary; all cases of a table have the same units.")
-        taken = {other: key for key in factor.keys for other in same_quantity(key)}
-        for other, key in taken.items():
-            if other in source:
-                by, given = source[other]
-                raise InputError(f"{factor.source} {key}: is varied by {by} {given} already.")
-        source |= {other: (factor.source, key) for other, key in taken.items()}
-
-
-def same_quantity(key: str) -> list[str]:
-    """The key and its alternatives, of which a scene holds one."""
-    section, _, name = key.partition(".")
-    group = next((names for names in ALTERNATIVES.get(section, []) if name in names), (name,))
-    return [f"{section}.{other}" for other in group]
+            # of alternative keys a scene holds one
+            first = next((names[0] for names in ALTERNATIVES.get(section, []) if name in names), name)
+            if (section, first) in source:
+                raise InputError(f"{factor.source} {key}: is varied by {source[section, first]} already.")
+            own[section, first] = f"{factor.source} {key}"
+        source |= own
 
 
 def run_name(scene: Scene) -> str:
@@ -193,7 +178,7 @@ def run_name(scene: Scene) -> str:
 
 
 def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:
-    """The base with ``overrides``, checked; a sentence of a `InputError` begins with its key."""
+    """The base with ``overrides``, checked. Raises `InputError`."""
     data = copy.deepcopy(base)
     # a rigid pin first: it drops the keys of the base's pin, not those of other overrides
     for key in sorted(overrides, key=lambda key: key != "pin.rigid"):
@@ -201,30 +186,4 @@ def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:
         value = overrides[key]
         put(data, section, name, None if isinstance(value, str) and value == ABSENT else value, key)
     read_targets(data, path)
-    try:
-        return parse_scene(data, _MARK)
-    except InputError as error:
-        raise InputError(str(error).replace(f"{_MARK}: ", "")) from None
-
-
-def _told(faults: dict[str, list[int]], path: Path, total: int, base: Path | None, given: list[str]) -> list[str]:
-    """Each fault once, with the cases that have it, whatever their values; those of keys that are not ``given`` by the
-    sweep are the ``base`` file's."""
-    alike: dict[str, tuple[str, list[int]]] = {}
-    for sentence, numbers in faults.items():
-        alike.setdefault(_VALUE.sub(r"\1", sentence, 1), (sentence, []))[1].extend(numbers)
-    sentences = []
-    for sentence, numbers in list(alike.values())[:_MOST_SENTENCES]:
-        key = sentence.split()[0].rstrip(":")
-        every = len(set(numbers)) == total
-        # a CSV file's sentence begins with its path
-        own = "/" not in key and not any(f"{name}.".startswith(f"{key}.") for name in given)
-        if every and own and base is not None:
-            which = f"every case, by its base {base}"
-        else:
-            more = f" and {len(numbers) - 1} more" if len(numbers) > 1 else ""
-            which = "every case" if every else f"case {min(numbers)}{more}"
-        sentences.append(f"{path}: {which}: {sentence}")
-    if len(alike) > _MOST_SENTENCES:
-        sentences.append(f"{path}: has {len(alike) - _MOST_SENTENCES} more faults like these.")
-    return sentences
+    return parse_scene(data, str(path))

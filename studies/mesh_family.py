@@ -33,31 +33,25 @@ class MeshFamily:
         g = scene.joint
         finest = (accuracy / _MARGIN / _CONSTANTS[scene.analysis.degree]) ** (1 / 3)
         self.first = min(_COARSEST, finest * RATIO ** (_LEVELS - 1))
-        self.scale = min(1.0, expected_angle(scene) / _WIDE) / max(1.0, g.size_ratio)
         edge = g.edge_ratio if g.edge_angle is not None else 1.0
         smallest = _SMALLEST * max(1.0, 1 / g.size_ratio, 1 / edge)
-        self.scale = max(self.scale, RATIO * smallest / self.first)
+        scale = min(1.0, expected_angle(scene) / _WIDE) / max(1.0, g.size_ratio)
+        self.scale = max(scale, RATIO * smallest / self.first)
 
     def scene_of(self, level: int, substeps: int) -> Scene | None:
         """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would be too fine for the
         limits of the keys."""
-        size = self.first / RATIO**level
+        size, length = self.first / RATIO**level, 1 / substeps
         joint = self.scene.joint.model_dump(exclude_none=True)
         joint |= {"relative_element_size": _rounded(size * self.scale), "growth": _rounded(min(2.0, _GROWTH * size))}
-        rules = self.scene.stepping
-        length = 1 / substeps
-        stepping = {"initial": length, "maximum": length, "minimum": min(rules.minimum, length)}
+        stepping = self.scene.stepping.model_dump()
+        stepping |= {"initial": length, "maximum": length, "minimum": min(stepping["minimum"], length)}
         try:
-            geometry = JointGeometry.model_validate(joint)
+            sections = {"joint": JointGeometry.model_validate(joint), "stepping": Stepping.model_validate(stepping)}
         except ValidationError:
             return None
-        return self.scene.model_copy(
-            update={
-                "joint": geometry,
-                "analysis": self.scene.analysis.model_copy(update={"accuracy": None}),
-                "stepping": Stepping.model_validate(rules.model_dump() | stepping),
-            }
-        )
+        analysis = self.scene.analysis.model_copy(update={"accuracy": None})
+        return self.scene.model_copy(update={**sections, "analysis": analysis})
 
 
 def expected_angle(scene: Scene) -> float:

@@ -184,10 +184,9 @@ def fit_case(refined: Refined, load_range: tuple[float, float], confidence: floa
 
 def _run(case: Case, folder: Path) -> RunCurve:
     """The curve of a ``case``. Raises `InputError` if it is not solved, or its joint has no such law."""
-    run = of_case(case, folder)
-    status = result_of(run)
+    status = result_of(case, folder)
     if status.status not in ("done", "stopped") or not status.steps:
         raise InputError(f"{status.status}: {status.message}" if status.message else status.status)
-    curve = read_run(run).loading()
+    curve = read_run(of_case(case, folder)).loading()
     check_compatible([curve])
     return curve

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, resolved
-from archord.studies import sweep as run
 from archord.studies.cases import combinations, factors, read_sweep, run_name, samples
-from archord.studies.sweep import Share, expected_seconds
+from archord.studies.sweep import expected_seconds, part_of
 from archord.studies.sweep_file import LatinHypercube, SweepFile
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -145,7 +144,7 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
     for number, one in enumerate((sweep, unchanged)):
         folder = tmp_path / f"elsewhere{number}"
         folder.mkdir()
-        (folder / "sweep.toml").write_text(run.resolved(one.file))
+        (folder / "sweep.toml").write_text(one.file.resolved())
         again = read_sweep(folder / "sweep.toml")
         assert [(c.number, c.run) for c in again.cases] == [(c.number, c.run) for c in one.cases]
         assert again.keys == one.keys
@@ -154,22 +153,16 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
 @pytest.mark.parametrize(
     "rows",
     [
-        (
-            "gird = 3",
-            "gird = 3 is not a known key; did you mean grid? Keys are base, list, zip, grid, latin_hypercube.",
-        ),
-        ("grid = [1]", "grid = [1] must be a table."),
-        ("[grid]\njoint.clearance = 1", "grid.joint.clearance = 1 must be a list of values."),
-        ("[grid]\njoint.clearance = []", "grid.joint.clearance = [] must not be empty."),
-        ("[grid]\nclearance = [1]", "[grid] clearance = 1: must read section.key, like joint.clearance."),
+        ("gird = 3", "gird = 3: is not a known key."),
+        ("grid = [1]", "grid = [1]: input should be a valid dictionary."),
+        ("[grid]\njoint.clearance = 1", "grid.joint.clearance = 1: input should be a valid list."),
+        ("[grid]\nclearance = [1]", "[grid] clearance: must read section.key, like joint.clearance."),
         ('[grid]\nunits.length = ["m"]', "[grid] units.length: cannot vary; all cases of a table have the same units."),
-        ("[grid]", "grid must not be empty."),
-        ("zip = {}", "zip must not be empty."),
-        ("list = []", "list = [] must not be empty."),
-        ("list = 3", "list = 3 must be a list of values; write [[list]]."),
+        ("zip = {}", "zip: dictionary should have at least 1 item after validation, not 0."),
+        ("list = 3", "list = 3: input should be a valid list."),
         (
             "[zip]\npin.E = [1.0, 2.0]\npin.nu = [0.3]",
-            "zip must hold lists of one length, but pin.E has 2, pin.nu has 1.",
+            "zip: must hold lists of one length, but pin.E has 2, pin.nu has 1.",
         ),
         (
             "[grid]\njoint.clearance = [0.1]\n[[list]]\njoint.relative_clearance = 0.1",
@@ -177,24 +170,18 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
         ),
         (
             "latin_hypercube = { number = 0, sed = 1, ranges = { pin.nu = [0.3, 0.1] } }",
-            "latin_hypercube.number = 0 must be at least 1.",
-            "latin_hypercube.ranges.pin.nu = [0.3, 0.1] must have a from that is less than its to.",
-            "latin_hypercube.sed = 1 is not a known key; did you mean seed? Keys are number, seed, ranges.",
+            "latin_hypercube.number = 0: input should be greater than or equal to 1.",
+            "latin_hypercube.ranges.pin.nu = [0.3, 0.1]: must have a from that is less than its to.",
+            "latin_hypercube.sed = 1: is not a known key.",
         ),
         (
             '[latin_hypercube]\nnumber = 2\nranges = { "pin.nu" = { from = 0, to = 1, scale = "log" } }',
-            'latin_hypercube.ranges.pin.nu must have a positive from where scale = "log".',
+            'latin_hypercube.ranges.pin.nu: must have a positive from where scale = "log".',
         ),
         (
             'latin_hypercube = { number = 2, ranges = { pin.E = ["a", 1.0], pin.nu = [0.1, nan] } }',
-            'latin_hypercube.ranges.pin.E = ["a", 1.0] must be two finite numbers, [low, high].',
-            "latin_hypercube.ranges.pin.nu = [0.1, NaN] must be two finite numbers, [low, high].",
-        ),
-        (
-            "[grid]\njoint.clearence = [1]",
-            "every case: joint.clearence = 1 is not a known key; did you mean clearance? Keys are model, "
-            "radius, clearance, relative_clearance, block_size, element_size, relative_element_size, size_ratio, "
-            "edge_angle, edge_ratio, growth.",
+            'latin_hypercube.ranges.pin.E.from = "a": input should be a valid number.',
+            "latin_hypercube.ranges.pin.nu.to = NaN: input should be a finite number.",
         ),
         (
             "[grid]\njoint.relative_clearance = [0.005, 0.9]\nload.steps = [1, 2, 3]",
@@ -207,52 +194,35 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
             "case 3 and 1 more: load.steps = 1.5 must be a whole number.",
         ),
         (
-            '[grid]\nload.steps = [3, "a = b c", 4, "d", 2.5]',
-            'case 2 and 2 more: load.steps = "a = b c" must be a whole number.',
+            "[grid]\npin.nu = [0.1, 0.2]\n[[list]]\nblock.nu = 0.7",
+            "every case: block.nu = 0.7 must be at most 0.499999.",
         ),
-        (
-            "grid.pin.E = [1.0, 2.0]\n[latin_hypercube]\nnumber = 30\nranges = { load.steps = [5, 6] }",
-            "every case: load.steps = NUMBER must be a whole number.",
-        ),
-        (
-            f"[grid]\npin.E = {[1.0] * 400}\nload.steps = {[1] * 400}",
-            "has 160000 cases (400 x 400); 100000 are allowed.",
-        ),
+        (f"[grid]\npin.E = {[1.0] * 400}\nload.steps = {[1] * 400}", "has 160000 cases; 100000 are allowed."),
     ],
 )
 def test_faults_are_told_in_a_sentence(tmp_path, rows):
     """File, key, value, and what is allowed; each fault once, however many cases have it."""
     text, *said = rows
-    found = [re.sub(r"5\.\d+", "NUMBER", line) for line in faults(tmp_path, text)]
-    assert sorted(found) == sorted(f"FILE: {fault}" for fault in said)
+    assert sorted(faults(tmp_path, text)) == sorted(f"FILE: {fault}" for fault in said)
+
+
+def test_of_many_faults_the_first_are_told(tmp_path):
+    said = faults(tmp_path, "[latin_hypercube]\nnumber = 30\nranges = { load.steps = [5, 6] }")
+    assert len(said) == 21
+    assert said[0].startswith("FILE: case 1: load.steps = 5.")
+    assert said[-1] == "FILE: has 10 more faults."
 
 
 @pytest.mark.parametrize(
     ("base", "text", "said"),
     [
-        ("", "", 'base is missing; give base = "scene.toml" or a [base] table.'),
-        ("", "base = 3", 'base must be a scene file, base = "scene.toml", or a table.'),
-        ("nowhere.toml", "", "HERE/nowhere.toml does not exist."),
-        (".", "", "HERE is not one."),
-        ("some.sweep.toml", "", "HERE/some.sweep.toml is a sweep."),
+        ("", "", "FILE: base: is missing."),
+        ("", "base = 3", "FILE: base = 3: input should be a valid dictionary."),
+        ("nowhere.toml", "", "HERE/nowhere.toml: cannot be read: No such file or directory."),
     ],
 )
 def test_a_base_is_needed(tmp_path, base, text, said):
-    beside = f'base = "{base}" must be a scene file, beside the sweep file; ' if base else ""
-    assert faults(tmp_path, text, base) == [f"FILE: {beside}{said.replace('HERE', str(tmp_path))}"]
-
-
-def test_a_fault_of_the_base_names_its_file(tmp_path):
-    """Unless the sweep or --set gives the key."""
-    scene = tomllib.loads(Path(ELASTIC).read_text())
-    scene["block"]["nu"] = 0.7
-    (tmp_path / "base.toml").write_text(tomli_w.dumps(scene))
-    fault = "block.nu = 0.7 must be at most 0.499999."
-    by_base = f"FILE: every case, by its base {tmp_path}/base.toml: {fault}"
-    assert faults(tmp_path, "[grid]\npin.nu = [0.1, 0.2]", "base.toml") == [by_base]
-    assert faults(tmp_path, "[grid]\nblock.nu = [0.7]", "base.toml") == [f"FILE: every case: {fault}"]
-    assert faults(tmp_path, "", "base.toml", ["block.nu=0.7"]) == [f"FILE: every case: {fault}"]
-    assert faults(tmp_path, "[grid]\nblock.nu = [0.7, 0.3]", "base.toml") == [f"FILE: case 1: {fault}"]
+    assert faults(tmp_path, text, base) == [said.replace("HERE", str(tmp_path))]
 
 
 def test_examples_are_sound(tmp_path):
@@ -270,11 +240,9 @@ def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
     text = "[grid]\njoint.clearance = [0.005, 0.006]"
     sweep = read_sweep(written(tmp_path, text), ["load.steps=3"])
     assert [case.scene.load.steps for case in sweep.cases] == [3, 3]
-    said = faults(tmp_path, text, overrides=["joint.clearance=0.1"])
-    assert said == [f"--set joint.clearance=0.1: is varied by {tmp_path}/some.sweep.toml already."]
-    said = faults(tmp_path, text, overrides=["joint.relative_clearance=0.1"])
-    by = f"{tmp_path}/some.sweep.toml as joint.clearance"
-    assert said == [f"--set joint.relative_clearance=0.1: is varied by {by} already."]
+    for key in ("joint.clearance", "joint.relative_clearance"):
+        said = faults(tmp_path, text, overrides=[f"{key}=0.1"])
+        assert said == [f"FILE: --set {key}: is varied by [grid] joint.clearance already."]
 
 
 def test_scenes_and_sweeps_are_told_apart(tmp_path):
@@ -290,10 +258,10 @@ def test_the_parts_of_an_array_are_the_whole(tmp_path):
     """Every case in one part, and the parts take about as long."""
     text = "[grid]\njoint.relative_element_size = [0.3, 0.1, 0.05]\nload.steps = [1, 2, 3, 4, 5, 6, 7, 8]"
     cases = read_sweep(written(tmp_path, text)).cases
-    parts = [Share.parse(f"{i}/3").of(cases) for i in (1, 2, 3)]
+    parts = [part_of(cases, f"{i}/3") for i in (1, 2, 3)]
     assert sorted(case.number for part in parts for case in part) == [case.number for case in cases]
     cost = [sum(expected_seconds(case.scene) for case in part) for part in parts]
     assert max(cost) < 1.2 * min(cost)
     for wrong in ("0/3", "4/3", "1", "a/b", "1/0"):
         with pytest.raises(InputError, match=f"--array {wrong}: must be I/N"):
-            Share.parse(wrong)
+            part_of(cases, wrong)

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
@@ -36,7 +35,7 @@ def test_each_case_is_what_solve_makes_of_it(solved, tmp_path):
 
 
 def test_tables_are_tidy(solved):
-    """A row per case and step, the varied keys in columns of their own with their units; three tables, one content."""
+    """A row per case and step, the varied keys in columns with their units; a row per case with the last step."""
     rows = table(solved / "out" / "sweep.csv")
     assert list(rows[0])[:6] == ["case", "run", "status", "pin.E [E*]", "load.steps", "step"]
     assert [(row["case"], row["step"]) for row in rows] == [
@@ -45,20 +44,14 @@ def test_tables_are_tidy(solved):
     assert {(row["case"], row["pin.E [E*]"], row["load.steps"]) for row in rows} == {
         (str(1 + 2 * i + j), f"{E:g}", str(n)) for i, E in enumerate((0.5, 1.0, 1.82)) for j, n in enumerate((2, 3))
     }
-    with h5py.File(solved / "out" / "sweep.h5") as file:
-        steps, cases = file["steps"][()], file["cases"][()]
-    assert list(steps.dtype.names) == list(rows[0])
-    for name in set(rows[0]) - {"run", "status"}:
-        assert steps[name] == pytest.approx([float(row[name]) for row in rows], rel=1e-11, abs=0), name
-    assert [value.decode() for value in steps["run"]] == [row["run"] for row in rows]
     ends = table(solved / "out" / "cases.csv")
-    assert len(ends) == len(cases) == 6
-    for end, case in zip(ends, cases, strict=True):
+    assert len(ends) == 6
+    for end in ends:
         own = [row for row in rows if row["case"] == end["case"]]
         assert {name: end[name] for name in ("P [E* R]", "eps [rad]", "work/(E* R2)")} == {
             name: own[-1][name] for name in ("P [E* R]", "eps [rad]", "work/(E* R2)")
         }
-        assert int(end["iterations"]) == case["iterations"] == sum(int(row["iterations"]) for row in own)
+        assert int(end["iterations"]) == sum(int(row["iterations"]) for row in own)
         assert (end["status"], end["message"], end["steps"]) == ("done", "", str(len(own)))
 
 
@@ -102,7 +95,7 @@ def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, refused):
 def test_identical_cases_are_solved_once(tmp_path, capsys):
     file = written(tmp_path, "[grid]\njoint.clearance = [0.005, 0.0050]\nload.steps = [1, 1]\n")
     assert sweep(file, "-o", tmp_path / "out") == 0
-    assert "4 cases, 1 of them distinct" in capsys.readouterr().out
+    assert "4 cases, 1 distinct" in capsys.readouterr().out
     rows = numbers(tmp_path / "out")
     assert [row.pop("case") for row in rows] == ["1", "2", "3", "4"]
     assert rows == 4 * rows[:1]
@@ -115,10 +108,11 @@ def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
     break_mesh(monkeypatch, "two\nlines", below=0.75)
     text = f"[[list]]\nload.steps = 1\n[[list]]\n{STUCK}[[list]]\npin.E = 0.5\n[[list]]\npin.nu = 0.2\n"
     file, out = written(tmp_path, text), tmp_path / "out"
-    runs = [case.run for case in read_sweep(file).cases]
+    cases = read_sweep(file).cases
+    runs = [case.run for case in cases]
     assert sweep(file, "-o", out) == 3
     said, err = capsys.readouterr()
-    assert "2 done, 1 stopped, 1 failed" in said
+    assert "2 done, 1 failed, 1 stopped" in said
     assert f"archord: case 2, {runs[1]}: stopped: " in err
     ends = table(out / "cases.csv")
     assert [end["status"] for end in ends] == ["done", "stopped", "failed", "done"]
@@ -132,7 +126,7 @@ def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
     monkeypatch.undo()
     assert sweep(file, "-o", out, "-q", "--retry") == 3
     assert [end["status"] for end in table(out / "cases.csv")] == ["done", "stopped", "done", "done"]
-    assert result_of(failure.parent).status == "done"
+    assert result_of(cases[2], out).status == "done"
     assert not failure.exists()
 
 
@@ -152,11 +146,13 @@ def test_an_array_solves_the_whole(tmp_path, solved):
         assert sweep(file, "-o", out, "--array", part, "-q") == 0
         assert sum(row["status"] == "done" for row in table(out / "cases.csv")) == done
     assert numbers(out) == numbers(_again(solved))
-    for name in ("sweep.csv", "cases.csv", "sweep.h5"):
+    for name in ("sweep.csv", "cases.csv"):
         (out / name).unlink()
+    (out / "sweep.h5").touch()  # a table that version 0.1 wrote, too
     before = times(out)
     assert sweep(file, "-o", out, "--gather", "-q") == 0
     assert numbers(out) == numbers(solved / "out")
+    assert not (out / "sweep.h5").exists()
     assert times(out) == before
 
 
@@ -171,10 +167,9 @@ def _again(solved: Path) -> Path:
     [
         (["FILE", "--dry-run"], ""),
         (["FILE", "--array", "3/2"], "--array 3/2: must be I/N, with I from 1 to N.\n"),
-        (["FILE", "--ranks-per-case", "2"], "--ranks-per-case 2: must divide the number of ranks, 1.\n"),
         (["FILE", "--gather"], "runs/some: holds no sweep to gather.\n"),
         (["FILE", "-o", "full"], "full: is not empty and holds no sweep; choose another folder with -o.\n"),
-        (["FILE", "-o", "full/file"], "full/file: is a file, not the folder of a sweep.\n"),
+        (["FILE", "-o", "full/file"], "full/file: cannot be used for a sweep: Not a directory.\n"),
         (["WRONG"], "WRONG: case 2: pin.E = -1.0 must be greater than 0.\n"),
         (["full"], "full: is not the folder of a sweep: sweep.toml is missing.\n"),
         (["nowhere.toml"], "nowhere.toml: cannot be read: No such file or directory.\n"),
@@ -192,13 +187,13 @@ def test_nothing_is_written_by_a_dry_run_or_bad_input(tmp_path, monkeypatch, cap
     assert err == said.replace("WRONG", wrong)
     assert code == (2 if said else 0)
     if not said:
-        assert out.startswith("6 cases; about ")
+        assert out.startswith("6 cases, 6 distinct; about ")
         assert [line.split()[0] for line in out.splitlines()[2:]] == ["1", "2", "3", "4", "5", "6"]
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_numbers_of_absent_and_mixed_keys(tmp_path):
-    """An absent key is empty in the CSV and nan in the HDF5 file, text and lists are text."""
+    """An absent key is empty, lists are as in TOML."""
     text = """
         [[list]]
         block.yield_stress = "none"
@@ -212,8 +207,3 @@ def test_numbers_of_absent_and_mixed_keys(tmp_path):
     rows = table(tmp_path / "out" / "cases.csv")
     assert [row["block.yield_stress [E*]"] for row in rows] == ["", "", "0.05", "0.05"]
     assert [row["load.displacement"] for row in rows] == 2 * ["0.5", "[0.5, 0.2]"]
-    with h5py.File(tmp_path / "out" / "sweep.h5") as file:
-        cases = file["cases"][()]
-    assert np.isnan(cases["block.yield_stress [E*]"][:2]).all()
-    assert cases["analysis.plane"][0] == b"stress"
-    assert cases["load.displacement"][1] == b"[0.5, 0.2]"

@@ -127,7 +127,7 @@ def test_the_job_script_calls_what_exists(tmp_path):
     script, file = root / "docs" / "cluster" / "sweep.sbatch", written(tmp_path, TEXT)
     command = ["bash", str(script), file, "-o", str(tmp_path / "out")]
     task = {"SLURM_ARRAY_TASK_ID": "7", "SLURM_ARRAY_TASK_COUNT": "12", "TMPDIR": str(tmp_path)}
-    for option, environment, said in (("--dry-run", {}, "12 cases; "), ("-q", task, "")):
+    for option, environment, said in (("--dry-run", {}, "12 cases, "), ("-q", task, "")):
         environment = ENVIRONMENT | environment
         result = subprocess.run([*command, option], cwd=tmp_path, env=environment, capture_output=True, text=True)
         assert result.returncode == 0, result.stderr
