@@ -12,7 +12,7 @@ import signal
 import threading
 import traceback
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -63,7 +63,7 @@ def solve_cases(comm: MPI.Intracomm, cases: list[Case], folder: Path, report: Ca
         gc.unfreeze()
 
 
-def _share(executor: Executor, cases: list[Case], folder: Path, report: Callable[[Result], Any]) -> None:
+def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Result], Any]) -> None:
     """Hand ``cases`` to the other ranks, and solve here from the end of the list."""
     lock = threading.Lock()
 
