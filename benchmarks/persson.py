@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 from scipy.optimize import brentq
@@ -53,28 +52,19 @@ def theory(load: float, alpha: float = 0.0) -> tuple[float, float]:
 
 def main() -> None:
     """Solve and print."""
-    angles = ("eps [deg]", "theory", "difference")
-    table = Table("case", "E* dR/P", "h/R", "R p0/P", "theory", "difference", *angles, "time")
-
-    def compare(
-        name: str, load: float, size: float = 0.04, steps: int = 1, alpha: float = 0.0, sections: dict | None = None
-    ) -> None:
-        start = perf_counter()
-        with tempfile.TemporaryDirectory() as folder:
-            m = Case(name, persson_joint(load, size, steps, **(sections or {}))).solve(Path(folder)).steps[-1]
-        eps, peak = theory(load, alpha)
-        pressure = f"{m.p0 / m.P:.6f}", f"{peak:.6f}", f"{m.p0 / m.P / peak - 1:+.1e}"
-        angle = (f"{np.degrees(value):{form}}" for value, form in ((m.eps, ".3f"), (eps, ".3f"), (m.eps - eps, "+.3f")))
-        table.add(name, f"{load:g}", f"{size:g}", *pressure, *angle, f"{perf_counter() - start:.1f} s")
-
-    for load in LOADS:
-        for size in (0.08, 0.04, 0.02):
-            compare("like bodies", load, size)
-    for load in INTERFERENCE:
-        compare("interference", load, steps=4)
+    cases: list[tuple] = [("like bodies", load, h, 1, 0.0, {}) for load in LOADS for h in (0.08, 0.04, 0.02)]
+    cases += [("interference", load, 0.04, 4, 0.0, {}) for load in INTERFERENCE]
     for pair in (UNLIKE, UNLIKE[::-1]):
         bodies, alpha = unlike(*pair)
-        compare(f"unlike, alpha = {alpha:+.3f}", 0.5, alpha=alpha, sections=bodies)
+        cases.append((f"unlike, alpha = {alpha:+.3f}", 0.5, 0.04, 1, alpha, bodies))
+    table = Table("case", "E* dR/P", "h/R", "R p0/P", "theory", "difference", "eps [deg]", "theory", "difference")
+    for name, load, size, steps, alpha, bodies in cases:
+        with tempfile.TemporaryDirectory() as folder:
+            m = Case(name, persson_joint(load, size, steps, **bodies)).solve(Path(folder)).steps[-1]
+        eps, peak = theory(load, alpha)
+        pressure = f"{m.p0 / m.P:.6f}", f"{peak:.6f}", f"{m.p0 / m.P / peak - 1:+.1e}"
+        angle, known = np.degrees(m.eps), np.degrees(eps)
+        table.add(name, f"{load:g}", f"{size:g}", *pressure, f"{angle:.3f}", f"{known:.3f}", f"{angle - known:+.3f}")
     print(table.markdown(), end="")
 
 

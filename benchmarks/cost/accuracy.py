@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from archord.postprocess.convergence import difference
 from archord.report.files import write_report
 from archord.report.table import Table
 from archord.scene.scene import Scene
-from archord.studies.accuracy import Accuracy, solve_to_accuracy
+from archord.studies.accuracy import solve_to_accuracy
 from archord.studies.mesh_family import RATIO, MeshFamily
 
 ELASTIC = 1e-2, 3e-3, 1e-3, 3e-4, 1e-4
@@ -46,36 +45,20 @@ CASES = (
 )
 
 
-@dataclass(frozen=True)
-class Line:
-    """What one accuracy led to; ``true_error`` of the curve against the reference, over its largest value."""
-
-    case: Case
-    accuracy: Accuracy
-    true_error: float
-
-    def fault(self) -> str | None:
-        """A sentence if the estimate or the error is larger than what was asked."""
-        asked, estimated = self.accuracy.asked, self.accuracy.estimated
-        if estimated is None or estimated > asked:
-            return f"{self.case.name}: {asked:g} was not reached"
-        if self.true_error > asked:
-            return f"{self.case.name}: the error is {self.true_error:.1e}, {asked:g} was asked"
-        return None
-
-
 def run(
     folder: Path,
     cases: Sequence[Case] = CASES,
     said: Said = lambda sentence: None,
     asked: Sequence[float] | None = None,
-) -> list[Line]:
+) -> tuple[list[dict[str, object]], list[str]]:
     """Solve ``cases`` below ``folder`` to the accuracies ``asked``, those of their material if absent, references
     first; ``said`` follows each run.
 
-    Raises `RuntimeError` if one fails.
+    Returns the entries of each accuracy by heading, with the true error of the curve, over its largest value, and a
+    sentence for every estimate or error that is larger than what was asked. Raises `RuntimeError` if a run fails.
     """
-    lines = []
+    rows: list[dict[str, object]] = []
+    faults = []
     for case in cases:
         known = reference(case, folder, said)
         for wanted in asked or (PLASTIC if case.scene.plastic else ELASTIC):
@@ -84,12 +67,31 @@ def run(
             outcome = solve_to_accuracy(varied(case.scene, analysis={"accuracy": wanted}), run_folder)
             if outcome.status == "interrupted":
                 raise KeyboardInterrupt
-            if outcome.status != "done" or outcome.accuracy is None:
+            found = outcome.accuracy
+            if outcome.status != "done" or found is None:
                 raise RuntimeError(f"{run_folder.name}: {outcome.message}")
             error = difference(_curve(case.scene, outcome), known, float(np.abs(known).max()))
-            lines.append(Line(case, outcome.accuracy, error))
-            said(f"{case.name}: {wanted:g}: {outcome.accuracy.estimated} estimated, {error:.1e} true")
-    return lines
+            said(f"{case.name}: {wanted:g}: {found.estimated} estimated, {error:.1e} true")
+            if found.estimated is None or found.estimated > wanted:
+                faults.append(f"{case.name}: {wanted:g} was not reached")
+            elif error > wanted:
+                faults.append(f"{case.name}: the error is {error:.1e}, {wanted:g} was asked")
+            rows.append(
+                {
+                    "joint": case.name,
+                    "asked": f"{wanted:g}",
+                    "estimated": f"{found.estimated or nan:.1e}",
+                    "true": f"{error:.1e}",
+                    "of the mesh": f"{found.mesh_error or nan:.1e}",
+                    "of the steps": f"{found.step_error:.1e}" if found.step_error else "",
+                    "meshes": found.levels[-1].mesh,
+                    "element size / R": f"{found.levels[-1].element_size:.3g}",
+                    "substeps": found.substeps,
+                    "dofs": found.levels[-1].dofs,
+                    "seconds": f"{found.seconds:.1f}",
+                }
+            )
+    return rows, faults
 
 
 def reference(case: Case, folder: Path, said: Said) -> np.ndarray:
@@ -117,23 +119,7 @@ def _curve(scene: Scene, outcome: Outcome) -> list[float]:
     return [m.delta if scene.force_controlled else m.P for m in outcome.steps]
 
 
-def write(lines: Sequence[Line], folder: Path) -> tuple[str, list[Path]]:
+def write(rows: Sequence[dict[str, object]], folder: Path) -> tuple[str, list[Path]]:
     """Write accuracy.csv and accuracy.md into ``folder``; returns the table and the files."""
-    rows = [
-        {
-            "joint": line.case.name,
-            "asked": f"{a.asked:g}",
-            "estimated": f"{a.estimated or nan:.1e}",
-            "true": f"{line.true_error:.1e}",
-            "of the mesh": f"{a.mesh_error or nan:.1e}",
-            "of the steps": f"{a.step_error:.1e}" if a.step_error else "",
-            "meshes": a.levels[-1].mesh,
-            "element size / R": f"{a.levels[-1].element_size:.3g}",
-            "substeps": a.substeps,
-            "dofs": a.levels[-1].dofs,
-            "seconds": f"{a.seconds:.1f}",
-        }
-        for line, a in ((line, line.accuracy) for line in lines)
-    ]
     text = Table.of(rows).markdown()
     return text, write_report(folder, "accuracy", rows, text)

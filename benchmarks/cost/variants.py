@@ -1,159 +1,158 @@
-"""What one scene costs in variants: each should pay only for what it uses. ``archord benchmark variants``."""
+"""Scenes and sweeps with one thing switched, by turns: ``archord benchmark variants``.
+
+Each run is a process of its own, timed from outside; nothing else should run. The sets of variants.toml are in groups:
+"joint" (one scene in variants, each of which should load only what it uses), "sweep" (on one rank and on two) and
+"strategies" (without each linear strategy; docs/development/linear_strategies.md says what was decided by it).
+"""
 
 from __future__ import annotations
 
 import json
 import sys
+import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import median
 
-from archord.benchmarks.case import Case, paper_joint
+from archord.benchmarks.case import paper_joint, slug
+from archord.benchmarks.cost.scaling import launcher
 from archord.benchmarks.timing import Process, Timing, time_all
-from archord.output.folder import claim_folder
 from archord.report.files import write_report
 from archord.report.table import Table
 from archord.scene.file import resolved
+from archord.scene.scene import Scene
 
-PLASTICITY = ("archord.materials.j2", "kernel radial_return")
-FIELDS = ("archord.output.fields",)
-CURVES = ("kernel closest_point",)
+SETS = tomllib.loads(Path(__file__).with_name("variants.toml").read_text(encoding="utf-8"))["set"]
+GROUPS = tuple(dict.fromkeys(given["group"] for given in SETS))
 ABSENT = ("matplotlib", "pyvista", "scipy", "rich", "numba")  # from a solve
-WATCHED = (*ABSENT, *PLASTICITY, *FIELDS, *CURVES, "dolfinx")
-
-# Runs the command line in a process of its own, and leaves a note of what that loaded before the note itself does.
+WATCHED = (*ABSENT, "dolfinx", "archord.materials.j2", "archord.output.fields", "kernel radial_return",
+           "kernel closest_point")  # fmt: skip
+WITHOUT = {
+    "": "",
+    "revised": "from archord.solver.linear import condensed; condensed._MOST_REVISIONS = 0",
+    **{
+        name: f"from archord.solver.linear.choose import LEFT_OUT; LEFT_OUT.add({name!r})"
+        for name in ("condensed", "lagged", "substructured")
+    },
+}
+_SCENES = Path(__file__).resolve().parents[2] / "scenes"
+_A_DAY = 86400.0  # seconds that a run may take
+# Runs the command line after a statement, and leaves a note of what that loaded before the note itself does.
 _PROBE = """
 import sys
-note, arguments = sys.argv[1], sys.argv[2:]
-from archord.cli import run
+note, change, arguments = sys.argv[1], sys.argv[2], sys.argv[3:]
+from archord.cli import launcher_rank, run
+exec(change)
 code = run(arguments)
 modules = sorted(sys.modules)
 import json, re
 from pathlib import Path
 kernels = sorted(set(re.findall(r"/(\\w+)-[0-9a-f]{16}\\.so", Path("/proc/self/maps").read_text())))
-Path(note).write_text(json.dumps({"modules": modules, "kernels": kernels}))
+if launcher_rank() == 0:
+    Path(note).write_text(json.dumps([*modules, *("kernel " + name for name in kernels)]))
 sys.exit(code)
 """
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A joint that is solved or, if ``drawn``, the picture of its run; what is ``unused`` must not be loaded for it."""
+    """Of the set ``case``: ``scene`` or a ``sweep`` of scenes/ is solved, or the run of ``picture_of`` drawn, on
+    ``ranks`` ranks, ``without`` a linear strategy; what is ``unused`` must not be loaded."""
 
-    case: Case
-    unused: tuple[str, ...]
-    drawn: bool = False
+    case: str
+    name: str
+    scene: Scene | None = None
+    sweep: str = ""
+    picture_of: str = ""
+    ranks: int = 1
+    without: str = ""
+    unused: Sequence[str] = ()
 
-    @property
-    def name(self) -> str:
-        """What the tables call it."""
-        return f"picture of {self.case.name}" if self.drawn else self.case.name
+    def process(self, folder: Path) -> Process:
+        """Its process in the existing ``folder``; the result is what it loaded, modules and kernels. Raises
+        `InputError` without mpirun."""
+        place, note = self.folder(folder), folder / "note.json"
+        if self.picture_of:
+            run = replace(self, name=self.picture_of).folder(folder)
+            arguments = ["picture", run.name, "-o", f"{place.name}.png"]
+        elif self.scene is None:
+            arguments = ["sweep", str(_SCENES / self.sweep), "-q", "-o", place.name]
+        else:
+            place.with_suffix(".toml").write_text(resolved(self.scene), encoding="utf-8")
+            arguments = ["solve", f"{place.name}.toml", "-q", "-o", place.name]
+        command = (*launcher(self.ranks), sys.executable, "-c", _PROBE, note.name, WITHOUT[self.without], *arguments)
+        # what is there already would not be solved again; what is compiled on first use is counted in no run
+        return Process(command, folder, lambda: json.loads(note.read_text()), _A_DAY, (place.name,), kind=place.name)
+
+    def folder(self, parent: Path) -> Path:
+        """Its output folder below ``parent``."""
+        return parent / slug(f"{self.case} {self.name}")
+
+    def faults(self, loaded: Sequence[str]) -> list[str]:
+        """A sentence for everything ``loaded`` that is not used."""
+        unused = {*self.unused, *(ABSENT if self.scene is not None else ())}
+        return [f"{self.case}, {self.name}: loads {name}, which it does not need" for name in loaded if name in unused]
 
 
-def variants(element_size: float = 0.04, steps: int = 5) -> list[Variant]:
-    """The paper's joint, elastic and plastic, deformable, with a rigid pin, without fields; and a picture."""
-    ways: dict[str, tuple[tuple[str, ...], dict]] = {
-        "": ((), {}),
-        ", rigid pin": (CURVES, {"pin": {"rigid": True}}),
-        ", no fields": (FIELDS, {"output": {"fields": False}}),
-    }
-    found = [
-        Variant(Case(material + way, paper_joint(element_size, steps, strength, **keys)), ABSENT + plain + unused)
-        for material, strength, plain in (("elastic", None, PLASTICITY), ("plastic", 0.002, ()))
-        for way, (unused, keys) in ways.items()
-    ]
-    drawn = Variant(found[len(ways)].case, ("dolfinx", "pyvista", *FIELDS, *PLASTICITY, *CURVES), drawn=True)
-    return [*found, drawn]
-
-
-@dataclass(frozen=True)
-class Use:
-    """What a variant used: median ``seconds`` of its process, peak ``memory`` and ``written`` in bytes, the number of
-    ``modules`` loaded, and those of `WATCHED` that were ``loaded``; ``dofs`` of its run."""
-
-    variant: Variant
-    dofs: int
-    seconds: float
-    memory: int
-    modules: int
-    loaded: tuple[str, ...]
-    written: int
-
-    def faults(self) -> list[str]:
-        """A sentence for everything loaded that the variant does not use."""
-        unused = [name for name in self.loaded if name in self.variant.unused]
-        return [f"{self.variant.name}: loads {name}, which it does not need" for name in unused]
+def variants(group: str) -> list[Variant]:
+    """The variants of a group, set by set."""
+    found = []
+    for given in (given for given in SETS if given["group"] == group):
+        for name, own in given["variants"].items():
+            solved = "scene" in given and "picture_of" not in own
+            scene = paper_joint(**given["scene"] | own.get("scene", {})) if solved else None
+            keys = own | {"scene": scene, "sweep": given.get("sweep", "")}
+            found.append(Variant(given["name"], name, **keys))
+    return found
 
 
 def run(
-    chosen: Sequence[Variant],
-    folder: Path,
-    repeats: int = 3,
-    said: Callable[[str], None] = lambda sentence: None,
-    *,
-    warm: bool = True,
-) -> list[Use]:
-    """Run the ``chosen`` ones ``repeats`` times, in turn, in processes of their own below ``folder``; ``said`` follows
-    each.
+    chosen: Sequence[Variant], folder: Path, repeats: int, said: Callable[[str], None] = lambda sentence: None
+) -> tuple[list[dict[str, object]], list[str]]:
+    """Run the ``chosen`` variants ``repeats`` times, in turn, below ``folder``, each once more before, uncounted;
+    ``said`` follows each run.
 
-    The first runs compile forms and kernels, which no variant pays for: each runs once more, uncounted, if ``warm``.
-    Raises `RuntimeError` if one fails.
+    Returns a row of entries for each, whose ratios are to the first of its set, run by run, the median; and a sentence
+    for everything loaded that is not used. Raises `InputError`, and `RuntimeError` if one fails.
     """
+
+    def told(process: Process, repeat: int, sentence: str) -> None:
+        variant = chosen[processes.index(process)]
+        said(f"{variant.case}, {variant.name}: {sentence}{'' if repeat else ' (not counted)'}")
+
     folder.mkdir(parents=True, exist_ok=True)
-    processes = [process(variant, folder.resolve(), warm) for variant in chosen]
-
-    def told(done: Process, repeat: int, sentence: str) -> None:
-        said(f"{chosen[processes.index(done)].name}: {sentence}{'' if repeat else ' (not counted)'}")
-
-    return [use_of(*pair, folder) for pair in zip(chosen, time_all(processes, repeats, told), strict=True)]
-
-
-def process(variant: Variant, folder: Path, warm: bool) -> Process:
-    """The command of ``variant`` in the existing ``folder``; its result is the note of what it loaded."""
-    run_folder, note = variant.case.folder(folder), folder / "note.json"
-    arguments = ["picture", str(run_folder)]
-    if not variant.drawn:
-        scene = run_folder.with_suffix(".toml")
-        scene.write_text(resolved(variant.case.scene), encoding="utf-8")
-        claim_folder(run_folder, force=True)
-        arguments = ["solve", str(scene), "-o", str(run_folder), "--force", "--quiet"]
-    command = (sys.executable, "-c", _PROBE, str(note), *arguments)
-    kind = variant.name if warm else None
-    return Process(command, folder, lambda: json.loads(note.read_text(encoding="utf-8")), kind=kind)
-
-
-def use_of(variant: Variant, timing: Timing, folder: Path) -> Use:
-    """What ``variant`` used. Raises `RuntimeError` if it failed."""
-    if timing.failure:
-        raise RuntimeError(f"{variant.name}: {timing.failure}")
-    run_folder, note = variant.case.folder(folder), timing.middle.result
-    names = {*note["modules"], *(f"kernel {name}" for name in note["kernels"])}
-    report = json.loads((run_folder / "run.json").read_text(encoding="utf-8"))
-    files = (f for f in run_folder.rglob("*") if f.is_file() and (f.name == "picture.png") == variant.drawn)
-    return Use(
-        variant,
-        dofs=report["mesh"]["dofs"],
-        seconds=timing.median,
-        memory=timing.middle.memory,
-        modules=len(note["modules"]),
-        loaded=tuple(name for name in WATCHED if name in names),
-        written=sum(file.stat().st_size for file in files),
-    )
-
-
-def write(uses: Sequence[Use], folder: Path) -> tuple[str, list[Path]]:
-    """Write variants.csv and variants.md into ``folder``; returns the table and the files."""
-    rows = [
-        {
-            "variant": used.variant.name,
-            "dofs": used.dofs,
-            "seconds": f"{used.seconds:.2f}",
-            "peak memory [MB]": f"{used.memory / 1e6:.0f}",
-            "modules": used.modules,
-            "written [kB]": f"{used.written / 1e3:.0f}",
-            **{name: "loaded" if name in used.loaded else "" for name in WATCHED},
+    processes = [variant.process(folder.resolve()) for variant in chosen]
+    rows: list[dict[str, object]] = []
+    faults: list[str] = []
+    firsts: dict[str, Timing] = {}
+    for variant, timing in zip(chosen, time_all(processes, repeats, told), strict=True):
+        if timing.failure:
+            raise RuntimeError(f"{variant.case}, {variant.name}: {timing.failure}")
+        first, loaded = firsts.setdefault(variant.case, timing), timing.middle.result
+        files = [file for file in variant.folder(folder).rglob("*") if file.is_file()]
+        entries: dict[str, object] = {
+            "case": variant.case,
+            "variant": variant.name,
+            "seconds": f"{timing.median:.2f}",
+            "times as long": f"{ratio(timing, first, 'seconds'):.2f}",
+            "CPU [s]": f"{median(run.cpu for run in timing.runs):.2f}",
+            "times the CPU": f"{ratio(timing, first, 'cpu'):.2f}",
+            "peak memory [MB]": f"{timing.middle.memory / 1e6:.0f}",
+            "written [kB]": f"{sum(file.stat().st_size for file in files) / 1e3:.0f}",
+            "loads": ", ".join(name for name in WATCHED if name in loaded),
         }
-        for used in uses
-    ]
+        rows.append(entries)
+        faults += variant.faults(loaded)
+    return rows, faults
+
+
+def ratio(one: Timing, other: Timing, what: str) -> float:
+    """``what`` ("seconds" or "cpu") of the runs of ``one`` over those of ``other``: the median of the pairs."""
+    return median(getattr(a, what) / getattr(b, what) for a, b in zip(one.runs, other.runs, strict=True))
+
+
+def write(rows: Sequence[dict[str, object]], folder: Path) -> tuple[str, list[Path]]:
+    """Write variants.csv and variants.md into ``folder``; returns the table and the files."""
     text = Table.of(rows).markdown()
     return text, write_report(folder, "variants", rows, text)

@@ -1,98 +1,98 @@
-"""The work-precision benchmark: error against wall time and dofs, archord's beside other codes' in one session."""
+"""Error against run time, archord's beside other codes' in one session: ``archord benchmark work-precision``."""
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from time import perf_counter
-from typing import cast
+from typing import Any
 
 import numpy as np
 
-from archord.benchmarks.case import Case
-from archord.benchmarks.cost.work_precision_cases import CASES, meshes
-from archord.benchmarks.cost.work_precision_codes import CALCULIX, Task, Values
-from archord.benchmarks.cost.work_precision_reference import Reference, profile_error, read_reference
-from archord.benchmarks.timing import Timing
-from archord.postprocess.convergence import Limit, extrapolated
+from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, OURS, Point, points
+from archord.benchmarks.timing import Timing, time_all
+from archord.geometry.basis import Array
+from archord.report.figure import new_figure, save
+from archord.report.files import write_report
+from archord.report.table import Table
 
 Pairs = list[tuple[float, float]]
-_SCATTER = 1e-4
+LEVELS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7)
+NAMES = {"P": "P", "p0": "p0", "eps": "contact angle", "profile": "pressure profile (L2)",
+         "dissipation": "plastic dissipation"}  # fmt: skip
+_FLOOR = 1e-9  # an error of zero has no place on a logarithmic axis
 
 
 @dataclass(frozen=True)
 class Line:
-    """A task, timed, what it found (None if it failed), and its relative errors by quantity, against the reference of
-    its kinematics."""
+    """A point, timed, and what it found, empty if it failed."""
 
-    task: Task
+    point: Point
     timing: Timing
-    values: Values | None
-    errors: dict[str, float]
-    reference: Reference
 
     @property
-    def force(self) -> float | None:
-        """P/(E* R); None if it failed."""
-        return self.values.quantities.get("P") if self.values else None
+    def found(self) -> dict[str, Any]:
+        """The result of the last run."""
+        return {} if self.timing.failure else self.timing.runs[-1].result
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Relative errors by quantity against the reference of the code's kinematics."""
+        case = CASES[self.point.case]
+        exact = case[self.found.get("kinematics", "current")]
+        errors = {name: abs(value / exact[name][0] - 1) for name, value in self.found.items() if name in exact}
+        if "profile" in self.found:
+            errors["profile"] = profile_error(self.found["profile"], np.array(case["profile"]))
+        return errors
 
 
-def judge(timing: Timing) -> Line:
-    """The errors of what a task found; none if it failed."""
-    task, errors = cast(Task, timing.process), {}
-    values: Values | None = timing.runs[-1].result if timing.done else None
-    reference = read_reference(task.case, values.kinematics if values else "current")
-    if values:
-        exact = reference.values
-        errors = {name: abs(value / exact[name] - 1) for name, value in values.quantities.items() if exact.get(name)}
-        if values.profile is not None and values.side in reference.profile:
-            errors["profile"] = profile_error(values.profile, reference.profile[values.side])
-    return Line(task, timing, values, errors, reference)
+def run(
+    folder: Path, only: Sequence[str], repeats: int, limit: float, said: Callable[[str], None] = lambda sentence: None
+) -> list[Line]:
+    """Time the points that fit ``only``, each ``repeats`` times and for ``limit`` seconds at most, in turn, below
+    ``folder``; ``said`` follows each run. Raises `InputError`."""
+    chosen = points(only)
+    processes = [point.process(folder, limit) for point in chosen]
+    names = {process.folder: point.name for process, point in zip(processes, chosen, strict=True)}
+
+    def told(process, repeat: int, sentence: str) -> None:
+        said(f"{names[process.folder]}: {sentence} ({f'{repeat} of {repeats}' if repeat else 'not counted'})")
+
+    return [Line(*pair) for pair in zip(chosen, time_all(processes, repeats, told), strict=True)]
+
+
+def profile_error(pressure: Array, reference: Array) -> float:
+    """Relative L2 difference over the arc, ``sqrt(int (p - p_ref)^2 / int p_ref^2)``; both ``(401,)`` at `ANGLES`."""
+    difference = np.trapezoid((pressure - reference) ** 2, ANGLES)
+    return float(np.sqrt(difference / np.trapezoid(reference**2, ANGLES)))
 
 
 def series_of(lines: Sequence[Line]) -> dict[tuple[str, str], list[Line]]:
     """The lines of one case by code and series, each from coarse to fine, as given."""
     found: dict[tuple[str, str], list[Line]] = {}
     for line in lines:
-        found.setdefault((line.task.code, line.task.series), []).append(line)
+        found.setdefault((line.point.code, line.point.series), []).append(line)
     return found
-
-
-def own_limit(code: str, members: Sequence[Line]) -> Limit | None:
-    """For a series of CalculiX, its P extrapolated from the four finest meshes, or from three if no more were solved;
-    None for others, and where one of the meshes moves it by more than 1e-4.
-
-    CalculiX's contact is a penalty: its P converges to a value that is a little smaller than that of exact contact.
-    """
-    pairs = [(line.task.size, line.force) for line in members if line.force is not None]
-    if code != CALCULIX or len({size for size, _ in pairs}) < 3:
-        return None
-    limit = extrapolated(*zip(*sorted(pairs)[:4], strict=True))
-    return limit if limit.error < _SCATTER * abs(limit.value) else None
 
 
 def envelopes(lines: Sequence[Line]) -> dict[str, Pairs]:
     """Per code the best of all its series in one case: pairs (seconds, error of P), where an error counts from the mesh
-    on from which its series stays below it. "CalculiX, own limit" is CalculiX against its own extrapolated P."""
+    on from which its series stays below it."""
     found: dict[str, Pairs] = {}
     for (code, _), members in series_of(lines).items():
-        judged = {code: [line.errors.get("P") for line in members]}
-        if limit := own_limit(code, members):
-            judged[f"{code}, own limit"] = [m.force and abs(m.force / limit.value - 1) for m in members]
-        for name, errors in judged.items():
-            lasted = zip(members, lasting(errors), strict=True)
-            found.setdefault(name, []).extend((line.timing.median, e) for line, e in lasted if e is not None)
+        known = [(line.timing.median, line.errors["P"]) for line in members if "P" in line.errors]
+        errors = lasting([error for _, error in known])
+        found.setdefault(code, []).extend((seconds, e) for (seconds, _), e in zip(known, errors, strict=True))
     return {code: envelope(pairs) for code, pairs in found.items() if pairs}
 
 
-def lasting(errors: Sequence[float | None]) -> list[float | None]:
+def lasting(errors: Sequence[float]) -> list[float]:
     """The errors of a series, coarse to fine, with each as large as any that follows on a finer mesh.
 
-    An error that happens to pass through zero on one mesh proves nothing of the method. Unknown errors stay None.
+    An error that happens to pass through zero on one mesh proves nothing of the method.
     """
-    return [None if error is None else max(e for e in errors[k:] if e is not None) for k, error in enumerate(errors)]
+    return [max(errors[k:]) for k in range(len(errors))]
 
 
 def envelope(pairs: Iterable[tuple[float, float]]) -> Pairs:
@@ -111,36 +111,91 @@ def seconds_at(error: float, kept: Pairs) -> float | None:
     """
     if not kept or error < kept[-1][1]:
         return None
-    seconds, errors = np.log([max(s, 1e-300) for s, _ in kept]), np.log([max(e, 1e-300) for _, e in kept])
+    seconds, errors = np.log(np.maximum(kept, 1e-300)).T
     return float(np.exp(np.interp(np.log(error), errors[::-1], seconds[::-1])))
 
 
-def warm_curves() -> list[Case]:
-    """Curves up to 2 dR, on the meshes that are good for 1e-4 (elastic) and 3e-4 (plastic) in P."""
-    elastic, plastic = (
-        meshes(0.16, growth=0.5, edge="elastic", degree=3)[0],
-        meshes(0.1, growth=0.3, edge="plastic")[0],
-    )
-    return [
-        Case("elastic, 8 steps", replace(CASES["elastic"], steps=8).scene(elastic)),
-        Case("elasto-plastic, sigY/E* = 0.2 %, 20 steps", CASES["plastic"].scene(plastic)),
-    ]
+def write(lines: Sequence[Line], folder: Path) -> tuple[str, list[Path]]:
+    """Write a table of points, as CSV and Markdown, and a diagram for each case; returns the tables and the files."""
+    texts, files = [], []
+    for case, given in CASES.items():
+        if some := [line for line in lines if line.point.case == case]:
+            rows = [row(line) for line in some]
+            codes = ", ".join(dict.fromkeys(f"{line.point.code} {line.point.version}".strip() for line in some))
+            parts = [f"**{given['title']}**: {codes}\n", Table.of(rows).markdown(), *ratios(envelopes(some))]
+            texts.append("\n".join(parts))
+            files += write_report(folder, f"work_precision_{case}", rows, texts[-1], partial(draw, case, some))
+    return "\n".join(texts), files
 
 
-def warm_seconds(repeats: int, curves: Sequence[Case] = ()) -> dict[str, list[float]]:
-    """Seconds of each of the ``curves``, or of `warm_curves`, within this process, ``repeats`` times in turn, after one
-    solve of each that is not counted: what calibrations and parameter studies pay.
+def row(line: Line) -> dict[str, object]:
+    """The entries of a point by heading; what is not known is empty."""
+    point, found, errors = line.point, line.found, line.errors
+    runs = line.timing.runs if found else []
+    seconds = sorted(run.seconds for run in runs)
+    return {
+        "code": point.code,
+        "series": point.series,
+        "mesh": f"{point.size:g} R",
+        "dofs": found.get("dofs", ""),
+        "steps": point.steps,
+        "iterations": found.get("iterations", ""),
+        "factorisations": found.get("factorisations", ""),
+        "seconds": f"{line.timing.median:.4g}" if runs else "",
+        "from - to": f"{seconds[0]:.4g} - {seconds[-1]:.4g}" if runs else "",
+        "MB": f"{max(run.memory for run in runs) / 1e6:.0f}" if runs else "",
+        "P/(E* R)": f"{found['P']:.8f}" if "P" in found else "",
+        **{f"error of {name}": f"{errors[name]:.1e}" if name in errors else "" for name in quantities(point.case)},
+        "failure": line.timing.failure,
+    }
 
-    Raises RuntimeError if one does not get to its end.
-    """
-    curves = curves or warm_curves()
-    found: dict[str, list[float]] = {case.name: [] for case in curves}
-    for repeat in range(repeats + 1):
-        for case in curves:
-            with tempfile.TemporaryDirectory() as folder:
-                start = perf_counter()
-                case.solve(Path(folder))
-                seconds = perf_counter() - start
-            if repeat:
-                found[case.name].append(seconds)
-    return found
+
+def quantities(case: str) -> list[str]:
+    """What ``case`` is judged by."""
+    return [name for name in NAMES if name == "profile" or name in CASES[case]["current"]]
+
+
+def ratios(kept: dict[str, Pairs]) -> list[str]:
+    """Seconds at equal errors of P, of archord, and in multiples of them of the other codes."""
+    others = [code for code in kept if code != OURS]
+    if OURS not in kept or not others:
+        return []
+
+    def cell(theirs: float | None, ours: float | None) -> str:
+        if theirs is None:
+            return "never"
+        return f"takes {theirs / ours:.2g} times as long" if ours else f"{theirs:.1f} s"
+
+    table = Table("error of P", f"{OURS} [s]", *others)
+    for level in LEVELS:
+        mine, times = seconds_at(level, kept[OURS]), [seconds_at(level, kept[code]) for code in others]
+        if any(time is not None for time in (mine, *times)):
+            table.add(f"{level:g}", f"{mine:.2f}" if mine else "never", *(cell(time, mine) for time in times))
+    reached = ", ".join(f"{code} {kept[code][-1][1]:.1e}" for code in (OURS, *others))
+    return [table.markdown(), f"Smallest errors of P reached: {reached}.\n"]
+
+
+def draw(case: str, lines: Sequence[Line], file: Path) -> None:
+    """Draw the errors of ``case`` over seconds (above) and dofs; grey is what the reference does not know."""
+    names, given = quantities(case), CASES[case]
+    codes = list(dict.fromkeys((OURS, *(line.point.code for line in lines))))
+    figure = new_figure(4.1 * len(names), 9)
+    panels = figure.subplots(2, len(names), sharey="col", squeeze=False)
+    for number, ((code, series), members) in enumerate(series_of(lines).items()):
+        style = {"color": f"C{codes.index(code)}", "marker": "os^Dvph*"[number % 8], "label": f"{code}, {series}"}
+        for k, name in enumerate(names):
+            known = [line for line in members if name in line.errors]
+            errors = [max(line.errors[name], _FLOOR) for line in known]
+            panels[0, k].loglog([line.timing.median for line in known], errors, **style)
+            panels[1, k].loglog([line.found["dofs"] for line in known], errors, **style)
+    for k, name in enumerate(names):
+        unknown = given["profile_error"] if name == "profile" else given["current"][name][1]
+        panels[0, k].set(xlabel="wall time of the whole process [s]", title=f"relative error of {NAMES[name]}")
+        panels[1, k].set(xlabel="degrees of freedom")
+        bottom = min(panels[0, k].get_ylim()[0], unknown / 2)
+        for ax in panels[:, k]:
+            ax.axhspan(bottom, unknown, color="0.9", zorder=0)
+            ax.set_ylim(bottom=bottom)
+            ax.grid(True, linewidth=0.4)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4, title=given["title"])
+    save(figure, file, dots=80)

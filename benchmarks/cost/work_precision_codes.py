@@ -1,191 +1,164 @@
-"""The codes of the work-precision benchmark as processes to be timed: archord, CalculiX on its decks, and peers."""
+"""The points of the work-precision benchmark: archord, CalculiX and peers on series of meshes, as timed processes.
+
+What is solved is in work_precision.toml. The result of a process is a dict of what the code found at the last step: "P"
+(over E* R), "p0" (over E*), "eps" [rad], "dissipation" (over E* R^2), "profile" (pressure over E* at `ANGLES`), "dofs",
+"iterations", "factorisations", and "kinematics" where the pairs are fixed; without what it does not tell.
+"""
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
 import math
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+import tomllib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-from archord.benchmarks.case import matches, slug
-from archord.benchmarks.cost.work_precision_cases import DECKS, SERIES, JointCase, Kinematics, Mesh, Series
-from archord.benchmarks.cost.work_precision_reference import interpolated, profile_of, values_of
+import numpy as np
+
+from archord.benchmarks.case import matches, paper_joint, slug
 from archord.benchmarks.peers import calculix
 from archord.benchmarks.peers.installed import Peer, installed
-from archord.benchmarks.timing import LIMIT, Failure, Process, last_core
+from archord.benchmarks.timing import Failure, Process
 from archord.geometry.basis import Array
 from archord.output.history import read_history
+from archord.postprocess.arc import read_arcs
+from archord.postprocess.curve import read_run
 from archord.postprocess.deck import deck_mesh
+from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.scene.file import resolved
+from archord.scene.scene import Scene
 
+DATA = tomllib.loads(Path(__file__).with_name("work_precision.toml").read_text(encoding="utf-8"))
+CASES: dict[str, dict[str, Any]] = DATA["cases"]
 OURS, CALCULIX = "archord", "CalculiX"
+ANGLES = np.linspace(0.0, np.pi / 2, 401)  # of pressure profiles, from the contact axis
+# of history.csv
+_COLUMNS = {"P": "P/(E* R)", "p0": "p0/E*", "eps": "eps", "dissipation": "plastic_dissipation/(E* R2)"}
 
 
 @dataclass(frozen=True)
-class Values:
-    """What a code found at the last step: ``quantities`` (P/(E* R), p0/E*, eps [rad], dissipation/(E* R2)) and the
-    pressure ``profile`` ``(401,)`` over E*, of the ``side`` "pin" or "hole", or "both", their mean; what it does
-    not tell is absent."""
+class Point:
+    """``code`` on the mesh of element size ``size`` (over R) of a ``series`` of ``case``, in ``steps`` steps.
 
-    quantities: dict[str, float]
-    dofs: int | None = None
-    kinematics: Kinematics = "current"
-    iterations: int | None = None
-    factorisations: int | None = None
-    profile: Array | None = None
-    side: str = "hole"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task(Process):
-    """``code`` on the mesh of element size ``size`` (in R) of a ``series`` of ``case``, to be timed; `read` gives
-    `Values`."""
+    ``prepare`` writes what the code needs into a folder, and returns the process that solves there.
+    """
 
     case: str
     code: str
+    version: str
     series: str
     size: float
     steps: int
-    version: str = ""
-
-    @property
-    def label(self) -> str:
-        """The mesh."""
-        return f"{self.size:g} R"
+    prepare: Callable[[Path], Process]
 
     @property
     def name(self) -> str:
-        """The code, its series and the mesh."""
-        return f"{self.code}, {self.series}, {self.label}"
+        """The case, the code, its series and the mesh."""
+        return f"{self.case}: {self.code}, {self.series}, {self.size:g} R"
+
+    def process(self, folder: Path, limit: float) -> Process:
+        """The process, for ``limit`` seconds at most, in a folder of its own below ``folder``, which is made."""
+        place = (folder / slug(self.name)).resolve()
+        place.mkdir(parents=True, exist_ok=True)
+        process = self.prepare(place)
+        return replace(process, limit=min(process.limit, limit), kind=(self.case, self.code, self.series))
 
 
-def tasks(
-    case: JointCase, folder: Path, *, quick: bool = False, peers: bool = True, limit: float = LIMIT
-) -> Iterator[Task]:
-    """All points of ``case``; what they need is written below ``folder``. CalculiX and peers where they are installed;
-    ``quick``: only one or two of each code's coarsest meshes."""
-    for series in SERIES:
-        if case.name in series.cases and (series.quick or not quick):
-            for mesh in series.meshes[: (1 if case.yield_stress else 2) if quick else None]:
-                yield _archord_task(case, series, mesh, folder, limit)
-    for series in DECKS if peers and shutil.which("ccx") else ():
-        if case.name in series.cases:
-            for mesh in series.meshes[: 1 if quick else None]:
-                yield _calculix_task(case, series, mesh, folder, limit)
-    for peer in installed() if peers else ():
-        for size, order in peer.series.get(case.name, ())[: 1 if quick else None]:
-            yield peer_task(case, peer, size, order, folder, limit)
-
-
-def chosen(found: Sequence[Task], patterns: Sequence[str]) -> list[Task]:
-    """Those whose code, series or "code, series, mesh" is one of ``patterns`` (with * and ?), or contains it; all
-    without any.
+def points(patterns: Sequence[str] = ()) -> list[Point]:
+    """All points, or those whose name fits one of ``patterns``; CalculiX's and peers' where they are installed.
 
     Raises `InputError` for a pattern that fits none.
     """
+    versions, peers = {OURS: VERSION} | _calculix_version(), installed()
+    found = []
+    for case, given in CASES.items():
+        for series in DATA["series"]:
+            if series["code"] in versions and case in series.get("cases", CASES):
+                steps = series.get("steps", given["steps"])
+                start = partial(Point, case, series["code"], versions[series["code"]], series["name"])
+                for size, growth in zip(series["element_size"], series["growth"], strict=True):
+                    joint = {"growth": growth} | ({"edge_angle": given["edge_angle"]} if series.get("edge") else {})
+                    analysis = {"degree": series.get("degree", 2)}
+                    scene = paper_joint(size, steps, given.get("yield_stress"), joint=joint, analysis=analysis)
+                    prepare = partial(_calculix, scene, series["elements"]) if "elements" in series else None
+                    found.append(start(size, steps, prepare or partial(_archord, scene)))
+        for peer in peers:
+            for size, order in peer.series.get(case, ()):
+                prepare = partial(_peer, peer, case, size, order, given["steps"])
+                found.append(Point(case, peer.label, peer.version, f"order {order}", size, given["steps"], prepare))
+    for pattern in patterns:
+        if not any(matches(pattern, point.name) for point in found):
+            known = ", ".join(dict.fromkeys(f"{point.case}: {point.code}, {point.series}" for point in found))
+            raise InputError(f"--only {pattern}: no point has such a name; there are {known}.")
+    return [point for point in found if not patterns or any(matches(pattern, point.name) for pattern in patterns)]
 
-    chosen_by = {p: [t for t in found if matches(p, t.name, t.code, t.series)] for p in patterns}
-    for pattern, fitting in chosen_by.items():
-        if not fitting:
-            known = ", ".join(dict.fromkeys(name for t in found for name in (t.code, t.series)))
-            raise InputError(f"--only {pattern}: no code or series has such a name; there are {known}.")
-    return [t for t in found if not patterns or any(t in fitting for fitting in chosen_by.values())]
+
+def profile(angle: Array, pressure: Array) -> Array:
+    """Pressure ``(401,)`` at `ANGLES` of one known at the angles ``(n,)``: linear, constant beyond the ends."""
+    order = np.argsort(angle)
+    return np.interp(ANGLES, angle[order], pressure[order])
 
 
-def _task(case: JointCase, code: str, series: str, size: float, folder: Path) -> Task:
-    """The task, without a command, in a folder of its own, which is made."""
-    place = (folder / slug(f"{case.name} {code} {series} {size:g} R")).resolve()
-    place.mkdir(parents=True, exist_ok=True)
-    kind = (code, case.name, series)
-    return Task(
-        (), place, core=last_core(), kind=kind, case=case.name, code=code, series=series, size=size, steps=case.steps
-    )
+def _archord(scene: Scene, folder: Path) -> Process:
+    (folder / "input.toml").write_text(resolved(scene), encoding="utf-8")
+    run = folder / "run"
 
-
-def _archord_task(case: JointCase, series: Series, mesh: Mesh, folder: Path, limit: float) -> Task:
-    scene = case.scene(mesh)
-    task = _task(case, OURS, series.name, scene.joint.h, folder)
-    (task.folder / "input.toml").write_text(resolved(scene), encoding="utf-8")
-
-    def read() -> Values:
-        run = task.folder / "run"
-        report = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        if report["status"] != "done":
-            raise Failure(report["message"])
-        return Values(
-            values_of(run, case),
-            report["mesh"]["dofs"],
-            scene.analysis.kinematics,
-            round(sum(read_history(run / "history.csv")["iterations"])),
-            report["totals"].get("factorisations"),
-            profile_of(run)["both"] / scene.E_star,
-            "both",
-        )
+    def read() -> dict[str, Any]:
+        report, history = json.loads((run / "run.json").read_text(encoding="utf-8")), read_history(run / "history.csv")
+        # the unbiased contact integrates one half of the pressure on either side
+        sides = read_arcs(read_run(run), len(history["eps"])).values()
+        return {
+            **{name: history[column][-1] for name, column in _COLUMNS.items()},
+            "profile": np.mean([profile(arc.angle.ravel(), arc.pressure.ravel()) for arc in sides], axis=0),
+            "dofs": report["mesh"]["dofs"],
+            "iterations": round(sum(history["iterations"])),
+            "factorisations": report["totals"]["factorisations"],
+        }
 
     command = (sys.executable, "-m", "archord", "solve", "input.toml", "-o", "run", "--force", "--quiet")
-    return replace(task, command=command, read=read, limit=limit, version=importlib.metadata.version("archord"))
+    return Process(command, folder, read)
 
 
-def _calculix_task(case: JointCase, series: Series, keys: Mesh, folder: Path, limit: float) -> Task:
-    if case.name == "elastic":
-        case = replace(case, steps=series.elastic_steps)
-    scene = case.scene(keys)
-    task = _task(case, CALCULIX, series.name, scene.joint.h, folder)
-    mesh = deck_mesh(scene, series.elements or "quadratic")
-    ccx = calculix.process(scene, mesh, task.folder)
+def _calculix(scene: Scene, elements: Any, folder: Path) -> Process:
+    mesh = deck_mesh(scene, elements)
+    process = calculix.process(scene, mesh, folder)
 
-    def read() -> Values:
-        opinion = ccx.read()
-        values = {"P": opinion.P, "p0": opinion.p0}
-        if case.yield_stress:
+    def read() -> dict[str, Any]:
+        opinion = process.read()
+        # neither contact angle nor profile: pressures at the nodes near the edge scatter too much
+        found = {"P": opinion.P, "p0": opinion.p0, "dofs": 2 * len(mesh.x), "iterations": opinion.iterations}
+        if scene.pin.yield_stress:
             # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
-            values["dissipation"] = case.yield_stress * opinion.peeq_integral
-        # no contact angle: pressures at the nodes near the edge scatter too much to find one
-        known = {name: value for name, value in values.items() if math.isfinite(value)}
-        profile = interpolated(opinion.angle, opinion.pressure)
-        return Values(known, 2 * len(mesh.x), iterations=opinion.iterations, profile=profile, side="pin")
+            found["dissipation"] = scene.pin.yield_stress * opinion.peeq_integral
+        return {name: value for name, value in found.items() if math.isfinite(value)}
 
-    return replace(task, command=ccx.command, clear=ccx.clear, read=read, limit=limit, version=_calculix_version())
+    return replace(process, read=read)
 
 
-@cache
-def _calculix_version() -> str:
+def _calculix_version() -> dict[str, str]:
+    """CalculiX and its version, if it is installed."""
+    if shutil.which("ccx") is None:
+        return {}
     found = re.search(r"Version (\S+)", subprocess.run(["ccx", "-v"], capture_output=True, text=True).stdout)
-    return found[1] if found else ""
+    return {CALCULIX: found[1] if found else ""}
 
 
-def peer_task(case: JointCase, peer: Peer, size: float, order: int, folder: Path, limit: float = LIMIT) -> Task:
-    """A mesh of ``peer``'s, for its own time limit or, if that is less, ``limit``."""
-    task = _task(case, peer.label, f"order {order}", size, folder)
-    output = task.folder / "result.json"
-    return replace(
-        task,
-        command=tuple(peer.command(case.name, size, order, case.steps, output)),
-        read=lambda: peer_values(output),
-        limit=min(limit, peer.time_limit),
-        clear=(output.name,),
-        version=peer.version,
-    )
+def _peer(peer: Peer, case: str, size: float, order: int, steps: int, folder: Path) -> Process:
+    output = folder / "result.json"
 
+    def read() -> dict[str, Any]:
+        found = json.loads(output.read_text(encoding="utf-8"))
+        if found["failed"]:
+            raise Failure(found["failed"])
+        return {name: value for name, value in found.items() if value is not None}
 
-def peer_values(output: Path) -> Values:
-    """What a peer's script wrote: {"P", "p0", "eps", "dofs", "iterations", "kinematics", "failed"}; null where it does
-    not know. Raises `Failure` with its own sentence, or if that is no such file."""
-    try:
-        data = json.loads(output.read_text(encoding="utf-8"))
-        if data["failed"]:
-            raise Failure(data["failed"])
-        values = {name: float(data[name]) for name in ("P", "p0", "eps") if data[name] is not None}
-        return Values(values, data["dofs"], data["kinematics"], data["iterations"])
-    except OSError:
-        raise Failure(f"wrote no {output.name}") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise Failure(f"{output.name} is not what a peer's script writes: {error!r}") from None
+    command = tuple(peer.command(case, size, order, steps, output))
+    return Process(command, folder, read, limit=peer.time_limit, clear=(output.name,))

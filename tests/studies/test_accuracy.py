@@ -12,6 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.case import Case, paper_joint
+from archord.benchmarks.cost.work_precision_codes import CASES
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.scene import geometry as scene_geometry
@@ -21,8 +22,6 @@ from archord.studies import mesh_family
 from archord.studies.accuracy import solve_to_accuracy
 from archord.studies.mesh_family import MeshFamily
 from tests.output.run_files import accepted_steps, same_run
-
-REFERENCE = Path(__file__).parents[2] / "benchmarks" / "cost" / "work_precision_reference.json"
 
 
 def open_scene(asked, steps=2, yield_stress=None, **sections):
@@ -42,7 +41,7 @@ def accurate(scene, folder, comm=MPI.COMM_SELF, **hooks):
 
 def known_force(case):
     """P at 2 dR in units of E* R, from meshes of up to 400 thousand dofs (docs/work_precision.md)."""
-    return json.loads(REFERENCE.read_text())["cases"][case]["current"]["quantities"]["P"]["value"]
+    return CASES[case]["current"]["P"][0]
 
 
 @pytest.fixture(scope="module")
