@@ -26,8 +26,9 @@ Real = TypeVar("Real", float, Array)
 _ASSUMED = 1.0  # P converges faster, but peak pressures and perfect plasticity do not for certain
 _LOWEST, _HIGHEST = 0.5, 2.0  # below, extrapolation multiplies noise; above, the error would be told too small
 _SHOWN = 0.05, 12.0  # orders that three meshes can show
-_SLOWEST, _CAUTIOUS = 1.5, 2.0  # orders that `mesh_error` takes
+_SLOWEST = 1.5  # order that `mesh_error` takes at least
 _USUAL = 3.0  # order of P on meshes that are refined everywhere (docs/accuracy.md)
+_ORDER_TOLERANCE = 1e-9
 _FREE = 1.4, 4.0  # of a clamped corner's singularity, twice its exponent of 0.7, and of smooth solutions in P2
 
 
@@ -78,19 +79,17 @@ class Refined:
         `observed_order` of the three finest, from norms over the steps they have in common, bounded to 0.5 .. 2. The
         first order is assumed with two meshes, and where the differences have no common sign or do not shrink.
         """
-        if len(curves) < 3:
-            return Order(_ASSUMED, f"{_ASSUMED:g} (assumed)")
-        n = min(map(len, curves[:3]))
-        finer, coarser = curves[1][:n] - curves[0][:n], curves[2][:n] - curves[1][:n]
-        found = -math.inf
-        if finer @ coarser > 0:
-            sizes = [run.scene.joint.h for run in self.runs[:3]]
-            found = observed_order(sizes, float(np.linalg.norm(finer)), float(np.linalg.norm(coarser)))
+        found = math.inf
+        if len(curves) > 2:
+            n = min(map(len, curves[:3]))
+            finer, coarser = curves[1][:n] - curves[0][:n], curves[2][:n] - curves[1][:n]
+            if finer @ coarser > 0:
+                sizes = [run.scene.joint.h for run in self.runs[:3]]
+                found = observed_order(sizes, float(np.linalg.norm(finer)), float(np.linalg.norm(coarser)))
         if not math.isfinite(found):
-            return Order(_ASSUMED, f"{_ASSUMED:g} (assumed: the differences of three meshes show none)")
+            return Order(_ASSUMED, f"{_ASSUMED:g} (assumed)")
         value = min(max(found, _LOWEST), _HIGHEST)
-        bounded = "" if value == found else f", which give {found:.1f}: bounded"
-        return Order(value, f"{value:.2g} (from three meshes{bounded})")
+        return Order(value, f"{value:.2g} (from three meshes)")
 
     def shift(self, curves: Sequence[Array]) -> Array:
         """What refinement still adds to the finest of ``curves`` ``(n,)``, by `richardson` from the next coarser run
@@ -111,14 +110,12 @@ def group(runs: list[RunCurve]) -> list[Refined]:
     scenes: dict[tuple, list[RunCurve]] = {}
     for run in runs:
         scenes.setdefault(_without_mesh(run.scene), []).append(run)
-    groups = []
     for same in scenes.values():
         same.sort(key=lambda run: run.scene.joint.h)
         for a, b in pairwise(same):
-            if np.isclose(a.scene.joint.h, b.scene.joint.h, rtol=1e-9, atol=0):
+            if math.isclose(a.scene.joint.h, b.scene.joint.h, rel_tol=1e-9):
                 raise InputError(f"{b.name}: is the same scene on the same mesh as {a.name}; give one of them.")
-        groups.append(Refined(same[0], tuple(same[1:])))
-    return groups
+    return [Refined(same[0], tuple(same[1:])) for same in scenes.values()]
 
 
 def _without_mesh(scene: Scene) -> tuple:
@@ -149,11 +146,11 @@ def mesh_error(curves: Sequence[Curve], ratio: float) -> float | None:
         return None
     largest = float(np.abs(curves[-1]).max())
     d = [difference(a, b, largest) for a, b in pairwise(curves)]
-    p = _CAUTIOUS
+    p = _HIGHEST
     if len(d) > 1 and d[-2] and d[-1]:
-        p = min(_CAUTIOUS, max(_SLOWEST, observed_order((1, ratio, ratio**2), d[-1], d[-2])))
+        p = min(_HIGHEST, max(_SLOWEST, observed_order((1, ratio, ratio**2), d[-1], d[-2])))
     last = richardson(d[-1], ratio, p)
-    return max([last, *(richardson(b / ratio**_USUAL, ratio, _CAUTIOUS) for b in d[-2:-1])])
+    return max([last, *(richardson(b / ratio**_USUAL, ratio, _HIGHEST) for b in d[-2:-1])])
 
 
 def step_error(coarse: Curve, fine: Curve) -> float:
@@ -177,25 +174,16 @@ def extrapolated(sizes: Sequence[float], values: Sequence[float]) -> Limit:
 
     The order is free: that of unlike meshes scatters. Raises ValueError for fewer than three different sizes.
     """
-    from scipy.optimize import minimize_scalar
-
     h, v = np.asarray(sizes, dtype=float), np.asarray(values, dtype=float)
     if len(np.unique(h)) < 3:
         raise ValueError("an extrapolation needs three element sizes")
-    spread = np.ptp(v)
-    if spread == 0:
-        return Limit(float(v[0]), _FREE[1], 0.0)
     h = h / h.max()
-
-    def misfit(order: float) -> float:
-        return float(np.log10(_fit(h, v, order)[1] / spread + 1e-300))
-
-    # the misfit over the order can have several minima: the best of a scan, then its neighbourhood
-    scan = np.linspace(*_FREE, 33)
-    best = int(np.argmin([misfit(order) for order in scan]))
-    bounds = scan[max(0, best - 1)], scan[min(len(scan) - 1, best + 1)]
-    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-9})
-    order = float(min(found.x, scan[best], key=misfit))
+    low, high = _FREE
+    while high - low > _ORDER_TOLERANCE:  # the misfit can have several minima: ever finer scans around the best order
+        orders = np.linspace(low, high, 33)
+        best = int(np.argmin([_fit(h, v, order)[1] for order in orders]))
+        low, high = orders[max(best - 1, 0)], orders[min(best + 1, 32)]
+    order = (low + high) / 2
     limit = _fit(h, v, order)[0]
     others = [_fit(np.delete(h, i), np.delete(v, i), order)[0] for i in range(len(h))]
     return Limit(limit, order, float(np.abs(np.array(others) - limit).max()))
