@@ -21,15 +21,15 @@ class Material(Protocol):
     """A constitutive law in the plane; every method is a pure function. What it does not define is that of a material
     without history, to inherit.
 
-    One that ``yields`` can leave its isotropic `elastic_tangent`, by yielding or otherwise; a body that cannot is
-    assembled once, from that tangent alone.
+    One that ``yields`` can leave its `elastic_tangent`, by yielding or otherwise; a body that cannot is assembled once,
+    from that tangent alone.
     """
 
     yields: ClassVar[bool] = False
 
     @property
     def elastic_tangent(self) -> Array:
-        """The isotropic elastic moduli ``(3, 3)`` from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx, s_yy, s_xy]``."""
+        """The elastic moduli ``(3, 3)``, symmetric, from ``[eps_xx, eps_yy, gamma_xy]`` to ``[s_xx, s_yy, s_xy]``."""
         ...
 
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:

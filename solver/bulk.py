@@ -89,17 +89,11 @@ class _PlasticBody:
 
 
 def _check_elastic_tangent(material: Material) -> None:
-    """Raise ValueError for what would be assembled wrongly: an anisotropic elastic tangent, or a response that is not
-    that tangent's though the material does not yield."""
-    C = material.elastic_tangent
-    if not np.allclose(
-        C, [[C[0, 0], C[0, 1], 0], [C[0, 1], C[0, 0], 0], [0, 0, C[2, 2]]], rtol=0, atol=1e-12 * C.max()
-    ):
-        raise ValueError(
-            "elastic_tangent of a material must be isotropic; an anisotropic one says yields = True, has an isotropic "
-            "elastic_tangent beside its own, and gives its own from update"
-        )
-    probe = 1e-3 * np.array([[3.0, -1.0, 2.0], [-20.0, 5.0, 10.0]])
+    """Raise ValueError for what would be assembled wrongly: an elastic tangent that is not symmetric, or a response
+    that is not that tangent's though the material does not yield."""
+    C, probe = material.elastic_tangent, 1e-3 * np.array([[3.0, -1.0, 2.0], [-20.0, 5.0, 10.0]])
+    if not np.allclose(C, C.T, rtol=0, atol=1e-12 * C.max()):
+        raise ValueError("elastic_tangent of a material must be symmetric")
     expected, found = probe @ C, material.update(probe, material.state(2))[0][:, [0, 1, 3]]
     if not material.yields and np.abs(found - expected).max() > 1e-9 * np.abs(expected).max():
         raise ValueError("a material whose update is not its elastic_tangent's must say yields = True")
@@ -119,11 +113,15 @@ class Bulk:
         n_owned = V.mesh.topology.index_map(2).size_local
         cells = {tag: tags.find(tag) for tag in materials}
         self.cells = {tag: c[c < n_owned] for tag, c in cells.items()}
-        u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+        u, v = _voigt(ufl.TrialFunction(V)), _voigt(ufl.TestFunction(V))
         self._plastic = {tag: _PlasticBody(V, self.cells[tag], m) for tag, m in materials.items() if m.yields}
-        self._elastic_of = {tag: self._elastic_form(tag, u, v) for tag in materials}
-        self._elastic_forms = [fem.form(form) for form in self._elastic_of.values()]
-        self._force_forms = []
+        elastic = {}
+        for tag, material in materials.items():
+            moduli = fem.Constant(V.mesh, np.array(material.elastic_tangent))
+            domain, metadata = [(1, self.cells[tag])], {"quadrature_degree": rule}
+            dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
+            elastic[tag] = fem.form(ufl.inner(ufl.dot(moduli, u), v) * dx)
+        self._elastic_forms = list(elastic.values())
         if self._plastic:
             cell, metadata = V.mesh.basix_cell(), {"quadrature_degree": rule, "quadrature_rule": "default"}
             element = {shape: basix.ufl.quadrature_element(cell, shape, degree=rule) for shape in ((3,), (3, 3))}
@@ -131,28 +129,16 @@ class Bulk:
             self._correction = fem.Function(fem.functionspace(V.mesh, element[(3, 3)]))
             domain = [(1, np.sort(np.concatenate([p.cells for p in self._plastic.values()])))]
             dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
-            self._force_forms.append(fem.form(ufl.inner(self._sigma, _voigt(v)) * dx))
-            self._corrected = ufl.inner(ufl.dot(self._correction, _voigt(u)), _voigt(v)) * dx
-            self._correction_kernel = fem.compile_form(V.mesh.comm, self._corrected)
+            self._plastic_force = fem.form(ufl.inner(self._sigma, v) * dx)
+            self._correction_kernel = fem.compile_form(V.mesh.comm, ufl.inner(ufl.dot(self._correction, u), v) * dx)
         self._corrected_cells: np.ndarray | None = None  # those of the form that was made last
         self._correction_forms: list[fem.Form] = []
-        self._action_forms: list[fem.Form] | None = None
-        self.stiffness = None
-        elastic = [form for tag, form in zip(materials, self._elastic_forms, strict=True) if tag not in self._plastic]
-        if elastic:
-            self.stiffness = matrix(V, elastic)
-            assemble(self.stiffness, elastic)
+        self.stiffness = None  # of the bodies that cannot yield
+        stiff = [form for tag, form in elastic.items() if tag not in self._plastic]
+        if stiff:
+            self.stiffness = matrix(V, stiff)
+            assemble(self.stiffness, stiff)
             self.stiffness.assemble()
-
-    def _elastic_form(self, tag: int, u, v) -> ufl.Form:
-        """Virtual work on ``v`` of the elastic stresses of ``u`` in the body with this ``tag``."""
-        mesh, moduli = self.V.mesh, self.materials[tag].elastic_tangent
-        c11, c12, c33 = (fem.Constant(mesh, float(value)) for value in moduli[[0, 0, 2], [0, 1, 2]])
-        domain, rule = [(1, self.cells[tag])], bulk_quadrature_degree(self.degree)
-        dx = ufl.Measure("dx", mesh, subdomain_data=domain, metadata={"quadrature_degree": rule})
-        eu, ev = _voigt(u), _voigt(v)
-        sigma = ufl.as_vector([c11 * eu[0] + c12 * eu[1], c12 * eu[0] + c11 * eu[1], c33 * eu[2]])
-        return ufl.inner(sigma, ev) * dx(1)
 
     @property
     def plastic(self) -> bool:
@@ -192,23 +178,20 @@ class Bulk:
         """Add the internal force of the displacement ``u`` (last passed to `update`) to ``force``."""
         if self.stiffness is not None:
             self.stiffness.multAdd(u, force, force)
-        for form in self._force_forms:
+        if self._plastic:
             with force.localForm() as local:
-                fem_petsc.assemble_vector(local, form)
+                fem_petsc.assemble_vector(local, self._plastic_force)
         force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def add_action(self, direction: fem.Function, out: PETSc.Vec) -> None:
-        """Add the tangent of the last `update`, applied to ``direction`` (always the same function), to ``out``."""
-        if self.stiffness is not None:
-            self.stiffness.multAdd(direction.x.petsc_vec, out, out)
-        if self._action_forms is None:
-            elastic = [ufl.action(self._elastic_of[tag], direction) for tag in self._plastic]
-            corrected = [ufl.action(self._corrected, direction)] if self._plastic else []
-            self._action_forms = [fem.form(form) for form in elastic + corrected]
-        for form in self._action_forms:
-            with out.localForm() as local:
-                fem_petsc.assemble_vector(local, form)
-        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        """Add the tangent of the last `update`, applied to ``direction``, to ``out``; `add_force` then needs another
+        update."""
+        for body in self._plastic.values():
+            eps = strain(body.gradient, body.dofs, direction.x.array.reshape(-1, 2))
+            q = eps.shape[1]
+            moduli = self._correction.x.array.reshape(-1, q, 3, 3)[body.cells] + body.points.material.elastic_tangent
+            self._sigma.x.array.reshape(-1, q, 3)[body.cells] = np.einsum("nqij,nqj->nqi", moduli, eps)
+        self.add_force(direction.x.petsc_vec, out)
 
     def assemble_elastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
         """Add the elastic stiffness of all bodies to ``A``."""

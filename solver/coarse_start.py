@@ -51,7 +51,7 @@ class CoarseStart:
             self.iterations = result.iterations + self.path.coarse_iterations
             self._reached = load if result.converged else None
             contact = self.coarse.contact
-            if not result.converged or (contact.interactions and contact.n_active() < _FEWEST_POINTS):
+            if not result.converged or (contact.pairs and contact.n_active() < _FEWEST_POINTS):
                 return None
             step = self.coarse.equilibrium.state() - self.path.state
             on_nodes = self.coarse.comm.bcast(self._order.collect(step[:-1].reshape(-1, 2)))

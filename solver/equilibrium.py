@@ -21,33 +21,30 @@ from archord.geometry.fenicsx import create_vector
 from archord.materials.points import Points
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
-from archord.solver.contact.law import LAWS
+from archord.solver.contact.law import Frictionless
 from archord.solver.control import FactorControl, ForceControl
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.linear.choose import choose
 from archord.solver.linear.facts import Facts, Strategy
 from archord.solver.problem import Load, Problem
 from archord.solver.tangent import TangentMatrix
-from archord.solver.timer import Timer
+from archord.solver.timer import BEFORE_SOLVING, Timer
 
 _LOAD_DEGREE = 6  # of the quadrature of distributed forces
 _MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which supports do not hold it
 
 
 class Equilibrium:
-    """Equilibrium of ``bulk`` and ``contact`` under the supports and loads of ``problem``. Collective."""
+    """Equilibrium of ``bulk`` and ``contact`` under the supports and loads of ``problem``. Collective.
 
-    def __init__(
-        self,
-        problem: Problem,
-        V: fem.FunctionSpace,
-        bulk: Bulk,
-        contact: Contact,
-        timer: Timer,
-    ) -> None:
-        self.problem, self.V, self.bulk, self.contact = problem, V, bulk, contact
+    ``linear`` is the strategy that solves with the tangent of all unknowns. What the last evaluation left are the
+    ``changes``, points that opened or closed, the ``reaction_norm`` and the ``noise``, a residual that is round-off,
+    each over all ranks; ``largest_reaction`` is the largest norm of all accepted states.
+    """
+
+    def __init__(self, problem: Problem, V: fem.FunctionSpace, bulk: Bulk, contact: Contact, timer: Timer) -> None:
+        self.problem, self.V, self.bulk, self.contact, self.timer = problem, V, bulk, contact, timer
         self.comm = V.mesh.comm
-        self.timer = timer
         self.interrupt = Interrupt()
         self.u = fem.Function(V, name="displacement")
         self.load = self.factor = 0.0
@@ -63,34 +60,29 @@ class Equilibrium:
             self.fixed[nodes, s.axis] = True
             self.rate[nodes, s.axis] = s.rate(x[nodes]) if callable(s.rate) else s.rate
             self._supported.append((s.name, s.axis, nodes[nodes < self.n_owned]))
-        self._free_owned = ~self.fixed[: self.n_owned].ravel()
         self.applied = sum((self._nodal_forces(load) for load in problem.loads), np.zeros((self.n_owned, 2)))
         self._force = create_vector(index_map, 2)
         self._reaction = np.zeros((self.n_owned, 2))
-        self.changes = 0  # points that opened or closed at the last evaluation, over all ranks
-        self.reaction_norm = self.noise = 0.0
-        self.largest_reaction = 0.0  # norm, of all accepted states
+        self.changes = 0
+        self.reaction_norm = self.noise = self.largest_reaction = 0.0
         self._stiffest = max(float(body.material.elastic_tangent[0, 0]) for body in problem.bodies)
-        self.choice = choose(self._facts())
-        matrix = V, bulk, contact, self.fixed, self.rate, self.timer
-        self.tangent = TangentMatrix(*matrix, condense=self.choice.uses("condensed"))
-        self.control = FactorControl(V)
-        if problem.control == "force":
-            self.control = ForceControl(V, self.tangent, self.rate, self._stiffest, self.factoriser)
-
-    def _facts(self) -> Facts:
-        """What the choice of linear strategies depends on."""
-        problem = self.problem
-        laws = [i.law for i in problem.interactions]
-        frictionless = bool(laws) and all(law in ("frictionless", LAWS["frictionless"]) for law in laws)
-        return Facts(
+        frictionless = contact.pairs and all(isinstance(pair.law, Frictionless) for pair in contact.pairs)
+        facts = Facts(
             self.comm,
-            2 * self.V.dofmap.index_map.size_global,
-            self.bulk.plastic,
+            2 * index_map.size_global,
+            bulk.plastic,
             problem.control == "force",
-            max(i.gamma_factor for i in problem.interactions) if frictionless else None,
+            contact.gamma_factor if frictionless else None,
             lambda: all(self._held(problem.tag(body)) for body in problem.bodies),
         )
+        self.choice = choose(facts)
+        condense = self.choice.uses("condensed")
+        self.tangent = TangentMatrix(V, bulk, contact, self.fixed, self.rate, timer, condense=condense)
+        self.control: FactorControl | ForceControl = FactorControl(V)
+        with timer(BEFORE_SOLVING):
+            if facts.by_force:
+                self.control = ForceControl(self.tangent, self.rate, self._stiffest, self._factoriser)
+            self._choose_linear()
 
     def _held(self, tag: int) -> bool:
         """Whether supports alone keep the body whose cells have this ``tag`` from moving rigidly. Collective."""
@@ -107,17 +99,16 @@ class Equilibrium:
         """Forces ``(n_owned, 2)`` on the modelled part per unit of the load factor."""
         V, mesh, problem = self.V, self.V.mesh, self.problem
         tag = problem.mesh.cell_tag(load.cells)
-        measure = ufl.Measure(
-            "dx", mesh, subdomain_data=problem.mesh.cells, metadata={"quadrature_degree": _LOAD_DEGREE}
-        )
-        dx, force = measure(tag), fem.Constant(mesh, np.array(load.force))
+        rule = {"quadrature_degree": _LOAD_DEGREE}
+        dx = ufl.Measure("dx", mesh, subdomain_data=problem.mesh.cells, metadata=rule)(tag)
+        force = fem.Constant(mesh, np.array(load.force))
         density = fem.Constant(mesh, 1.0) if load.density is None else load.density(ufl.SpatialCoordinate(mesh))
         total = self.comm.allreduce(fem.assemble_scalar(fem.form(density * dx)))
         vector = fem.assemble_vector(fem.form(density * ufl.inner(force, ufl.TestFunction(V)) * dx))
         vector.scatter_reverse(InsertMode.add)
         return vector.array[: 2 * self.n_owned].reshape(-1, 2) / (problem.symmetry * total)
 
-    # ------------------------------------------------------------------ unknowns
+    # ------------------------------------------------------------------ unknowns and tangent
 
     def pack(self, state: Array, x: PETSc.Vec) -> None:
         """Put ``state``, shaped like `state`, with its prescribed values replaced, into the unknowns ``x``."""
@@ -126,35 +117,24 @@ class Equilibrium:
         u[self.fixed] = self.factor * self.rate[self.fixed]
         self.control.join(x, u[: self.n_owned].ravel(), self.factor)
 
-    def unpack(self, x: PETSc.Vec) -> None:
-        """Take displacements and load factor from the unknowns ``x``. Collective."""
-        self.u.x.array[: 2 * self.n_owned] = x.array_r[: 2 * self.n_owned]
-        self.u.x.scatter_forward()
-        self.factor = self.control.factor(self.load, x)
-        self.u.x.array[self.fixed.ravel()] = self.factor * self.rate[self.fixed]
-
-    # ------------------------------------------------------------------ tangent
-
-    def factoriser(self, A: PETSc.Mat) -> Strategy:
+    def _factoriser(self, A: PETSc.Mat) -> Strategy:
         """The strategy that factorises ``A``, a tangent of all displacements. Collective."""
         return self.choice.factoriser(A, self.V)
 
-    @property
-    def linear(self) -> Strategy:
-        """The strategy that solves with the tangent of all unknowns. Collective."""
-        return self.control.border or self.tangent.condensed or self.factoriser(self.tangent.A)
+    def _choose_linear(self) -> None:
+        self.linear = self.control.border or self.tangent.condensed or self._factoriser(self.tangent.A)
 
     def update_tangent(self, *, factorise: bool = True) -> None:
         """Assemble the tangent of the last evaluation, to be factorised or not. Collective."""
         self.tangent.update(factorise=factorise)
-        self.control.update(self.tangent, factorise=factorise)
+        self.control.follow(self.tangent, factorise=factorise)
 
     def _follow_pattern(self) -> bool:
         """Replace the matrix where the pairs of the last evaluation slid out of its pattern; returns whether."""
         if self._pattern_grew:
-            self.tangent.destroy()
             self.tangent.renew()
-            self.control.follow(self.tangent)
+            self.control.replace(self.tangent.A)
+            self._choose_linear()
         return self._pattern_grew
 
     # ------------------------------------------------------------------ residual
@@ -164,12 +144,14 @@ class Equilibrium:
 
         Raises `ProjectionError` if a contact point finds no partner, and what `evaluate` raises.
         """
-        self.unpack(x)
+        self.u.x.array[: 2 * self.n_owned] = x.array_r[: 2 * self.n_owned]
+        self.u.x.scatter_forward()
+        self.factor = self.control.factor(x)
+        self.u.x.array[self.fixed.ravel()] = self.factor * self.rate[self.fixed]
         self.evaluate()
         renewed = self._follow_pattern()
-        free = np.where(self._free_owned, self._force.array_r, 0.0)
-        missing = self.force_on_factor() - self.load / self.problem.symmetry if self.control.border is not None else 0.0
-        self.control.join(f, free, missing)
+        missing = self.force_on_factor() - self.load / self.problem.symmetry if self.control.border else 0.0
+        self.control.join(f, self._where_free().ravel(), missing)
         return renewed
 
     def evaluate(self) -> None:
@@ -187,20 +169,27 @@ class Equilibrium:
             self._pattern_grew = self.contact.evaluate(u)
             self.contact.add_force(self._force.array.reshape(-1, 2))
         self._force.array[:] -= self.factor * self.applied.ravel()
-        self._reaction = np.where(self._free_owned, 0.0, self._force.array_r).reshape(-1, 2)
-        changes, noise = self.contact.active_set_changes, self.contact.round_off()
-        totals = np.array([(self._reaction**2).sum(), noise**2, self.interrupt.received > 0, changes])
+        self._reaction = np.where(self.fixed[: self.n_owned], self._force.array_r.reshape(-1, 2), 0.0)
+        totals = np.array(
+            [
+                (self._reaction**2).sum(),
+                self.contact.round_off() ** 2,
+                self.interrupt.received > 0,
+                self.contact.active_set_changes,
+            ]
+        )
         self.comm.Allreduce(MPI.IN_PLACE, totals)
         self.changes = int(totals[3])
         self.reaction_norm, contact_noise = np.sqrt(totals[:2])
-        self.noise = self._bulk_noise() + contact_noise
+        # the bulk's are forces that a rigid motion of the size of the displacement leaves
+        largest = self.comm.allreduce(np.abs(self.u.x.array).max(initial=0.0), op=MPI.MAX)
+        self.noise = 1e-13 * self._stiffest * min(largest, self.problem.travel) + contact_noise
         if totals[2]:
             raise Interrupted(self.comm.allreduce(self.interrupt.received, op=MPI.MAX))
 
-    def _bulk_noise(self) -> float:
-        """Round-off of the bulk's residual: forces that a rigid motion of the size of the displacement leaves."""
-        largest = self.comm.allreduce(np.abs(self.u.x.array).max(initial=0.0), op=MPI.MAX)
-        return 1e-13 * self._stiffest * min(largest, self.problem.travel)
+    def _where_free(self) -> Array:
+        """The forces of the last evaluation ``(n_owned, 2)`` where displacements are not prescribed, zero elsewhere."""
+        return np.where(self.fixed[: self.n_owned], 0.0, self._force.array_r.reshape(-1, 2))
 
     def reaction(self, name: str) -> Array:
         """Force ``(2,)`` of the supports ``name`` on the modelled part at the last evaluation, over all ranks."""
@@ -223,16 +212,15 @@ class Equilibrium:
 
     def worst_place(self) -> tuple[float, float] | None:
         """Where the residual is largest, over all ranks."""
-        size = np.linalg.norm(self.residual()[: self.n_owned], axis=1)
+        size = np.nan_to_num(np.linalg.norm(self._where_free(), axis=1), nan=-1.0, posinf=-1.0)
         at = int(np.argmax(size)) if len(size) else 0
         x = self.V.tabulate_dof_coordinates()[at, :2] if len(size) else np.zeros(2)
-        found = [(s, p) for s, p in self.comm.allgather((size[at] if len(size) else -1.0, tuple(x))) if np.isfinite(s)]
-        return max(found)[1] if found else None
+        value, place = max(self.comm.allgather((size.max(initial=-1.0), tuple(x))))
+        return place if value >= 0 else None
 
     def residual(self) -> Array:
         """Residual forces ``(n_local, 2)`` at the last evaluation, zero at prescribed displacements and ghosts."""
-        owned = np.where(self._free_owned, self._force.array_r, 0.0).reshape(-1, 2)
-        return np.pad(owned, ((0, self.n_local - self.n_owned), (0, 0)))
+        return np.pad(self._where_free(), ((0, self.n_local - self.n_owned), (0, 0)))
 
     def displacement(self) -> Array:
         """A copy of the nodal displacements ``(n_local, 2)``."""

@@ -59,13 +59,7 @@ class LoadPath:
 
     def attempt(self, load: float) -> Newton:
         """Solve for equilibrium at ``load``, from one guess after the other. Collective."""
-        result = None
-        for guess, afar in self._guesses(load):
-            result = self.solver.solve(load, guess, afar=afar).after(result)
-            if result.converged:
-                break
-        assert result is not None
-        return result
+        return self.solver.solve(load, self._guesses(load))
 
     def _guesses(self, load: float) -> Iterator[tuple[Array, bool]]:
         """Guesses for a step to ``load``, and whether to find the elastic solution from there first."""

@@ -13,10 +13,10 @@ from typing import Any, Literal
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.geometry.curve import RigidCircle
 from archord.geometry.tagged_mesh import TaggedMesh
-from archord.solver.contact.law import ContactLaw
+from archord.solver.contact.interaction import Interaction, Rigid
 
+__all__ = ["Body", "Guess", "Interaction", "Load", "Problem", "Rigid", "Support"]
 Vector = tuple[float, float]
 
 
@@ -27,33 +27,6 @@ class Body:
     name: str
     material: Any
     cells: str = ""
-
-
-@dataclass(frozen=True)
-class Rigid:
-    """A rigid disc that is displaced by ``rate`` times the load factor."""
-
-    circle: RigidCircle
-    rate: Vector = (0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Interaction:
-    """Contact of two ``surfaces``, facet sets of one body each, of which the first may be a rigid disc.
-
-    ``law`` is "frictionless", "tied" or a `ContactLaw`. Under ``kinematics`` "current" the closest points are those of
-    the deformed curves, under "reference" those of the undeformed ones. ``gamma_factor`` is Nitsche's gamma over the
-    trace constant of each contact cell. ``integrated`` names the one facet set whose points carry the contact, both do
-    if empty. ``slide`` is how far pairs are expected to slide.
-    """
-
-    name: str
-    surfaces: tuple[str | Rigid, str]
-    law: str | ContactLaw = "frictionless"
-    kinematics: Literal["current", "reference"] = "current"
-    gamma_factor: float = 0.5
-    integrated: str = ""
-    slide: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ With a line search and without, points held on their facets, elastic points firs
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -31,34 +31,39 @@ class Recovery:
         """Whether no body can yield, so that nothing but the contact is nonlinear."""
         return not self.equilibrium.bulk.plastic
 
-    def solve(self, load: float, guess: Array, *, afar: bool = False) -> Newton:
-        """Solve at ``load`` from ``guess``, which may come from ``afar`` (see `_solve_at_once`).
+    def solve(self, load: float, guesses: Iterable[tuple[Array, bool]]) -> Newton:
+        """Solve at ``load`` from one of the ``guesses`` after the other, of which each tells whether it comes from afar
+        (see `_solve_at_once`). Collective.
 
         Where a large gamma makes that fail, gamma is raised in stages: the solution hardly depends on it, but points
         open and close for many iterations where it is large.
         """
         self.equilibrium.load = load
-        contact, result = self.equilibrium.contact, None
+        self._solves: list[Newton] = []
+        for guess, afar in guesses:
+            if self._solve_in_stages(guess, afar):
+                break
+        return Newton.together(self._solves)
+
+    def _solve_in_stages(self, guess: Array, afar: bool) -> bool:
+        contact = self.equilibrium.contact
         wanted = contact.gamma_factor
+        if (wanted <= _STIFF_CONTACT or not self.continues_gamma) and self._solve_at_once(guess, afar):
+            return True
         if wanted <= _STIFF_CONTACT:
-            return self._solve_at_once(guess, afar)
-        if not self.continues_gamma:
-            result = self._solve_at_once(guess, afar)
-            if result.converged:
-                return result
+            return False
         stages = math.ceil(math.log(wanted / GAMMA_FACTOR, _GAMMA_RATIO))
         for factor in np.geomspace(GAMMA_FACTOR, wanted, stages + 1):
             contact.use_gamma_factor(float(factor))
-            result = self._solve_at_once(guess, afar).after(result)
+            converged = self._solve_at_once(guess, afar)
             guess, afar = self.equilibrium.state(), False
-            if not result.converged:
+            if not converged:
                 break
         contact.use_gamma_factor(wanted)
-        assert result is not None
-        self.continues_gamma |= result.converged
-        return result
+        self.continues_gamma |= converged
+        return converged
 
-    def _solve_at_once(self, guess: Array, afar: bool) -> Newton:
+    def _solve_at_once(self, guess: Array, afar: bool) -> bool:
         """Solve from ``guess``.
 
         A guess from ``afar`` is too stiff for a line search, which creeps there, and may yield far too much: full steps
@@ -68,41 +73,40 @@ class Recovery:
         points = self.equilibrium.plastic_points()
         if not self.equilibrium.comm.allreduce(len(points)):
             return self._solve_either_way(guess, full_steps=afar)
-        before = None
         if afar:
             for p in points:
                 p.elastic_only = True
-            before = self._solve_either_way(guess, full_steps=True, goal=max(_ROUGH, self.newton.tolerance))
+            if self._solve_either_way(guess, full_steps=True, goal=max(_ROUGH, self.newton.tolerance)):
+                guess = self.equilibrium.state()
             for p in points:
                 p.elastic_only = False
-            if before.converged:
-                guess = self.equilibrium.state()
-        return self._solve_either_way(guess).after(before)
+        return self._solve_either_way(guess)
 
-    def _solve_either_way(self, guess: Array, *, full_steps: bool = False, goal: float = 0.0) -> Newton:
+    def _solve_either_way(self, guess: Array, *, full_steps: bool = False, goal: float = 0.0) -> bool:
         """With a line search, then without, or the other way round with ``full_steps``.
 
         The problem is nearly linear by pieces, where it is smooth, and full steps find the right ones where the line
         search, which wants a smaller residual in every step, creeps: first touch, large gamma, nearly incompressible
         bodies.
         """
-        result = None
-        for kind in ("basic", "bt") if full_steps else ("bt", "basic"):
-            result = self._solve_holding(guess, kind, goal).after(result)
-            if result.converged or self.equilibrium.control.singular:
+        for line_search in (not full_steps, full_steps):
+            if self._solve_holding(guess, line_search, goal):
+                return True
+            if self.equilibrium.control.singular:
                 break
-        assert result is not None
-        return result
+        return False
 
-    def _solve_holding(self, guess: Array, line_search: str, goal: float) -> Newton:
+    def _solve_holding(self, guess: Array, line_search: bool, goal: float) -> bool:
         """Solve from ``guess``; where that circles though no point opens or closes, points jump between two facets that
         meet at an angle: they are held on theirs then, each facet continued beyond its ends."""
         result, contact = self.newton.solve(guess, line_search=line_search, goal=goal), self.equilibrium.contact
+        self._solves.append(result)
         changes = result.active_set_changes
         circles = len(changes) > CIRCLING and not any(changes[-CIRCLING:])
         if result.converged or not contact.pairs_move or not circles:
-            return result
-        iterate = self.newton.last_iterate()
+            return result.converged
         contact.hold()
-        held = self.newton.solve(iterate, line_search=line_search, goal=goal, search=False)
-        return replace(held.after(result), held=True)
+        result = self.newton.solve(None, line_search=line_search, goal=goal)
+        result.held = True
+        self._solves.append(result)
+        return result.converged

@@ -65,33 +65,6 @@ class Step:
         return self.attempts[-1].residuals[-1] if self.attempts and self.attempts[-1].residuals else 0.0
 
 
-class StepSize:
-    """The length of the next step, in output steps, adapted to how Newton's method fares."""
-
-    def __init__(self, rules: StepRules) -> None:
-        self.rules = rules
-        self.length = rules.initial
-        self._just_cut = False
-
-    def accepted(self, iterations: int) -> None:
-        """Grow after a solve that was easy enough; the first one after a cut is not."""
-        if iterations <= self.rules.target_iterations and not self._just_cut:
-            self.length = min(self.rules.maximum, self.rules.growth * self.length)
-        self._just_cut = False
-
-    def failed(self) -> bool:
-        """Cut the step; False if it is the smallest already."""
-        smallest = self.length <= self.rules.minimum
-        self._just_cut = True
-        self.length = max(self.rules.minimum, self.rules.cutback * self.length)
-        return not smallest
-
-    def within(self, passed: float) -> float:
-        """End of the next step in an output step of which the part ``passed`` is done; 1 is its target."""
-        end = passed + self.length
-        return 1.0 if end > 1 - _SLIVER else end
-
-
 def march(
     path: LoadPath,
     targets: Sequence[float],
@@ -109,47 +82,47 @@ def march(
     ``target_done(step, position)`` every output target, ``attempted(load, iterations)`` every solve, ``gave_up(load)``
     the one after which nothing smaller is allowed, before it is taken back. Raises `StepFailure`.
     """
-    at = path.at
-    size = StepSize(rules or StepRules())
-    size.length = at.size or size.length
+    at, rules = path.at, rules or StepRules()
+    at.size = at.size or rules.initial
     for number in range(at.targets_done, len(targets)):
-        begun, target, passed = at.load, targets[number], 0.0
+        begun, target, passed, just_cut = at.load, targets[number], 0.0, False
         record = Step(target)
         while passed < 1:
-            end = size.within(passed)
+            end = passed + at.size if passed + at.size <= 1 - _SLIVER else 1.0
             load = target if end == 1 else begun + end * (target - begun)
             result = path.attempt(load)
             record.iterations += result.iterations
             record.coarse_iterations += path.coarse_iterations
             record.attempts.append(result)
             attempted(load, result.iterations)
-            if not result.converged:
-                record.cutbacks += 1
-                tried = size.length
-                smallest = not size.failed()
-                if smallest:
-                    gave_up(load)
-                path.take_back()
-                if smallest:
-                    raise StepFailure(_why(result, path.solver.equilibrium.problem, load, at.load, tried), record)
+            if result.converged:
+                record.substeps += 1
+                if result.iterations <= rules.target_iterations and not just_cut:
+                    at.size = min(rules.maximum, rules.growth * at.size)
+                just_cut, passed = False, end
+                path.accept(load)
+                substep_done(load)
+                path.commit()
                 continue
-            record.substeps += 1
-            size.accepted(result.iterations)
-            path.accept(load)
-            at.size, passed = size.length, end
-            substep_done(load)
-            path.commit()
+            record.cutbacks += 1
+            smallest = at.size <= rules.minimum
+            if smallest:
+                gave_up(load)
+            path.take_back()
+            if smallest:
+                raise StepFailure(_why(result, path.solver.equilibrium.problem, load, at), record)
+            at.size, just_cut = max(rules.minimum, rules.cutback * at.size), True
         at.targets_done = number + 1
         target_done(record, at)
 
 
-def _why(result: Newton, problem: Problem, load: float, held: float, length: float) -> str:
+def _why(result: Newton, problem: Problem, load: float, at: Position) -> str:
     name, by_force = problem.load_name, problem.control == "force" or problem.loads
     where = "" if result.worst is None else f", the largest residual at ({result.worst[0]:.4g}, {result.worst[1]:.4g})"
     last = f"{result.residuals[-1]:.1e}" if result.residuals and np.isfinite(result.residuals[-1]) else "none"
-    tried = f"the step was cut to {length:.2g} of an output step" if length < 1 else "no smaller step is allowed"
+    cut = f"the step was cut to {at.size:.2g} of an output step" if at.size < 1 else "no smaller step is allowed"
     limit = "; if the bodies yield as a whole, the limit load is close" if by_force and result.plastic_increment else ""
     return (
         f"no equilibrium at {name} = {load:.6g}: {result.reason}; after {result.iterations} iterations the residual "
-        f"over reaction was {last}{where}; {tried}; the last load that held is {name} = {held:.6g}{limit}"
+        f"over reaction was {last}{where}; {cut}; the last load that held is {name} = {at.load:.6g}{limit}"
     )

@@ -12,14 +12,13 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.solver.bulk import Bulk
-from archord.solver.contact import interaction as contact
 from archord.solver.contact.contact import Contact
-from archord.solver.contact.law import LAWS
+from archord.solver.contact.interaction import Interface, Rigid
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.equilibrium import Equilibrium
 from archord.solver.load_path import LoadPath, Position
 from archord.solver.newton import NewtonSolver
-from archord.solver.problem import Interaction, Problem, Rigid
+from archord.solver.problem import Problem
 from archord.solver.recovery import Recovery
 from archord.solver.stepping import StepRules, march
 from archord.solver.timer import Timer
@@ -46,22 +45,13 @@ class System:
             materials = {problem.tag(body): body.material for body in problem.bodies}
             self.bulk = Bulk(self.V, problem.mesh.cells, materials)
             self.sides: dict[str, Surface] = {}
-            self.contact = Contact(self.V, [self._interaction(i) for i in problem.interactions])
+            interfaces = [
+                Interface(i, [self._surface(surface, i.name) for surface in i.surfaces]) for i in problem.interactions
+            ]
+            self.contact = Contact(self.V, interfaces)
             self.equilibrium = Equilibrium(problem, self.V, self.bulk, self.contact, self.timer)
             tolerance, most = problem.tolerance, problem.max_iterations
             self.solver = Recovery(NewtonSolver(self.equilibrium, tolerance=tolerance, max_iterations=most))
-
-    def _interaction(self, given: Interaction) -> contact.Interaction:
-        integrated = given.surfaces.index(given.integrated) if given.integrated else None
-        return contact.Interaction(
-            given.name,
-            [self._surface(surface, given.name) for surface in given.surfaces],
-            law=LAWS[given.law] if isinstance(given.law, str) else given.law,
-            kinematics=given.kinematics,
-            gamma_factor=given.gamma_factor,
-            integrated=integrated,
-            slide=given.slide,
-        )
 
     def _surface(self, given: str | Rigid, interaction: str) -> Surface | RigidSurface:
         if isinstance(given, Rigid):

@@ -20,7 +20,7 @@ from dolfinx import fem
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.materials.points import Points
-from archord.solver.contact.interaction import Interaction, first_failure
+from archord.solver.contact.interaction import Interface, on_every_rank
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.sparsity import Reach
 from archord.solver.contact.surface import Surface
@@ -28,31 +28,25 @@ from archord.solver.contact.tangent import ContactTangent, trial_rate
 
 
 class Contact:
-    """All ``interactions``, if any, in the displacement space ``V``: ``surfaces`` of bodies, ``rigid`` ones.
+    """All ``interfaces``, if any, in the displacement space ``V``: ``surfaces`` of bodies, ``rigid`` ones, ``pairs``.
 
-    A surface belongs to one interaction, as its points do. ``active_set_changes`` counts the points of this rank that
+    A surface belongs to one interface, as its points do. ``active_set_changes`` counts the points of this rank that
     opened or closed at the last evaluation. Collective.
     """
 
-    def __init__(self, V: fem.FunctionSpace, interactions: Sequence[Interaction] = ()) -> None:
-        self.interactions = list(interactions)
-        self.surfaces = [surface for i in interactions for surface in i.bodies]
-        self.rigid = [surface for i in interactions for surface in i.rigid]
-        self.pairs = [pair for i in interactions for pair in i.pairs]
-        self.comm = V.mesh.comm
+    def __init__(self, V: fem.FunctionSpace, interfaces: Sequence[Interface] = ()) -> None:
+        self.interfaces, self.comm = list(interfaces), V.mesh.comm
+        self.surfaces = [surface for i in interfaces for surface in i.bodies]
+        self.rigid = [surface for i in interfaces for surface in i.rigid]
+        self.pairs = [pair for i in interfaces for pair in i.pairs]
         self._n_dofs = V.dofmap.index_map.size_global
         for number, surface in enumerate(self.rigid):
             surface.curve_dofs[:] = self._n_dofs + number
-        self.gamma_factor = max((i.gamma_factor for i in interactions), default=0.0)
+        self.gamma_factor = max((i.interaction.gamma_factor for i in interfaces), default=0.0)
         self.pairs_move = any(pair.moves for pair in self.pairs)
         self.active_set_changes = 0
-        self._reaches = [Reach(pair, i.slide) for i in interactions for pair in i.pairs]
+        self._reaches = [Reach(pair, i.slide) for i in interfaces for pair in i.pairs]
         self._tangent: ContactTangent | None = None
-
-    @property
-    def rigid_rates(self) -> Array:
-        """Displacements ``(n, 2)`` of the rigid surfaces per unit of the load factor."""
-        return np.array([surface.rate for surface in self.rigid]).reshape(-1, 2)
 
     def move(self, factor: float) -> None:
         """Displace rigid surfaces by their rates times the load ``factor``."""
@@ -66,8 +60,8 @@ class Contact:
 
     def use_gamma_factor(self, factor: float) -> None:
         """Limit the gamma factor of all interactions to ``factor``, for the time being."""
-        for interaction in self.interactions:
-            interaction.limit_gamma(factor)
+        for interface in self.interfaces:
+            interface.limit_gamma(factor)
 
     def hold(self) -> None:
         """Keep all points on the facets they were last paired with, until `search`: the forces become smooth."""
@@ -80,15 +74,14 @@ class Contact:
         Returns whether the matrix pattern had to grow (the pairs slid out of it). Collective; raises `ProjectionError`
         on every rank if a point on any of them finds no partner.
         """
-        motions, failure = [pair.opposite.curve_displacement(u) for pair in self.pairs], None
+        motions = [pair.opposite.curve_displacement(u) for pair in self.pairs]
         try:
-            for pair, motion in zip(self.pairs, motions, strict=True):
-                pair.evaluate(u, motion)
-        except ProjectionError as error:
-            failure = str(error)
-        if failure := first_failure(self.comm, failure):
+            with on_every_rank(self.comm):
+                for pair, motion in zip(self.pairs, motions, strict=True):
+                    pair.evaluate(u, motion)
+        except ProjectionError:
             self.search()
-            raise ProjectionError(failure)
+            raise
         self.active_set_changes = sum(pair.changes for pair in self.pairs)
         grew = any([reach.extend() for reach in self._reaches if reach.pair.moves])
         if grew:
@@ -115,8 +108,7 @@ class Contact:
 
     def add_force(self, force: Array) -> None:
         """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, 2)`` of owned nodes."""
-        both = [surface for i in self.interactions for surface in i.surfaces]
-        on = {id(surface): np.zeros((len(surface.curve_dofs), 2)) for surface in both}
+        on = {id(surface): np.zeros((len(surface.curve_dofs), 2)) for surface in [*self.surfaces, *self.rigid]}
         for pair in self.pairs:
             pair.add_forces(on[id(pair.surface)], on[id(pair.opposite)])
         for surface in self.surfaces:
@@ -140,11 +132,11 @@ class Contact:
     def resultant(self, name: str = "") -> Array:
         """Contact force ``(2,)`` on the second surface of the interaction ``name``, the first without, over all
         ranks."""
-        return next(i for i in self.interactions if name in ("", i.name)).resultant()
+        return next(i for i in self.interfaces if name in ("", i.interaction.name)).resultant()
 
     def force_on_factor(self) -> float:
         """Contact force on what moves rigid surfaces, along their rates, over all ranks."""
-        return float(sum(surface.rate @ i.resultant() for i in self.interactions for surface in i.rigid))
+        return float(sum(surface.rate @ i.resultant() for i in self.interfaces for surface in i.rigid))
 
     def histories(self) -> dict[str, tuple[np.ndarray, Points]]:
         """Numbers ``(n,)`` of facets of this rank and their ``n q`` points, of materials and of laws, by place."""

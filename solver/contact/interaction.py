@@ -15,71 +15,87 @@ that meshes that match nowhere pass the patch tests.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.curve import ProjectionError
+from archord.geometry.curve import ProjectionError, RigidCircle
 from archord.solver.contact.law import LAWS, ContactLaw
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.quadrature import segment_rule
 from archord.solver.contact.surface import RigidSurface, Surface
 
 GAMMA_FACTOR = 0.5  # twice the bound of coercivity; larger values stiffen the edge of the contact and cost iterations
-Kinematics = Literal["current", "reference"]
 
 
+@dataclass(frozen=True)
+class Rigid:
+    """A rigid disc that is displaced by ``rate`` times the load factor."""
+
+    circle: RigidCircle
+    rate: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class Interaction:
-    """Contact of two ``surfaces``, of which the first may be rigid, by a ``law``.
+    """Contact of two ``surfaces``, facet sets of one body each, of which the first may be a rigid disc.
 
-    Under current ``kinematics`` the closest points are those of the deformed surfaces, under reference kinematics those
-    of the undeformed ones, with the normal of the first surface for both, and the gap is linear in the displacement; a
-    law whose points do not slide has no other. ``integrated`` is the number of the one surface that is integrated, both
-    are without. ``slide`` is how far pairs are expected to slide, for which the matrix gets room from the start.
-    Collective; raises `ProjectionError` on every rank if a point on any of them finds no partner.
+    ``law`` is "frictionless", "tied" or a `ContactLaw`. Under ``kinematics`` "current" the closest points are those of
+    the deformed curves, under "reference" those of the undeformed ones, with the normal of the first surface for both,
+    and the gap is linear in the displacement; a law whose points do not slide has no other. ``gamma_factor`` is
+    Nitsche's gamma over the trace constant of each contact cell. ``integrated`` names the one facet set whose points
+    carry the contact, both do if empty. ``slide`` is how far pairs are expected to slide, for which the matrix gets
+    room from the start.
     """
 
-    def __init__(
-        self,
-        name: str,
-        surfaces: Sequence[Surface | RigidSurface],
-        *,
-        law: ContactLaw = LAWS["frictionless"],
-        kinematics: Kinematics = "current",
-        gamma_factor: float = GAMMA_FACTOR,
-        integrated: int | None = None,
-        slide: float = 0.0,
-    ) -> None:
-        self.name, self.surfaces, self.gamma_factor = name, list(surfaces), gamma_factor
+    name: str
+    surfaces: tuple[str | Rigid, str]
+    law: str | ContactLaw = "frictionless"
+    kinematics: Literal["current", "reference"] = "current"
+    gamma_factor: float = GAMMA_FACTOR
+    integrated: str = ""
+    slide: float = 0.0
+
+
+class Interface:
+    """The ``interaction`` of two ``surfaces`` as pairs of them.
+
+    Collective; raises ValueError if none of them is to be integrated, and `ProjectionError` on every rank if a point on
+    any of them finds no partner.
+    """
+
+    def __init__(self, interaction: Interaction, surfaces: Sequence[Surface | RigidSurface]) -> None:
+        self.interaction, self.surfaces = interaction, list(surfaces)
         self.bodies = [surface for surface in surfaces if isinstance(surface, Surface)]
         self.rigid = [surface for surface in surfaces if isinstance(surface, RigidSurface)]
-        moves = law.slides and kinematics == "current"
-        self.slide = slide if moves else 0.0
-        chosen = [own for own in self.bodies if integrated is None or own is surfaces[integrated]]
+        law = LAWS[interaction.law] if isinstance(interaction.law, str) else interaction.law
+        moves = law.slides and interaction.kinematics == "current"
+        self.slide = interaction.slide if moves else 0.0
+        given = zip(surfaces, interaction.surfaces, strict=True)
+        chosen = [own for own, name in given if own in self.bodies and interaction.integrated in ("", name)]
+        if not chosen:
+            raise ValueError(f"{interaction.name!r} does not have the surface {interaction.integrated!r}")
         compliance = np.array([1 / own.material.elastic_tangent[0, 0] for own in chosen])
         self.pairs: list[Pair] = []
-        failure = None
-        for own, share in zip(chosen, compliance / compliance.sum(), strict=True):
-            opposite = surfaces[1] if own is surfaces[0] else surfaces[0]
-            try:
+        with on_every_rank(self.bodies[0].comm):
+            for own, share in zip(chosen, compliance / compliance.sum(), strict=True):
+                opposite = surfaces[1] if own is surfaces[0] else surfaces[0]
                 if isinstance(opposite, Surface):
                     own.place_points(*segment_rule(own.curve, opposite.curve))
                 self.pairs.append(Pair(own, opposite, law, float(share), moves=moves))
-            except ProjectionError as error:
-                failure = str(error)
-        if failure := first_failure(self.bodies[0].comm, failure):
-            raise ProjectionError(failure)
         if not moves and not self.rigid and chosen[0] is surfaces[0]:
             self.pairs[0].use_own_normals()
-        self.limit_gamma(gamma_factor)
+        self.limit_gamma(interaction.gamma_factor)
 
     def limit_gamma(self, factor: float) -> None:
         """Use the own gamma factor, or ``factor`` where that is less."""
         for pair in self.pairs:
-            pair.use_gamma(min(self.gamma_factor, factor))
+            pair.use_gamma(min(self.interaction.gamma_factor, factor))
 
     def resultant(self) -> Array:
         """Contact force ``(2,)`` on the second surface, over all ranks."""
@@ -89,6 +105,13 @@ class Interaction:
         return self.bodies[0].sum_over_ranks(total)
 
 
-def first_failure(comm: MPI.Comm, failure: str | None) -> str | None:
-    """The first of what the ranks report, on all of them."""
-    return next((f for f in comm.allgather(failure) if f), None)
+@contextmanager
+def on_every_rank(comm: MPI.Comm) -> Iterator[None]:
+    """Let a `ProjectionError` that any rank raises within the context be raised on all of them. Collective."""
+    failure = None
+    try:
+        yield
+    except ProjectionError as error:
+        failure = str(error)
+    if said := next((f for f in comm.allgather(failure) if f), None):
+        raise ProjectionError(said)

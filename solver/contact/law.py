@@ -31,11 +31,11 @@ class ContactLaw(Protocol):
         """History of ``n`` points at the beginning: None, or a dataclass of arrays, as that of a material."""
         return None
 
-    def update(self, gap: Array, slip: Array, trial: Array, state: State) -> tuple[Array, Array, State]:
+    def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
         """Traction ``(m, 2)``, its derivative ``(m, 2, 2)`` with respect to ``trial``, and the new state.
 
         ``trial`` ``(m, 2)`` is Nitsche's traction of points that touch and stick: that of the own body's stress minus
-        gamma times ``gap`` ``(m,)`` and ``slip`` ``(m,)``. Traction and derivative are zero at points that do not
+        ``gamma`` times ``gap`` and ``slip``, ``(m,)`` each. Traction and derivative are zero at points that do not
         touch; where they touch, the pressure follows its trial value. What is not a number stays that.
         """
         ...
@@ -44,7 +44,7 @@ class ContactLaw(Protocol):
 class Frictionless(ContactLaw):
     """``p = [trial]_+`` and no shear."""
 
-    def update(self, gap: Array, slip: Array, trial: Array, state: State) -> tuple[Array, Array, State]:
+    def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
         """Pressure where the trial pressure is positive."""
         touches = ~(trial[:, 0] <= 0)
         traction, derivative = np.zeros_like(trial), np.zeros((len(trial), 2, 2))
@@ -58,7 +58,7 @@ class Tied(ContactLaw):
 
     slides = False
 
-    def update(self, gap: Array, slip: Array, trial: Array, state: State) -> tuple[Array, Array, State]:
+    def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
         """The trial traction."""
         return trial, np.tile(np.eye(2), (len(trial), 1, 1)), state
 

@@ -82,7 +82,7 @@ class Pair:
 
     def _answer(self, trial: Array) -> Array:
         """Traction of the law, none at points without a partner; its derivative and the active points are kept."""
-        traction, self.derivative = self.points.update(*self.opening.T, trial)
+        traction, self.derivative = self.points.update(*self.opening.T, trial, self.gamma)
         lone = ~self.projection.found
         if lone.any():
             traction = np.where(lone[:, None], 0.0, traction)

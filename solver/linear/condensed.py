@@ -45,7 +45,7 @@ def why_not(facts: Facts) -> str | None:
 
 
 class Condensed:
-    """Python context of the matrix ``K + E D`` and of its preconditioner, which solves with it. Collective.
+    """Python context of a preconditioner that solves with ``K + E D``. Collective.
 
     ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)``, sorted, are the block dofs that may get
     forces, and ``near`` ``(k,)`` those on which they depend, the same on every rank, as is all that is as small as the
@@ -55,7 +55,7 @@ class Condensed:
     """
 
     def __init__(self, K: PETSc.Mat, nodes: np.ndarray, revise: Callable[[Array], Array | None]) -> None:
-        self.comm, self._K, self._nodes, self._revise = K.comm.tompi4py(), K, nodes, revise
+        self.comm, self.matrix, self._nodes, self._revise = K.comm.tompi4py(), K, nodes, revise
         self._start, self._end = K.getOwnershipRange()
         K.setOption(PETSc.Mat.Option.SPD, True)
         self._ksp = PETSc.KSP().create(K.comm)
@@ -68,9 +68,6 @@ class Condensed:
         self._Z = self._responses(_dofs(nodes))
         none = np.zeros(0, dtype=np.int64)
         self.occupy(none, none)
-        sizes = K.getSizes()
-        self.matrix = PETSc.Mat().createPython(sizes, context=self, comm=K.comm)
-        self.matrix.setUp()
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` solve with the matrix."""
@@ -79,7 +76,7 @@ class Condensed:
     def _responses(self, dofs: np.ndarray) -> Array:
         """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one after the other."""
         unit = self._unit_forces(dofs)
-        self._found = PETSc.Mat().createDense((self._K.getSizes()[0], (None, len(dofs))), comm=self._K.comm)
+        self._found = PETSc.Mat().createDense((self.matrix.getSizes()[0], (None, len(dofs))), comm=self.matrix.comm)
         self._found.setUp()
         self._ksp.setUp()
         self._ksp.getPC().getFactorMatrix().matSolve(unit, self._found)
@@ -91,10 +88,10 @@ class Condensed:
         PETSc spoils sparse ones."""
         if self.comm.size == 1:
             offsets, columns = (part.astype(PETSc.IntType) for part in (np.arange(len(dofs) + 1), dofs))
-            shape = len(dofs), self._K.getSize()[0]
+            shape = len(dofs), self.matrix.getSize()[0]
             csr = offsets, columns, np.ones(len(dofs))
-            return PETSc.Mat().createTranspose(PETSc.Mat().createAIJ(shape, csr=csr, comm=self._K.comm))
-        unit = PETSc.Mat().createDense((self._K.getSizes()[0], (None, len(dofs))), comm=self._K.comm)
+            return PETSc.Mat().createTranspose(PETSc.Mat().createAIJ(shape, csr=csr, comm=self.matrix.comm))
+        unit = PETSc.Mat().createDense((self.matrix.getSizes()[0], (None, len(dofs))), comm=self.matrix.comm)
         unit.setUp()
         mine, at = self._own(dofs)
         unit.getDenseArray()[at, mine] = 1.0
@@ -112,6 +109,10 @@ class Condensed:
         values = np.zeros((len(dofs), *own.shape[1:]))
         values[mine] = own[at]
         return self._sum(values)
+
+    def at_nodes(self, own: Array) -> Array:
+        """What this rank has for its block dofs, ``own`` ``(n, 2)``, for the nodes ``(m, 2)`` on every rank."""
+        return self._on_all(_dofs(self._nodes), own.ravel()).reshape(-1, 2)
 
     def _sum(self, values: Array) -> Array:
         if self.comm.size > 1:
@@ -145,13 +146,6 @@ class Condensed:
         self._D[row], self._filled[row] = D, D.any(axis=1)
         used = np.flatnonzero(D.any(axis=0))
         self._DZ[row] = D[:, used] @ self._near_Z[used]
-
-    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """``y = (K + E D) x``, called by PETSc."""
-        self._K.mult(x, y)
-        forces = self._D @ self._on_all(self._columns, x.array_r)
-        mine, at = self._own(_dofs(self._nodes))
-        y.array[at] += forces[mine]
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x = (K + E D)^-1 r`` with the points that are closed after ``-x``, called by PETSc; not a number if that is

@@ -12,7 +12,6 @@ from archord.solver.linear.facts import Facts
 
 _MANY_DOFS = 20_000  # for which a factorisation takes longer than some solves with an old one
 _TOLERANCE = 1e-3  # residual of a linear system over its right-hand side
-_NEVER = 1_000_000  # iterations
 _MANY_SOLVES = 12  # that cost what a factorisation does
 _MANY_CHANGES = 100  # of the active set, which make so many solves
 
@@ -45,17 +44,11 @@ class Lagged:
         many = iteration >= 2 * _MANY_SOLVES
         return PETSc.KSP.ConvergedReason.CONVERGED_ITS if many else PETSc.KSP.ConvergedReason.ITERATING
 
-    def factorises(self, snes: PETSc.SNES, changes: int, *, renewed: bool) -> bool:
-        """Whether the next matrix of ``snes`` is to be factorised, after so many ``changes`` of the active set since
-        the last one, or because it was ``renewed``; ``snes`` is told."""
+    def factorises(self, iterations: int, changes: int, *, renewed: bool) -> bool:
+        """Whether to factorise the next matrix: the last system took so many ``iterations``, there were ``changes`` of
+        the active set since the last matrix, or it is ``renewed``."""
         self._changes += changes
-        many = snes.getKSP().getIterationNumber() > _MANY_SOLVES or self._changes > _MANY_CHANGES
-        factorise = renewed or many
+        factorise = renewed or iterations > _MANY_SOLVES or self._changes > _MANY_CHANGES
         if factorise:
             self._changes = 0
-        name = snes.getOptionsPrefix() or ""
-        options = PETSc.Options(name)
-        options["snes_lag_preconditioner"] = 1 if factorise else _NEVER
-        snes.setFromOptions()
-        options.delValue("snes_lag_preconditioner")  # or every other solver of this process would take it for its own
         return factorise

@@ -6,10 +6,11 @@ import sys
 from functools import cache
 from typing import Any
 
-import basix
 import cffi
 import numpy as np
 from dolfinx import fem
+
+from archord.geometry.basis import lagrange_triangle
 
 _PROTOTYPES = """
 int METIS_NodeND(int32_t *n, int32_t *offsets, int32_t *neighbours, int32_t *weights, int32_t *options, int32_t *order,
@@ -19,39 +20,27 @@ _LIBRARIES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")  # Debian's (gms
 
 
 @cache
-def _metis() -> tuple[cffi.FFI, Any]:
+def metis() -> tuple[cffi.FFI, Any]:
+    """METIS's library, and what makes its arguments. Raises OSError if it is not installed."""
     ffi = cffi.FFI()
     ffi.cdef(_PROTOTYPES)
-    for folder in ("", f"{sys.prefix}/lib/"):
-        for name in _LIBRARIES:
-            try:
-                return ffi, ffi.dlopen(folder + name)
-            except OSError:
-                continue
+    for path in (folder + name for folder in ("", f"{sys.prefix}/lib/") for name in _LIBRARIES):
+        try:
+            return ffi, ffi.dlopen(path)
+        except OSError:
+            continue
     raise OSError("METIS is not installed")
-
-
-def available() -> bool:
-    """Whether METIS is installed."""
-    try:
-        _metis()
-    except OSError:
-        return False
-    return True
 
 
 def corners(V: fem.FunctionSpace) -> np.ndarray:
     """The nodes ``(n_owned, 3)``, in global numbers, at the corners of the edge or the triangle that each of this
     rank's nodes of ``V`` lies on; those at corners are their own."""
-    topology = basix.topology(basix.CellType.triangle)
-    nodes = V.element.basix_element.entity_dofs
-    at = np.zeros((V.dofmap.list.shape[1], 3), dtype=np.int64)
-    for entities, dofs in zip(topology, nodes, strict=True):
-        for ends, own in zip(entities, dofs, strict=True):
-            at[own] = np.resize([nodes[0][end][0] for end in ends], 3)
+    x, y = lagrange_triangle(V.element.basix_element.degree).points.T
+    weight = np.stack([1 - x - y, x, y], axis=1)  # of the triangle's corners, its first three nodes
+    ends = np.where(weight > 1e-9, np.arange(3), weight.argmax(axis=1)[:, None])
     index_map = V.dofmap.index_map
     found = np.zeros((index_map.size_local + index_map.num_ghosts, 3), dtype=np.int32)
-    found[V.dofmap.list] = V.dofmap.list[:, at]
+    found[V.dofmap.list] = V.dofmap.list[:, ends]
     return index_map.local_to_global(found[: index_map.size_local].ravel()).reshape(-1, 3)
 
 
@@ -62,15 +51,13 @@ def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.nda
     That keeps what separates parts: of the nodes of an edge or a triangle none is in a part without its corners.
     """
     alone = corner[:, 0] == np.arange(n)
-    at = np.flatnonzero(alone)
     number = np.cumsum(alone) - 1
     both = alone[rows] & alone[columns]
-    place = np.append(np.full(n, n), n)  # the last is that of no corner
-    place[at] = nested_dissection(len(at), number[rows[both]], number[columns[both]])
+    place = np.full(n + 1, n)  # the last is that of no corner
+    place[:-1][alone] = nested_dissection(int(alone.sum()), number[rows[both]], number[columns[both]])
     first = np.where(alone, place[:n], place[corner].min(axis=1, initial=n))
-    order = np.lexsort((alone, first))
     found = np.empty(n, dtype=np.int32)
-    found[order] = np.arange(n)
+    found[np.lexsort((alone, first))] = np.arange(n)
     return found
 
 
@@ -84,9 +71,9 @@ def nested_dissection(n: int, rows: np.ndarray, columns: np.ndarray) -> np.ndarr
     if not len(row):
         return place
     offsets = np.searchsorted(row, np.arange(n + 1)).astype(np.int32)
-    ffi, metis = _metis()
+    ffi, library = metis()
     arrays = np.array([n], dtype=np.int32), offsets, column.astype(np.int32), np.empty(n, dtype=np.int32), place
     size, at, neighbours, order, places = (ffi.from_buffer("int32_t[]", a) for a in arrays)
-    if metis.METIS_NodeND(size, at, neighbours, ffi.NULL, ffi.NULL, order, places) != 1:
+    if library.METIS_NodeND(size, at, neighbours, ffi.NULL, ffi.NULL, order, places) != 1:
         raise MemoryError("METIS found no order of elimination")
     return place

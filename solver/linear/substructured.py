@@ -22,7 +22,7 @@ from petsc4py import PETSc
 
 from archord.kernels.compiled import CompilerError, library, pointer
 from archord.solver.linear.facts import Facts, solve_by
-from archord.solver.linear.nested_dissection import available, before_corners, corners
+from archord.solver.linear.nested_dissection import before_corners, corners, metis
 
 _LARGEST_INTERFACE = 4000  # unknowns: every rank factorises a dense matrix of that size
 
@@ -31,16 +31,13 @@ def why_not(facts: Facts) -> str | None:
     """Why the ranks do not eliminate unknowns of their own, as far as that is known before there is a matrix."""
     if facts.comm.size == 1:
         return "one rank"
-    return next((said for said in facts.comm.allgather(_missing()) if said), None)
-
-
-def _missing() -> str:
-    """What is not installed here."""
+    missing = None
     try:
+        metis()
         schur_kernels()
-    except CompilerError as error:
-        return f"MUMPS's C interface is not installed ({error})"
-    return "" if available() else "METIS is not installed"
+    except (CompilerError, OSError) as error:
+        missing = f"METIS or MUMPS's C interface is missing: {error}"
+    return next((said for said in facts.comm.allgather(missing) if said), None)
 
 
 def substructures(A: PETSc.Mat, V: fem.FunctionSpace) -> Substructures | str:
@@ -61,26 +58,19 @@ def _interface(A: PETSc.Mat, comm: MPI.Comm) -> np.ndarray:
     """Dofs without which the ranks' blocks of ``A`` are not coupled: those on cells of several ranks, and of any others
     that are, as the contact's, the ones of the higher rank."""
     start, end = A.getOwnershipRange()
+
+    def union(dofs: np.ndarray) -> np.ndarray:
+        return np.unique(np.concatenate(comm.allgather(np.unique(dofs))))
+
     local = np.asarray(A.getLGMap()[0].indices)
-    shared = _union(comm, local[(local < start) | (local >= end)])
+    shared = union(local[(local < start) | (local >= end)])
     offsets, columns, _ = A.getValuesCSR()
     across = np.flatnonzero((columns < start) | (columns >= end))
     rows, columns = start - 1 + np.searchsorted(offsets, across, side="right"), columns[across]
-    across = np.flatnonzero(~_within(rows, shared) & ~_within(columns, shared))
-    rows, columns = rows[across], columns[across]
+    coupled = ~np.isin(rows, shared) & ~np.isin(columns, shared)
     size = A.getBlockSize()
-    blocks = np.unique(np.union1d(shared, _union(comm, np.maximum(rows, columns))) // size)
+    blocks = np.unique(np.union1d(shared, union(np.maximum(rows, columns)[coupled])) // size)
     return (size * blocks[:, None] + np.arange(size)).ravel()
-
-
-def _union(comm: MPI.Comm, dofs: np.ndarray) -> np.ndarray:
-    return np.unique(np.concatenate(comm.allgather(np.unique(dofs))))
-
-
-def _within(dofs: np.ndarray, some: np.ndarray) -> np.ndarray:
-    """Which of ``dofs`` are among ``some``, sorted."""
-    at = np.searchsorted(some, dofs)
-    return some[np.minimum(at, len(some) - 1)] == dofs if len(some) else np.zeros(len(dofs), dtype=bool)
 
 
 def schur_kernels() -> Any:
@@ -105,15 +95,13 @@ class Substructures:
         self._set = PETSc.IS().createGeneral(local.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         self._block = A.createSubMatrices(self._set)[0]
         offsets, columns, _ = self._block.getValuesCSR()
-        on_interface = np.zeros(len(local), dtype=bool)
-        on_interface[kept] = True
-        entries = _ranges(offsets[kept], offsets[kept + 1])
-        self._shared = entries[on_interface[columns[entries]]]  # of the interface alone: all ranks have them
+        rows = np.repeat(np.arange(len(local), dtype=np.int32), np.diff(offsets))
+        last = np.isin(local, interface)
+        self._shared = np.flatnonzero(last[rows] & last[columns])  # of the interface alone: all ranks have them
         size = A.getBlockSize()
         corner = np.searchsorted(local[::size] // size, corner)  # all are on cells of this rank
-        place = _places(offsets, columns, on_interface, corner, self._own.start // size, size)
-        rows = np.repeat(np.arange(1, len(local) + 1, dtype=np.int32), np.diff(offsets))
-        self._arrays = rows, columns.astype(np.int32, copy=False) + 1, kept.astype(np.int32) + 1, place + 1
+        place = _places(rows, columns, last, corner, self._own.start // size, size)
+        self._arrays = rows + 1, columns.astype(np.int32, copy=False) + 1, kept.astype(np.int32) + 1, place + 1
         self._b = np.zeros(len(local))
         m = len(interface)
         self._reduced, self._complement = np.zeros(m), np.zeros((m, m))
@@ -180,29 +168,20 @@ class Substructures:
             self._mumps = None
 
 
-def _ranges(starts: np.ndarray, ends: np.ndarray, step: int = 1) -> np.ndarray:
-    """Every ``step``-th number from each of ``starts`` to that of ``ends``, without it, one after the other."""
-    counts = (ends - starts) // step
-    first = np.cumsum(counts) - counts
-    return step * np.arange(counts.sum()) + np.repeat(starts - step * first, counts)
-
-
 def _places(
-    offsets: np.ndarray, columns: np.ndarray, last: np.ndarray, corner: np.ndarray, start: int, size: int
+    rows: np.ndarray, columns: np.ndarray, last: np.ndarray, corner: np.ndarray, start: int, size: int
 ) -> np.ndarray:
     """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)`` behind the others.
 
-    Rows from ``offsets`` have sorted ``columns``; dofs and entries come in blocks of ``size``. Block ``start + i`` has
-    the blocks ``corner[i]`` at its corners; all that are not last have some.
+    Entries are at ``rows`` and ``columns``, in blocks of ``size``. Block ``start + i`` has the blocks ``corner[i]`` at
+    its corners; all that are not last have some.
     """
-    behind = last[::size]
-    inner = np.flatnonzero(~behind)
-    number = np.where(behind, -1, np.cumsum(~behind) - 1)
-    starts, ends = offsets[size * inner], offsets[size * inner + 1]
-    row, column = np.repeat(inner, (ends - starts) // size), columns[_ranges(starts, ends, size)] // size
-    both = ~behind[column]
-    row, column = number[row[both]], number[column[both]]
-    place = np.empty(len(behind), dtype=np.int32)
+    inner = np.flatnonzero(~last[::size])
+    number = np.full(len(last) // size, -1)
+    number[inner] = np.arange(len(inner))
+    one = (rows % size == 0) & (columns % size == 0) & ~last[rows] & ~last[columns]  # entry of each block
+    row, column = number[rows[one] // size], number[columns[one] // size]
+    place = np.empty(len(number), dtype=np.int32)
     place[inner] = before_corners(len(inner), row, column, number[corner[inner - start]])
-    place[behind] = np.arange(len(inner), len(behind))
+    place[number < 0] = np.arange(len(inner), len(number))
     return (size * place[:, None] + np.arange(size, dtype=np.int32)).ravel()

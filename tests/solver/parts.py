@@ -21,8 +21,7 @@ from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
-from archord.solver.contact.interaction import Interaction
-from archord.solver.contact.law import LAWS
+from archord.solver.contact.interaction import Interaction, Interface
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Problem
 from archord.solver.stepping import StepRules
@@ -129,11 +128,13 @@ def joint_parts(
     return Parts(V, joint.cells, joint.facets, bulk, sides, interact([opposite, sides[-1]], **contact_options))
 
 
-def interact(surfaces, *, kinematics="current", **options) -> Contact:
-    """The contact of two surfaces; "tied" is a law that has no kinematics."""
-    if kinematics == "tied":
-        return Contact(surfaces[1].V, [Interaction("tie", surfaces, law=LAWS["tied"], **options)])
-    return Contact(surfaces[1].V, [Interaction("contact", surfaces, kinematics=kinematics, **options)])
+def interact(surfaces, *, kinematics="current", integrated=None, **options) -> Contact:
+    """The contact of two surfaces, of which one or both are integrated; "tied" is a law that has no kinematics."""
+    options |= {"law": "tied"} if kinematics == "tied" else {"kinematics": kinematics}
+    chosen = "" if integrated is None else str(integrated)
+    return Contact(
+        surfaces[1].V, [Interface(Interaction("contact", ("0", "1"), integrated=chosen, **options), surfaces)]
+    )
 
 
 def blocks(comm: MPI.Comm, *edges: int) -> TaggedMesh:

@@ -44,7 +44,7 @@ class Cylinder:
         self.radial[inner] = coordinates(self.V)[inner] / A
 
     def step(self, wall: float) -> None:
-        result = self.solver.solve(wall, self.problem.state())
+        result = self.solver.solve(wall, [(self.problem.state(), False)])
         assert result.converged, result.reason
         self.u = self.problem.displacement()
         force = internal_force(self.bulk, self.u)

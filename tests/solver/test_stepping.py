@@ -27,7 +27,7 @@ def test_a_failed_step_leaves_no_trace():
     load, u = equilibrium.load, equilibrium.displacement()
     forces = joint.forces()
     joint.solver.newton.max_iterations = 1
-    result = joint.solver.solve(1.2 * load, equilibrium.state())
+    result = joint.solver.solve(1.2 * load, [(equilibrium.state(), False)])
     assert not result.converged
     equilibrium.restore(load, np.append(u, load))
     assert all(p.state is s for p, s in zip(points, states, strict=True))

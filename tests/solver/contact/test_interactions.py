@@ -9,8 +9,8 @@ from mpi4py import MPI
 from archord.geometry.curve import RigidCircle
 from archord.geometry.joint_mesh import Facets
 from archord.materials.elasticity import contact_modulus
-from archord.solver.contact import interaction as contact
 from archord.solver.contact.contact import Contact
+from archord.solver.contact.interaction import Interface
 from archord.solver.contact.law import ContactLaw
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Body, Interaction, Problem, Support
@@ -68,7 +68,7 @@ def test_the_tangent_of_several_interactions_is_the_derivative_of_their_forces()
 def test_a_limit_of_gamma_holds_for_the_interactions_above_it():
     """The others keep their factor; without a limit each has its own again."""
     contact = stack({"gamma_factor": 20.0}, {}).contact
-    low, high = (i.pairs[0] for i in contact.interactions)
+    low, high = (i.pairs[0] for i in contact.interfaces)
     assert contact.gamma_factor == 20
     before = low.gamma.copy(), high.gamma.copy()
     contact.use_gamma_factor(5.0)
@@ -81,7 +81,7 @@ def test_a_limit_of_gamma_holds_for_the_interactions_above_it():
 class Bilateral(ContactLaw):
     """Surfaces that slide on each other and never part."""
 
-    def update(self, gap, slip, trial, state):
+    def update(self, gap, slip, trial, gamma, state):
         derivative = np.zeros((len(trial), 2, 2))
         derivative[:, 0, 0] = 1.0
         return trial * [1.0, 0.0], derivative, state
@@ -112,10 +112,11 @@ def test_every_rigid_disc_moves_by_itself():
     edge = Surface(parts.V, parts.facets, Facets.BLOCK_HELD, ELASTIC)
     pin = RigidSurface(RigidCircle(np.array([0.0, -DR]), R), (0.0, -1.0))
     disc = RigidSurface(RigidCircle(np.array([2.5, R]), R), (0.1, -2.0))
-    interactions = [contact.Interaction("pin", [pin, parts.sides[0]]), contact.Interaction("disc", [disc, edge])]
-    both, u, depth, h = Contact(parts.V, interactions), np.zeros((len(coordinates(parts.V)), 2)), 1.5 * DR, 1e-6 * DR
+    sides = {"pin": [pin, parts.sides[0]], "disc": [disc, edge]}
+    interfaces = [Interface(Interaction(name, ("", "")), surfaces) for name, surfaces in sides.items()]
+    both, u, depth, h = Contact(parts.V, interfaces), np.zeros((len(coordinates(parts.V)), 2)), 1.5 * DR, 1e-6 * DR
     both.move(depth)
-    np.testing.assert_array_equal([pin.motion[0], disc.motion[0]], depth * both.rigid_rates)
+    np.testing.assert_array_equal([pin.motion[0], disc.motion[0]], [depth * pin.rate, depth * disc.rate])
     contact_force(both, u)
     assert all(pair.active.any() for pair in both.pairs)
     along = sum(rate @ both.resultant(name) for rate, name in ((pin.rate, "pin"), (disc.rate, "disc")))

@@ -43,16 +43,6 @@ def test_many_solves_bring_a_new_factorisation(small_is_large, monkeypatch):
     assert abs(P / usual.steps[-1].P - 1) < 1e-9
 
 
-def test_solvers_that_follow_factorise_as_ever(monkeypatch):
-    """What a large elastic joint asks of PETSc is not asked of the next joint."""
-    plastic = paper_joint(0.15, 2, 0.002)
-    before = solve(plastic).steps
-    monkeypatch.setattr(lagged, "_MANY_DOFS", 0)
-    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
-    solve(paper_joint(0.15, 1))
-    assert [m.iterations for m in solve(plastic).steps] == [m.iterations for m in before]
-
-
 def test_plastic_joints_factorise_every_matrix(small_is_large, monkeypatch):
     scene = paper_joint(0.12, 2, 0.002)
     usual = solve(scene)

@@ -133,7 +133,7 @@ def test_corners_are_those_of_the_edge_or_triangle(degree):
     assert (size[alone] == 0).all()
     assert (size[~alone] > 0).all()
     weights = {2: [1 / 2], 3: [1 / 3, 2 / 3]}[degree]
-    on_edge = [np.abs((1 - w) * ends[:, 0] + w * ends[:, 1] - x).max(axis=1) for w in weights]
+    on_edge = [np.abs((1 - w) * ends[:, 0] + w * ends[:, k] - x).max(axis=1) for w in weights for k in (1, 2)]
     off = np.minimum.reduce([*on_edge, np.abs(ends.mean(axis=1) - x).max(axis=1)])
     assert (off[~alone] <= 0.05 * size[~alone]).all()
 
