@@ -35,12 +35,7 @@ class CellBasis:
     gradient: Array  # (n, q, a, 2) in physical coordinates
     point: Array  # (n, q, 2)
     jacobian: Array  # (n, q, 2, 2) d x_i / d X_j
-
-    @property
-    def determinant(self) -> Array:
-        """Jacobian determinant ``(n, q)``; negative where the cell's vertices run clockwise."""
-        J = self.jacobian
-        return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+    determinant: Array  # (n, q) negative where the cell's vertices run clockwise
 
     @property
     def measure(self) -> Array:
@@ -61,7 +56,7 @@ def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) 
     inverse[..., 0, 0], inverse[..., 1, 1] = J[..., 1, 1] / det, J[..., 0, 0] / det
     inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1] / det, -J[..., 1, 0] / det
     gradient = np.einsum(f"j{at},nqji->nqai", table[1:], inverse)
-    return CellBasis(table[0], np.ascontiguousarray(gradient), point, J)
+    return CellBasis(table[0], np.ascontiguousarray(gradient), point, J, det)
 
 
 def _tabulate(degree: int, X: Array) -> Array:

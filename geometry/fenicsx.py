@@ -4,9 +4,9 @@ to the process."""
 from __future__ import annotations
 
 import signal
-import threading
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 
 import basix
 import basix.ufl
@@ -18,7 +18,7 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.mesh_cache import kept_mesh
-from archord.geometry.partition import sector_partitioner
+from archord.geometry.partition import sectors
 from archord.geometry.plane_mesh import PlaneMesh
 from archord.geometry.tagged_mesh import TaggedMesh
 
@@ -30,15 +30,9 @@ except ImportError:
 __all__ = ["create_vector", "gmsh_to_mesh"]
 
 
-def _leave_broken_pipes_to_python() -> None:
-    """Give SIGPIPE back to Python, which ignores it and raises `BrokenPipeError`: importing dolfinx starts PETSc, whose
-    handler ends the process with a page of text where the reader of its output, like head, has seen enough."""
-    before = signal.getsignal(signal.SIGPIPE)  # as Python knows it, which PETSc has not asked
-    if before is not None and threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGPIPE, before)
-
-
-_leave_broken_pipes_to_python()
+with suppress(TypeError, ValueError):  # a handler of another language, or not the main thread
+    # Python's own again, which raises BrokenPipeError: dolfinx starts PETSc, whose handler ends the process with a page
+    signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
 
 
 def gmsh_to_mesh(
@@ -57,14 +51,14 @@ def gmsh_to_mesh(
     The triangles are cut in four ``refinements`` times before they get nodes of higher order.
     ``adjust(x, tag)`` moves the nodes ``x`` ``(n, 2)`` of the physical curve ``tag``; without it, second-order edges
     are straight. The mesh is scaled by ``scale`` at the end. An error on rank 0 is raised on every rank. Its sets
-    have the names of gmsh's physical groups. ``partitioner`` replaces `sector_partitioner`.
+    have the names of gmsh's physical groups. ``partitioner`` replaces `sectors`.
     ``key`` says all that enters ``build`` and ``adjust``; `kept_mesh` gives the same mesh again.
     """
     made, failure = PlaneMesh.empty(order), None
     if comm.rank == 0:
-        drawn = build, adjust, order, refinements
+        make = partial(_made, build, adjust, order, refinements)
         try:
-            made = kept_mesh((*key, order, refinements), lambda: _made(*drawn)) if key else _made(*drawn)
+            made = kept_mesh((*key, order, refinements), make) if key else make()
         except Exception as error:  # raised on all ranks below
             failure = f"gmsh could not mesh the problem: {error}"
     failure = comm.bcast(failure)
@@ -80,11 +74,10 @@ def _made(build: Callable, adjust: Callable[[Array, int], Array] | None, order: 
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
-        for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
-            gmsh.option.setNumber(f"Mesh.{option}", 0)
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setNumber("Mesh.Algorithm", 6)
-        gmsh.option.setNumber("Mesh.HighOrderOptimize", 0)
+        for option in ("FromPoints", "FromCurvature", "ExtendFromBoundary"):
+            gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
+        for name, value in (("General.Terminal", 0), ("Mesh.Algorithm", 6), ("Mesh.HighOrderOptimize", 0)):
+            gmsh.option.setNumber(name, value)
         build(gmsh)
         gmsh.model.mesh.generate(2)
         for _ in range(refinements):
@@ -104,8 +97,11 @@ def _made(build: Callable, adjust: Callable[[Array, int], Array] | None, order: 
 
 def _distribute(comm: MPI.Comm, made: PlaneMesh, order: int, partitioner) -> TaggedMesh:
     """The mesh that rank 0 ``made`` and its sets, on all ranks."""
-    if partitioner is None and comm.size > 1:
-        partitioner = sector_partitioner(lambda: made.x)
+
+    def in_sectors(comm, n_parts: int, cell_types, cells) -> AdjacencyList_int32:
+        return AdjacencyList_int32(sectors(made.x, cells[0].reshape(-1, 3), n_parts).reshape(-1, 1))
+
+    partitioner = partitioner or (in_sectors if comm.size > 1 else None)
     equispaced = basix.LagrangeVariant.equispaced
     element = basix.ufl.element("P", "triangle", order, lagrange_variant=equispaced, shape=(2,))
     mesh = create_mesh(comm, cells=made.cells, x=made.x, e=element, partitioner=partitioner)

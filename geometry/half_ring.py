@@ -6,11 +6,9 @@ and the symmetry axis is x = 0. The ring's outer edge is held.
 
 from __future__ import annotations
 
-import math
-
 from mpi4py import MPI
 
-from archord.geometry.joint_mesh import Cells, Facets, edges_on, mesh_joint
+from archord.geometry.joint_mesh import Cells, Drawing, Facets, mesh_joint
 from archord.geometry.tagged_mesh import TaggedMesh
 
 
@@ -24,19 +22,16 @@ def half_ring(
     core_radius: float,
     *,
     size_ratio: float = 1.0,
-    refinements: int = 0,
     **options,
 ) -> TaggedMesh:
     """Mesh the half joint, with elements ``element_size`` long on the hole's arc and ``size_ratio`` times that on the
-    pin's; ``refinements`` and other ``options`` as for `mesh_joint`. Lengths share one unit.
+    pin's, and ``options`` as for `mesh_joint`. Lengths share one unit.
 
     Away from the arcs they grow by ``growth`` per unit of distance, to a third of ``core_radius`` at the pin's centre.
     """
-    coarsening = 2.0**refinements
     hole, outer, size, core = (1 + clearance / radius, *(v / radius for v in (outer_radius, element_size, core_radius)))
-    size, growth = coarsening * size, coarsening * growth
 
-    def draw(geo) -> tuple[dict, dict, dict]:
+    def draw(geo) -> Drawing:
         centre = geo.addPoint(0, 0, 0)
 
         def half_circle(r: float) -> tuple[int, int, list[int]]:
@@ -52,17 +47,15 @@ def half_ring(
         below, above = geo.addLine(low, bottom), geo.addLine(top, high)
         loop = [*hole_arcs, above, *(-arc for arc in reversed(edge)), below]
         faces[Cells.BLOCK] = geo.addPlaneSurface([geo.addCurveLoop(loop)])
-        curves = {Facets.PIN_ARC: pin_arcs, Facets.HOLE_ARC: hole_arcs, Facets.BLOCK_HELD: edge}
-        curves[Facets.SYMMETRY] = [*axis, below, above]
-        from_arcs = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
-        from_core = f"{coarsening * core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
-        sizes = {}
-        for body, arcs, on_arc in ((Cells.PIN, pin_arcs, size_ratio * size), (Cells.BLOCK, hole_arcs, size)):
-            for arc in arcs:
-                geo.mesh.setTransfiniteCurve(arc, edges_on(math.pi / 2, on_arc) + 1)
-            sizes[body] = f"Min({on_arc!r} + {from_arcs}, {from_core})"
-        return faces, sizes, curves
+        lines = {Facets.PIN_ARC: pin_arcs, Facets.HOLE_ARC: hole_arcs, Facets.BLOCK_HELD: edge}
+        lines[Facets.SYMMETRY] = [*axis, below, above]
+        arcs = {Facets.PIN_ARC: size_ratio * size, Facets.HOLE_ARC: size}
+        from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
+        from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
+        on_arcs = zip(faces, arcs.values(), strict=True)
+        sizes = {body: f"Min({on_arc!r} + {from_arc}, {from_core})" for body, on_arc in on_arcs}
+        return Drawing(faces, sizes, lines, arcs)
 
     circles = {Facets.PIN_ARC: (0.0, 1.0), Facets.HOLE_ARC: (0.0, hole), Facets.BLOCK_HELD: (0.0, outer)}
     key = ("half ring", hole, outer, size, growth, core, size_ratio)
-    return mesh_joint(comm, draw, circles, key, radius=radius, refinements=refinements, **options)
+    return mesh_joint(comm, draw, circles, key, radius=radius, **options)

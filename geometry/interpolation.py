@@ -63,21 +63,17 @@ class _Triangles:
         coordinates ``(k, 2)`` there."""
         places = np.pad(to, ((0, 0), (0, 1)))
         found = compute_collisions_points(self._tree, places)
-        count = np.diff(found.offsets)
-        point, cell = np.repeat(np.arange(len(to)), count), found.array
-        lost = np.flatnonzero(count == 0)  # in no triangle's bounding box
+        point, cell = np.repeat(np.arange(len(to)), np.diff(found.offsets)), found.array
+        lost = np.setdiff1d(np.arange(len(to)), point)  # in no triangle's bounding box
         if len(lost):
             everything = create_midpoint_tree(self._mesh, 2, np.arange(len(self._number), dtype=np.int32))
             nearest = compute_closest_entity(self._tree, everything, self._mesh, places[lost])
             point, cell = np.append(point, lost), np.append(cell, nearest)
-            order = np.argsort(point, kind="stable")
-            point, cell = point[order], cell[order]
         cell = self._number[cell]
         X = _reference_points(self._corners[cell], to[point])
         smallest = np.minimum(X.min(axis=1), 1 - X.sum(axis=1))  # barycentric coordinate
-        start = np.flatnonzero(np.diff(point, prepend=-1))
-        best = np.flatnonzero(smallest == np.maximum.reduceat(smallest, start)[point])
-        best = best[np.diff(point[best], prepend=-1) > 0]
+        order = np.lexsort((-smallest, point))
+        best = order[np.unique(point[order], return_index=True)[1]]
         return cell[best], X[best]
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -39,12 +40,22 @@ class Facets(_Set):
     SYMMETRY = 5
 
 
+class Drawing(NamedTuple):
+    """A joint in gmsh: its faces, their element sizes (expressions in x and y), its lines, and the size of the equal
+    edges on sets of them that are quarter circles of about unit radius."""
+
+    faces: dict[Cells, int]
+    sizes: dict[Cells, str]
+    lines: dict[Facets, list[int]]
+    arcs: dict[Facets, float]
+
+
 _CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
 
 
 def mesh_joint(
     comm: MPI.Comm,
-    draw: Callable,
+    draw: Callable[..., Drawing],
     circles: dict[Facets, tuple[float, float]],
     key: tuple,
     *,
@@ -53,8 +64,7 @@ def mesh_joint(
     refinements: int = 0,
     partitioner=None,
 ) -> TaggedMesh:
-    """Mesh what ``draw(gmsh.model.geo)`` returns: by `Cells` the faces and the element sizes (expressions in x and y),
-    by `Facets` the lines.
+    """Mesh what ``draw(gmsh.model.geo)`` returns, times ``radius``.
 
     ``circles`` are the heights of the centre and the radii of sets of arcs, on which all their nodes are put; ``key``
     is all that enters the drawing. The mesh is made with larger elements, which are then cut in four as often as
@@ -63,35 +73,33 @@ def mesh_joint(
     """
 
     def build(gmsh) -> None:
-        faces, sizes, curves = draw(gmsh.model.geo)
+        drawn, coarser, mesh = draw(gmsh.model.geo), 2.0**refinements, gmsh.model.mesh
         gmsh.model.geo.synchronize()
-        groups = [(2, [face], tag) for tag, face in faces.items()]
-        groups += [(1, lines, tag) for tag, lines in sorted(curves.items()) if lines]
-        for dim, entities, tag in groups:
-            gmsh.model.addPhysicalGroup(dim, entities, tag, tag.set_name)
-        field, parts = gmsh.model.mesh.field, []
-        for size in dict.fromkeys(sizes[tag] for tag in faces):
-            parts.append(field.add("MathEval"))
-            field.setString(parts[-1], "F", size)
-        if len(parts) > 1:
-            for i, face in enumerate(faces.values()):
-                whole, parts[i] = parts[i], field.add("Restrict")
-                field.setNumber(parts[i], "InField", whole)
-                field.setNumbers(parts[i], "SurfacesList", [face])
-            parts.append(field.add("Min"))
-            field.setNumbers(parts[-1], "FieldsList", parts[:-1])
-        field.setAsBackgroundMesh(parts[-1])
+        for facets, size in drawn.arcs.items():
+            for line in drawn.lines[facets]:
+                mesh.setTransfiniteCurve(line, max(2, math.ceil(math.pi / 2 / (coarser * size))) + 1)
+        for body, face in drawn.faces.items():
+            gmsh.model.addPhysicalGroup(2, [face], body, body.set_name)
+        for facets, lines in drawn.lines.items():
+            gmsh.model.addPhysicalGroup(1, lines, facets, facets.set_name)
+        fields = []
+        for size in dict.fromkeys(drawn.sizes[body] for body in drawn.faces):
+            fields.append(mesh.field.add("MathEval"))
+            mesh.field.setString(fields[-1], "F", f"{coarser!r} * ({size})")
+        if len(fields) > 1:
+            for i, face in enumerate(drawn.faces.values()):
+                whole, fields[i] = fields[i], mesh.field.add("Restrict")
+                mesh.field.setNumber(fields[i], "InField", whole)
+                mesh.field.setNumbers(fields[i], "SurfacesList", [face])
+            fields.append(mesh.field.add("Min"))
+            mesh.field.setNumbers(fields[-1], "FieldsList", fields[:-1])
+        mesh.field.setAsBackgroundMesh(fields[-1])
 
     def exact(x: Array, tag: int) -> Array:
         return on_circle(x, *circles[Facets(tag)]) if tag in circles else x
 
     options = {"order": degree, "scale": radius, "refinements": refinements, "partitioner": partitioner}
     return gmsh_to_mesh(comm, build, exact, **options, key=key)
-
-
-def edges_on(angle: float, size: float) -> int:
-    """Number of edges, at least two, of an arc of unit radius over ``angle`` [rad], none longer than ``size``."""
-    return max(2, math.ceil(angle / size))
 
 
 def refinements(cells: float) -> int:

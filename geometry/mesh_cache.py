@@ -6,10 +6,10 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import pickle
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from zipfile import BadZipFile
 
 from archord.geometry.plane_mesh import PlaneMesh
 from archord.kernels.compiled import cache_folder
@@ -27,19 +27,19 @@ def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
     if os.environ.get("ARCHORD_KEEP_MESHES") == "0":
         return make()
     folder = cache_folder() / "meshes"
-    path = folder / f"{_digest(key)}.npz"
-    with suppress(OSError, ValueError, KeyError, EOFError, BadZipFile):
-        mesh = PlaneMesh.load(path)
+    path = folder / f"{_digest(key)}.mesh"
+    with suppress(Exception):  # whatever a damaged file makes of it
+        mesh = pickle.loads(path.read_bytes())
         os.utime(path)
         return mesh
     mesh = make()
     if len(mesh.cells) <= _LARGEST:
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
-            new = path.with_suffix(f".{os.getpid()}.npz")
-            mesh.save(new)
+            new = path.with_suffix(f".{os.getpid()}.mesh")
+            new.write_bytes(pickle.dumps(mesh))
             os.replace(new, path)
-            for old in sorted(folder.glob("*.npz"), key=os.path.getmtime)[:-_MOST]:
+            for old in sorted(folder.glob("*.mesh"), key=os.path.getmtime)[:-_MOST]:
                 old.unlink()
     return mesh
 

@@ -6,10 +6,7 @@ every run, unlike that of a graph partitioner whose input arrives in any order.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from dolfinx.cpp.graph import AdjacencyList_int32
 
 from archord.geometry.basis import Array
 
@@ -22,14 +19,3 @@ def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     part = np.empty(len(cells), dtype=np.int32)
     part[order] = np.arange(len(cells)) * n_parts // max(len(cells), 1)
     return part
-
-
-def sector_partitioner(vertices: Callable[[], Array]) -> Callable:
-    """`sectors` as a dolfinx cell partitioner, for a mesh that is whole on the rank that has its ``vertices()``."""
-
-    def partition(comm, n_parts: int, cell_types, cells) -> AdjacencyList_int32:
-        triangles = cells[0].reshape(-1, 3)
-        part = sectors(vertices()[:, :2], triangles, n_parts) if len(triangles) else np.zeros(0, dtype=np.int32)
-        return AdjacencyList_int32(part.reshape(-1, 1))
-
-    return partition

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import basix
 import numpy as np
@@ -42,35 +40,20 @@ class PlaneMesh:
     def from_gmsh(cls, gmsh) -> PlaneMesh:
         """What gmsh's model has in physical groups."""
         numbers, x, _ = gmsh.model.mesh.getNodes()
-        cells, bodies = _elements(gmsh, CellType.triangle, 2)
-        edges, tags = _elements(gmsh, CellType.interval, 1)
-        used = np.zeros(int(numbers.max()) + 1, dtype=bool)  # but for centres of arcs, which dolfinx does not expect
-        used[cells] = True
-        number = np.cumsum(used) - 1
-        nodes = np.empty((number[-1] + 1, 2))
-        kept = used[numbers]
-        nodes[number[numbers[kept]]] = x.reshape(-1, 3)[kept, :2]
-        return cls(nodes, number[cells], bodies, number[edges], tags, _named_groups(gmsh, 2), _named_groups(gmsh, 1))
-
-    def save(self, path: Path) -> None:
-        """Write the mesh to the .npz file ``path``."""
-        names = json.dumps([self.cell_sets, self.facet_sets])
-        np.savez(path, self.x, self.cells, self.bodies, self.edges, self.tags, np.array(names))
-
-    @classmethod
-    def load(cls, path: Path) -> PlaneMesh:
-        """The mesh that `save` wrote. Raises OSError or ValueError."""
-        with np.load(path) as file:
-            *arrays, names = (file[f"arr_{i}"] for i in range(6))
-        return cls(*arrays, *json.loads(str(names)))
+        cells, bodies, cell_sets = _elements(gmsh, CellType.triangle, 2)
+        edges, tags, facet_sets = _elements(gmsh, CellType.interval, 1)
+        used, of_cells = np.unique(cells, return_inverse=True)  # no centres of arcs, which dolfinx does not expect
+        place = np.empty(int(numbers.max()) + 1, dtype=np.int64)
+        place[numbers] = np.arange(len(numbers))
+        nodes, cells = x.reshape(-1, 3)[place[used], :2], of_cells.reshape(cells.shape)
+        return cls(nodes, cells, bodies, np.searchsorted(used, edges), tags, cell_sets, facet_sets)
 
     def second_order(self) -> PlaneMesh:
         """This mesh of straight triangles with nodes on the middles of their edges, behind the others."""
         ends = np.concatenate([self.cells[:, _ENDS].reshape(-1, 2), self.edges])
         first, which = distinct_edges(ends)
         x = np.concatenate([self.x, self.x[ends[first]].mean(axis=1)])
-        middle = len(self.x) + which
-        of_cells, of_edges = np.split(middle, [3 * len(self.cells)])
+        of_cells, of_edges = np.split(len(self.x) + which, [3 * len(self.cells)])
         cells, edges = np.hstack([self.cells, of_cells.reshape(-1, 3)]), np.column_stack([self.edges, of_edges])
         return replace(self, x=x, cells=cells, edges=edges)
 
@@ -90,20 +73,15 @@ def distinct_edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, which
 
 
-def _named_groups(gmsh, dim: int) -> dict[str, int]:
-    """Tags of gmsh's physical groups of dimension ``dim`` by their names, by their numbers where they have none."""
-    tags = [tag for _, tag in gmsh.model.getPhysicalGroups(dim)]
-    return {gmsh.model.getPhysicalName(dim, tag) or str(tag): tag for tag in tags}
-
-
-def _elements(gmsh, kind: CellType, dim: int) -> tuple[np.ndarray, np.ndarray]:
-    """gmsh's numbers of the nodes ``(n, a)`` of elements in physical groups of dimension ``dim``, and the groups' tags
-    ``(n,)``."""
-    nodes, tags = [], []
+def _elements(gmsh, kind: CellType, dim: int) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
+    """gmsh's numbers of the nodes ``(n, a)`` of elements in physical groups of dimension ``dim``, the groups' tags
+    ``(n,)``, and the tags by their names, by their numbers where they have none."""
+    nodes, tags, names = [], [], {}
     for _, tag in gmsh.model.getPhysicalGroups(dim):
+        names[gmsh.model.getPhysicalName(dim, tag) or str(tag)] = tag
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
             types, _, found = gmsh.model.mesh.getElements(dim, entity)
             per_element = gmsh.model.mesh.getElementProperties(types[0])[3]
             nodes.append(found[0].reshape(-1, per_element)[:, perm_gmsh(kind, per_element)])
             tags.append(np.full(len(nodes[-1]), tag, dtype=np.int32))
-    return np.concatenate(nodes), np.concatenate(tags)
+    return np.concatenate(nodes), np.concatenate(tags), names

@@ -10,7 +10,7 @@ import math
 
 from mpi4py import MPI
 
-from archord.geometry.joint_mesh import Cells, Facets, edges_on, mesh_joint
+from archord.geometry.joint_mesh import Cells, Drawing, Facets, mesh_joint
 from archord.geometry.tagged_mesh import TaggedMesh
 
 _EDGE_GROWTH = 0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
@@ -27,49 +27,43 @@ def quarter_joint(
     size_ratio: float = 1.0,
     edge: tuple[float, float] | None = None,
     rigid_pin: bool = False,
-    refinements: int = 0,
     **options,
 ) -> TaggedMesh:
-    """Mesh the quarter joint; ``refinements`` and other ``options`` as for `mesh_joint`. Lengths share one unit.
+    """Mesh the quarter joint, with ``options`` as for `mesh_joint`. Lengths share one unit.
 
     ``element_size`` is the edge length on the hole's arc, ``size_ratio`` times that the one on the pin's; away from
     them it grows by ``growth`` per unit of distance. ``edge`` is an angle from the axis [rad] and the size to which
     the elements shrink there, where the contact is to end. A rigid pin is not meshed.
     """
-    coarsening = 2.0**refinements
-    hole, width, size = 1.0 + clearance / radius, block_size / radius, coarsening * element_size / radius
+    hole, width, size = 1.0 + clearance / radius, block_size / radius, element_size / radius
+    on_arc = {Cells.PIN: size_ratio * size, Cells.BLOCK: size}
+    equal = {Facets.PIN_ARC: size_ratio * size, Facets.HOLE_ARC: size}
 
-    def draw(geo) -> tuple[dict, dict, dict]:
-        faces: dict[Cells, int] = {}
-        curves: dict[Facets, list[int]] = {facet: [] for facet in Facets}
+    def draw(geo) -> Drawing:
+        def face(*points: tuple[float, float]) -> tuple[int, int, list[int]]:
+            """The face between an arc, by its centre and ends, and lines by corners or the centre; arc and lines."""
+            centre, bottom, side, *corners = (geo.addPoint(x, y, 0) for x, y in points)
+            corners = corners or [centre]
+            arc = geo.addCircleArc(bottom, centre, side)
+            lines = [geo.addLine(a, b) for a, b in zip([side, *corners], [*corners, bottom], strict=True)]
+            return geo.addPlaneSurface([geo.addCurveLoop([arc, *lines])]), arc, lines
 
-        def arc_with(line: int, size: float) -> int:
-            if edge is None:
-                geo.mesh.setTransfiniteCurve(line, edges_on(math.pi / 2, size) + 1)
-            return line
-
+        faces, axis, lines = {}, [], {}
         if not rigid_pin:
-            centre, bottom, side = (geo.addPoint(x, y - (hole - 1), 0) for x, y in ((0, 0), (0, -1), (1, 0)))
-            arc, top = arc_with(geo.addCircleArc(bottom, centre, side), size_ratio * size), geo.addLine(side, centre)
-            axis = geo.addLine(centre, bottom)
-            faces[Cells.PIN] = geo.addPlaneSurface([geo.addCurveLoop([arc, top, axis])])
-            curves |= {Facets.PIN_ARC: [arc], Facets.PIN_TOP: [top], Facets.SYMMETRY: [axis]}
-        points = (0, 0), (0, -hole), (hole, 0), (width, 0), (width, -width), (0, -width)
-        centre, bottom, side, *corners = (geo.addPoint(x, y, 0) for x, y in points)
-        arc = arc_with(geo.addCircleArc(bottom, centre, side), size)
-        edges = [geo.addLine(a, b) for a, b in zip([side, *corners], [*corners, bottom], strict=True)]
-        faces[Cells.BLOCK] = geo.addPlaneSurface([geo.addCurveLoop([arc, *edges])])
-        curves[Facets.HOLE_ARC], curves[Facets.BLOCK_HELD] = [arc], [edges[0]]
-        curves[Facets.SYMMETRY] += [edges[-1]]
-        from_arc = f"{coarsening * growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
-        sizes = {Cells.PIN: f"{size_ratio * size!r} + {from_arc}", Cells.BLOCK: f"{size!r} + {from_arc}"}
-        if edge is not None:
-            x, y = hole * math.sin(edge[0]), hole * math.cos(edge[0])
-            from_edge = f"{coarsening * _EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
-            fine = coarsening * edge[1] / radius
-            sizes = {body: f"Min({value}, {fine!r} + {from_edge})" for body, value in sizes.items()}
-        return faces, sizes, curves
+            faces[Cells.PIN], arc, (top, line) = face((0, 1 - hole), (0, -hole), (1, 1 - hole))
+            lines |= {Facets.PIN_ARC: [arc], Facets.PIN_TOP: [top]}
+            axis.append(line)
+        corners = (width, 0), (width, -width), (0, -width)
+        faces[Cells.BLOCK], arc, (held, *_, line) = face((0, 0), (0, -hole), (hole, 0), *corners)
+        lines |= {Facets.HOLE_ARC: [arc], Facets.BLOCK_HELD: [held], Facets.SYMMETRY: [*axis, line]}
+        from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
+        sizes = {body: f"{size!r} + {from_arc}" for body, size in on_arc.items()}
+        if edge is None:
+            return Drawing(faces, sizes, lines, {arc: size for arc, size in equal.items() if arc in lines})
+        x, y = hole * math.sin(edge[0]), hole * math.cos(edge[0])
+        near_edge = f"{edge[1] / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
+        return Drawing(faces, {body: f"Min({value}, {near_edge})" for body, value in sizes.items()}, lines, {})
 
     circles = {Facets.PIN_ARC: (1 - hole, 1.0), Facets.HOLE_ARC: (0.0, hole)}
     key = ("quarter joint", hole, width, size, growth, size_ratio, edge and (edge[0], edge[1] / radius), rigid_pin)
-    return mesh_joint(comm, draw, circles, key, radius=radius, refinements=refinements, **options)
+    return mesh_joint(comm, draw, circles, key, radius=radius, **options)

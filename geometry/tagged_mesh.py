@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx.mesh import Mesh, MeshTags
+from dolfinx.mesh import Mesh, MeshTags, compute_incident_entities
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,8 @@ class TaggedMesh:
     def tags_behind(self, name: str) -> set[int]:
         """Tags of the cells at the facets of the set ``name``, over all ranks. Collective."""
         self.mesh.topology.create_connectivity(1, 2)
-        to_cell = self.mesh.topology.connectivity(1, 2)
-        n_cells = self.mesh.topology.index_map(2).size_local + self.mesh.topology.index_map(2).num_ghosts
-        tag = np.zeros(n_cells, dtype=np.int64)
-        tag[self.cells.indices] = self.cells.values
-        here = {int(tag[cell]) for facet in self.facets.find(self.facet_tag(name)) for cell in to_cell.links(facet)}
+        cells = compute_incident_entities(self.mesh.topology, self.facets.find(self.facet_tag(name)), 1, 2)
+        here = np.unique(self.cells.values[np.isin(self.cells.indices, cells)]).tolist()
         return set().union(*self.mesh.comm.allgather(here))
 
 

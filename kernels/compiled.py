@@ -13,6 +13,7 @@ import shlex
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -62,13 +63,11 @@ def pointer(array: npt.NDArray[Any]) -> Any:
 
 
 def cache_folder() -> Path:
-    """The user's folder for what is made once and used again; a temporary one where that cannot be written."""
+    """The user's folder for what is made once and used again; a new temporary one where that cannot be written."""
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "archord"
-    try:
+    with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return Path(tempfile.gettempdir())
-    return folder if os.access(folder, os.W_OK) else Path(tempfile.gettempdir())
+    return folder if os.access(folder, os.W_OK) else Path(tempfile.mkdtemp(prefix="archord-"))
 
 
 def _compile(command: list[str], source: Path, path: Path, libraries: tuple[str, ...]) -> None:

@@ -88,7 +88,7 @@ def test_the_mesh_not_used_for_longest_is_forgotten(comm, made, monkeypatch, tmp
 )
 def test_a_file_that_is_no_mesh_is_made_again(comm, made, tmp_path, spoil):
     first = content(quarter_joint(comm, **QUARTER))
-    (path,) = tmp_path.glob("meshes/*.npz")
+    (path,) = tmp_path.glob("meshes/*.mesh")
     spoil(path)
     for a, b in zip(first, content(quarter_joint(comm, **QUARTER)), strict=True):
         assert (a == b).all()
