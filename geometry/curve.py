@@ -125,22 +125,19 @@ class Curve:
         self, x: Array, outward: Array, displacement: Array, home: Index, reach: int = 1, margin: float = 0.0
     ) -> Projection:
         m, k = len(x), self.degree + 1
-        displaced = self.X + displacement
         facet, lost = np.empty(m, dtype=np.int32), np.zeros(1, dtype=np.int32)
-        xi, bend, shape, slope = np.empty(m), np.empty(m), np.empty((m, k)), np.empty((m, k))
-        point, normal, tangent = (np.empty((m, 2)) for _ in range(3))
-        slides, found = np.empty(m, dtype=bool), np.empty(m, dtype=bool)
+        (xi, bend), (shape, slope) = np.empty((2, m)), np.empty((2, m, k))
+        point, normal, tangent = np.empty((3, m, 2))
+        slides, found = np.empty((2, m), dtype=bool)
         x, outward, home = np.ascontiguousarray(x), np.ascontiguousarray(outward), home.astype(np.int32, copy=False)
-        curve: tuple[np.ndarray, ...] = (displaced, self._coefficients, home)
+        curve: tuple[np.ndarray, ...] = (self.X + displacement, self._coefficients, home)
         results: tuple[np.ndarray, ...] = (facet, xi, point, normal, tangent, bend, shape, slope, slides, found, lost)
         n_lost = library(Path(__file__).with_name("closest_point.c")).closest_points(
             m, pointer(x), pointer(outward), self.n_facets, self.degree, *map(pointer, curve), reach, margin,
             _END_MARGIN, _NEWTON_STEPS, *map(pointer, results),
         )  # fmt: skip
         if n_lost:
-            at = x[lost[0]]
-            message = f"{n_lost} contact points found no closest point, the first at ({at[0]:g}, {at[1]:g})"
-            raise ProjectionError(message)
+            raise ProjectionError(f"{n_lost} contact points found no closest point, the first at {x[lost[0]]}")
         nodes = self.connectivity[facet]
         return Projection(found, point, normal, tangent, bend, slides, nodes, shape, slope, facet, xi)
 

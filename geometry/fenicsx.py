@@ -18,7 +18,6 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.mesh_cache import kept_mesh
-from archord.geometry.partition import sectors
 from archord.geometry.plane_mesh import PlaneMesh
 from archord.geometry.tagged_mesh import TaggedMesh
 
@@ -41,7 +40,6 @@ def gmsh_to_mesh(
     adjust: Callable[[Array, int], Array] | None = None,
     *,
     order: int = 2,
-    scale: float = 1.0,
     refinements: int = 0,
     partitioner=None,
     key: tuple = (),
@@ -50,9 +48,8 @@ def gmsh_to_mesh(
 
     The triangles are cut in four ``refinements`` times before they get nodes of higher order.
     ``adjust(x, tag)`` moves the nodes ``x`` ``(n, 2)`` of the physical curve ``tag``; without it, second-order edges
-    are straight. The mesh is scaled by ``scale`` at the end. An error on rank 0 is raised on every rank. Its sets
-    have the names of gmsh's physical groups. ``partitioner`` replaces `sectors`.
-    ``key`` says all that enters ``build`` and ``adjust``; `kept_mesh` gives the same mesh again.
+    are straight. An error on rank 0 is raised on every rank. The sets have the names of gmsh's physical groups.
+    ``partitioner`` replaces `sectors`. A mesh whose ``key`` says all that enters it is kept (`kept_mesh`).
     """
     made, failure = PlaneMesh.empty(order), None
     if comm.rank == 0:
@@ -61,12 +58,9 @@ def gmsh_to_mesh(
             made = kept_mesh((*key, order, refinements), make) if key else make()
         except Exception as error:  # raised on all ranks below
             failure = f"gmsh could not mesh the problem: {error}"
-    failure = comm.bcast(failure)
-    if failure:
+    if failure := comm.bcast(failure):
         raise RuntimeError(failure)
-    mesh = _distribute(comm, made, order, partitioner)
-    mesh.mesh.geometry.x[:] *= scale
-    return mesh
+    return _distribute(comm, made, order, partitioner)
 
 
 def _made(build: Callable, adjust: Callable[[Array, int], Array] | None, order: int, refinements: int) -> PlaneMesh:
@@ -111,3 +105,17 @@ def _distribute(comm: MPI.Comm, made: PlaneMesh, order: int, partitioner) -> Tag
     mesh.topology.create_connectivity(1, 2)
     facets = meshtags_from_entities(mesh, 1, AdjacencyList_int32(edges), tags)
     return TaggedMesh(mesh, cells, facets, *comm.bcast((made.cell_sets, made.facet_sets)))
+
+
+def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
+    """The rank ``(n,)`` of each of the ``cells`` ``(n, k)`` with vertices ``x`` ``(m, 2)``: sectors around the origin,
+    numbered from below, of as many cells each.
+
+    Points in contact face each other along rays from there, so most pairs stay on one rank; and the cut is the same in
+    every run, unlike that of a graph partitioner whose input arrives in any order.
+    """
+    middle = x[cells].mean(axis=1)
+    order = np.argsort(np.arctan2(middle[:, 1], middle[:, 0]), kind="stable")
+    part = np.empty(len(cells), dtype=np.int32)
+    part[order] = np.arange(len(cells)) * n_parts // max(len(cells), 1)
+    return part

@@ -1,7 +1,5 @@
 """C sources as functions on numpy arrays, declared by a header beside them: compiled once, by the compiler that dolfinx
-needs for its forms, and kept in the user's cache.
-
-Why not numba: dolfinx imports it wherever it is installed, 0.4 s of every run.
+needs for its forms, and kept in the user's cache. (Numba would cost 0.4 s of every run: dolfinx imports it if it can.)
 """
 
 from __future__ import annotations
@@ -72,17 +70,14 @@ def cache_folder() -> Path:
 
 def _compile(command: list[str], source: Path, path: Path, libraries: tuple[str, ...]) -> None:
     """Several processes may compile at once: each into a file of its own, and the last one stays."""
-    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".so", delete=False) as file:
-        target = Path(file.name)
-    try:
-        command = [*command, "-o", str(target), str(source), *(f"-l{name}" for name in ("m", *libraries))]
-        result = subprocess.run(command, capture_output=True, text=True)
-    except OSError as error:
-        target.unlink()
-        raise CompilerError(f"no C compiler ({error}); install gcc, or set CC") from None
-    if result.returncode:
-        target.unlink()
-        said = [line for line in result.stderr.splitlines() if "error" in line] or [f"exit code {result.returncode}"]
-        raise CompilerError(f"{source.name} could not be compiled: {said[0]}")
-    target.chmod(0o755)
-    os.replace(target, path)
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        made = Path(folder) / path.name
+        command = [*command, "-o", str(made), str(source), *(f"-l{name}" for name in ("m", *libraries))]
+        try:
+            result = subprocess.run(command, capture_output=True, text=True)
+        except OSError as error:
+            raise CompilerError(f"no C compiler ({error}); install gcc, or set CC") from None
+        if result.returncode:
+            said = [line for line in result.stderr.splitlines() if "error" in line] or [f"exit {result.returncode}"]
+            raise CompilerError(f"{source.name} could not be compiled: {said[0]}")
+        os.replace(made, path)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from dolfinx.mesh import entities_to_geometry
 
+from archord.geometry.fenicsx import sectors
 from archord.geometry.half_ring import half_ring
 from archord.geometry.joint_mesh import Facets
-from archord.geometry.partition import sectors
 from archord.geometry.quarter_joint import quarter_joint
 
 
