@@ -214,12 +214,12 @@ def fit(
         raise InputError(f"{folders[0]}: --csv and --law are for a sweep, and this is none.")
     from archord.output.folder import FILES
     from archord.output.user_file import check_target, writing
-    from archord.postprocess.curve import read_run
     from archord.postprocess.laws import fit_report
     from archord.postprocess.laws.calibration import calibrate
     from archord.postprocess.laws.fitted_law import PYTHON_BEGINS
+    from archord.postprocess.run import Run
 
-    runs = [read_run(folder).loading() for folder in folders]
+    runs = [Run(folder).curve.loading() for folder in folders]
     calibration = calibrate(runs, deltas, confidence, hold_k)
     law = calibration.law()
     # checked and written before anything is printed: a file that cannot be written is one sentence alone

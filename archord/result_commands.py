@@ -63,10 +63,8 @@ def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
 @click.command()
 @argument("folder", "RUN", "run folder")
 @file("--vtk", "write .vtu files for each step and run.pvd into DIR", "DIR")
-@file("--csv", "write history, contact, nodes and cells into DIR", "DIR")
-@click.option(
-    "--step", type=int, metavar="N", help="of the .vtu files this step alone [all]; of nodes and cells [last]"
-)
+@file("--csv", "write history and contact into DIR", "DIR")
+@click.option("--step", type=int, metavar="N", help="write the .vtu files of this step alone [all]")
 @flag("--force", "overwrite files that are there")
 def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, force: bool) -> int:
     """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything else."""
@@ -83,7 +81,7 @@ def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, f
     if csv is not None:
         from archord.postprocess.export import export_csv
 
-        print(*export_csv(run, csv, step, force=force), sep="\n")
+        print(*export_csv(run, csv, force=force), sep="\n")
     return 0
 
 
@@ -112,8 +110,8 @@ def picture(folder: Path, output: Path | None) -> int:
 @flag("--force", "overwrite a file that is there")
 def export_deck(scene: Path, output: Path | None, elements: Elements, overrides: tuple[str, ...], force: bool) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
-    from archord.output.user_file import check_target
-    from archord.postprocess.deck import write_deck
+    from archord.output.user_file import check_target, writing
+    from archord.postprocess.deck import deck, deck_mesh
     from archord.scene.file import load_scene
 
     checked = load_scene(scene, overrides)
@@ -121,6 +119,7 @@ def export_deck(scene: Path, output: Path | None, elements: Elements, overrides:
         raise InputError(f'{scene}: joint.model = "ring" cannot be exported; only "block" can.')
     path = output or Path(f"{scene.stem}.inp")
     check_target(path, [scene], force=force)
-    write_deck(checked, path, elements)
+    with writing(path):
+        path.write_text(deck(checked, deck_mesh(checked, elements)), encoding="utf-8")
     print(path)
     return 0

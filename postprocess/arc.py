@@ -12,7 +12,6 @@ from archord.presets.arc import ArcProfile
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
-SIDES = ("pin", "hole")
 _FIXED, _PER_STEP = ("s", "weight"), ("coordinates", "pressure", "raw_pressure", "gap")
 
 
@@ -24,22 +23,18 @@ def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
     path = run.folder / "contact.h5" if run.folder else None
     if path is None or not path.is_file():
         raise InputError(f"{run.name}: is not a complete run folder: contact.h5 is missing.")
-    at, radius = step_name(step), {"pin": run.R, "hole": run.R + run.dR}
+    radius, found = {"pin": run.R, "hole": run.R + run.dR}, {}
     try:
         with h5py.File(path) as file:
             if int(file["accepted"][()]) < step:
                 raise KeyError(step)
-            return {
-                side: ArcProfile(
-                    radius=radius[side],
-                    **{name: file[f"{side}/{name}"][()] for name in _FIXED},
-                    **{name: file[f"{side}/{name}/{at}"][()] for name in _PER_STEP},
-                )
-                for side in SIDES
-                if side in file
-            }
+            for side in (side for side in radius if side in file):
+                arrays = {name: file[f"{side}/{name}"][()] for name in _FIXED}
+                arrays |= {name: file[f"{side}/{name}/{step_name(step)}"][()] for name in _PER_STEP}
+                found[side] = ArcProfile(radius[side], **arrays)
     except (OSError, KeyError, RuntimeError, TypeError, ValueError):
         raise InputError(f"{path}: cannot be read as the contact of a run.") from None
+    return found
 
 
 def undeformed(arc: ArcProfile, side: str, scene: Scene) -> Array:

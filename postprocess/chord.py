@@ -76,32 +76,23 @@ def chord_projection(
     they carry pressure, the others there are left out. Raises ValueError for angles that do not rise from 0, pressure
     beyond pi/2, numbers that are not finite, and a contact angle that is not between 0 and pi.
     """
-    angle, p = np.ravel(np.asarray(phi, float)), np.ravel(np.asarray(pressure, float))
-    if not 0 < eps < np.pi:
-        raise ValueError(f"the contact semi-angle is {eps:g}; it must be between 0 and pi.")
-    if not 0 < R < np.inf:
-        raise ValueError(f"the radius is {R:g}; it must be positive.")
-    if len(angle) < 2 or len(angle) != len(p):
-        raise ValueError("phi and pressure must have the same length, two or more.")
-    if not (angle[0] >= 0 and (np.diff(angle) >= 0).all()):
-        raise ValueError("phi must rise from the contact axis, from 0 or more.")
-    if not np.isfinite(p).all():
-        raise ValueError("the pressure must be finite everywhere.")
-    if weight is None:
-        gap = np.diff(angle) * R
-        measure = (np.append(gap, 0.0) + np.append(0.0, gap)) / 2
-    else:
-        measure = np.ravel(np.asarray(weight, float))
-        if len(measure) != len(angle):
-            raise ValueError("weight must have the length of phi.")
+    angle, p = (np.ravel(np.asarray(values, float)) for values in (phi, pressure))
+    gap = np.diff(angle) * R
+    trapezoidal = (np.append(gap, 0.0) + np.append(0.0, gap)) / 2
+    measure = trapezoidal if weight is None else np.ravel(np.asarray(weight, float))
+    if not (0 < eps < np.pi and 0 < R < np.inf):
+        raise ValueError(f"the contact semi-angle {eps:g} must be between 0 and pi, the radius {R:g} positive.")
+    if not 1 < len(angle) == len(p) == len(measure):
+        raise ValueError("phi, pressure and weight must have the same length, two or more.")
+    if not (angle[0] >= 0 and (np.diff(angle) >= 0).all() and np.isfinite(p).all()):
+        raise ValueError("phi must rise from the contact axis, from 0 or more, and the pressure must be finite.")
     kept = (angle <= eps) | (p != 0)
     angle, p, measure = angle[kept], p[kept], measure[kept]
     if len(angle) and angle[-1] > np.pi / 2 * (1 + 1e-12):
         raise ValueError("the contact must end within pi/2 of the axis.")
     stretch = np.cos(eps / 2) / np.cos(angle - eps / 2) ** 2
-    return ChordPressure(
-        chord_coordinate(angle, eps, R), p * np.cos(angle) / stretch, measure * stretch, float(eps), float(R)
-    )
+    x, py = chord_coordinate(angle, eps, R), p * np.cos(angle) / stretch
+    return ChordPressure(x, py, measure * stretch, float(eps), float(R))
 
 
 def read_chord_pressure(folder: str | Path, step: int | None = None, side: str | None = None) -> ChordPressure:

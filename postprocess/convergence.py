@@ -183,7 +183,7 @@ def extrapolated(sizes: Sequence[float], values: Sequence[float]) -> Limit:
         orders = np.linspace(low, high, 33)
         best = int(np.argmin([_fit(h, v, order)[1] for order in orders]))
         low, high = orders[max(best - 1, 0)], orders[min(best + 1, 32)]
-    order = (low + high) / 2
+    order = float(low + high) / 2
     limit = _fit(h, v, order)[0]
     others = [_fit(np.delete(h, i), np.delete(v, i), order)[0] for i in range(len(h))]
     return Limit(limit, order, float(np.abs(np.array(others) - limit).max()))

@@ -9,17 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from archord.materials.material import Array
-from archord.output.folder import no_run
-from archord.output.history import read_history
-from archord.scene.errors import InputError
-from archord.scene.file import load_scene
 from archord.scene.scene import Scene
 
-_CURVES = ("delta", "P", "p0", "eps", "peeq_max")
-_NEEDED = (*_CURVES, "step", "delta/dR", "P/(E* R)", "p0/E*", "iterations", "cutbacks", "seconds")
+CURVES = ("delta", "P", "p0", "eps", "peeq_max")
 _SAME = 1e-6  # relative difference of two forces that are the same but for what Newton leaves
-
-Columns = dict[str, list[float]]
 
 
 @dataclass(frozen=True)
@@ -63,7 +56,7 @@ class RunCurve:
 
     def at(self, steps: np.ndarray | slice) -> RunCurve:
         """The chosen ``steps`` alone."""
-        return replace(self, **{name: getattr(self, name)[steps] for name in _CURVES})
+        return replace(self, **{name: getattr(self, name)[steps] for name in CURVES})
 
     def first_loading(self) -> RunCurve:
         """The steps before the pin first goes back."""
@@ -87,30 +80,3 @@ class RunCurve:
 def gap_name(dR: float, symbol: str = "dR") -> str:
     """A clearance as it stands in names of quantities: of its size alone, where it is an interference."""
     return symbol if dR > 0 else f"|{symbol}|"
-
-
-def read_columns(path: Path) -> Columns:
-    """The columns of the history.csv ``path`` by name without unit. Raises `InputError` if it is none."""
-    try:
-        columns = read_history(path)
-        if not np.isfinite([columns[name] for name in _NEEDED]).all():
-            raise ValueError("numbers that are not finite")
-    except (ValueError, IndexError, KeyError, OSError):
-        raise InputError(f"{path}: cannot be read as the history of a run.") from None
-    return columns
-
-
-def curve_of(folder: Path, scene: Scene, columns: Columns) -> RunCurve:
-    """The curves among the ``columns`` of a run of ``scene``. Raises `InputError` if it has no accepted step."""
-    if not columns["delta"]:
-        raise InputError(f"{folder}: holds no accepted step.")
-    return RunCurve(str(folder), scene, **{name: np.array(columns[name]) for name in _CURVES}, folder=folder)
-
-
-def read_run(folder: str | Path) -> RunCurve:
-    """The curves in the run folder ``folder``. Raises `InputError` if it is not one, or holds no accepted step."""
-    folder = Path(folder)
-    for name in ("scene.toml", "history.csv"):
-        if not (folder / name).is_file():
-            raise no_run(folder, name)
-    return curve_of(folder, load_scene(folder / "scene.toml"), read_columns(folder / "history.csv"))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -21,9 +20,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.joint_mesh import Cells, Facets
 from archord.geometry.quarter_joint import quarter_joint
-from archord.output.user_file import writing
 from archord.scene.scene import Scene
-from archord.scene.sections import Pin, Solid
 
 Ints = npt.NDArray[np.int64]
 Elements = Literal["quadratic", "linear"]
@@ -35,6 +32,22 @@ _COUNTERCLOCKWISE = [0, 1, 2, 5, 3, 4]
 _MIRRORED = [0, 2, 1, 4, 3, 5]
 # Quarter k of a triangle has its corner k, and half of its edge k as edge k.
 _QUARTERS = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
+
+_CONTACT = """*SURFACE INTERACTION, NAME=CONTACT
+*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR
+{}
+*CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE
+PIN_ARC_SURFACE, HOLE_ARC_SURFACE
+*BOUNDARY"""
+_STEP = """*STEP, INC=1000
+*STATIC
+1., 1.
+*BOUNDARY
+{0}, 2, 2, {1}
+*NODE PRINT, NSET={0}, TOTALS=ONLY
+RF
+*NODE PRINT, NSET=BLOCK_HELD, TOTALS=ONLY
+RF"""
 
 
 @dataclass(frozen=True)
@@ -118,26 +131,22 @@ def deck(scene: Scene, mesh: PlaneMesh, thick: float | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_deck(scene: Scene, path: Path, elements: Elements) -> None:
-    """Mesh ``scene`` and write its deck to ``path``. Raises `InputError` if that is not possible."""
-    with writing(path):
-        path.write_text(deck(scene, deck_mesh(scene, elements)), encoding="utf-8")
-
-
 def _mesh_lines(scene: Scene, mesh: PlaneMesh, thick: float) -> Iterator[str]:
     units = scene.units
     yield "*HEADING"
     yield f"archord: half a pin joint; {units.length}, {units.stress}; thickness {_number(thick)}"
     yield "*NODE, NSET=ALL_NODES"
-    yield from (f"{i}, {_number(x)}, {_number(y)}" for i, (x, y) in enumerate(zip(*mesh.x.T, strict=True), 1))
+    yield from (f"{i}, {_number(x)}, {_number(y)}" for i, (x, y) in enumerate(mesh.x, 1))
     name = ("CPE" if scene.analysis.plane == "strain" else "CPS") + str(mesh.elements.shape[1])
     for body in Cells:
         yield f"*ELEMENT, TYPE={name}, ELSET={body.name}"
         for e in np.flatnonzero(mesh.bodies == body):
             yield ", ".join(map(str, [e + 1, *(mesh.elements[e] + 1)]))
-    yield from _node_set("PIN_NODES", mesh.elements[mesh.bodies == Cells.PIN])
-    for tag in Facets:
-        yield from _node_set(tag.name, mesh.edge_nodes(tag))
+    sets = {"PIN_NODES": mesh.elements[mesh.bodies == Cells.PIN]} | {tag.name: mesh.edge_nodes(tag) for tag in Facets}
+    for name, nodes in sets.items():
+        listed = np.unique(nodes) + 1
+        yield f"*NSET, NSET={name}"
+        yield from (", ".join(map(str, listed[i : i + 10])) for i in range(0, len(listed), 10))
     for tag in (Facets.PIN_ARC, Facets.HOLE_ARC):
         yield f"*SURFACE, NAME={tag.name}_SURFACE, TYPE=ELEMENT"
         yield from (f"{e + 1}, S{edge + 1}" for e, edge in mesh.edges[tag])
@@ -145,44 +154,26 @@ def _mesh_lines(scene: Scene, mesh: PlaneMesh, thick: float) -> Iterator[str]:
 
 def _model_lines(scene: Scene, thick: float) -> Iterator[str]:
     for body, solid in ((Cells.PIN, scene.block if scene.pin.rigid else scene.pin), (Cells.BLOCK, scene.block)):
-        yield from _material(body.name, solid)
+        yield from (f"*MATERIAL, NAME={body.name}", "*ELASTIC", f"{solid.E!r}, {solid.nu!r}")
+        if solid.yield_stress is not None:
+            yield from ("*PLASTIC", f"{_number(solid.yield_stress)}, 0.")
+            if solid.hardening:
+                yield f"{_number(solid.yield_stress + solid.hardening)}, 1."
         yield from (f"*SOLID SECTION, ELSET={body.name}, MATERIAL={body.name}", _number(thick))
-    yield from ("*SURFACE INTERACTION, NAME=CONTACT", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR")
-    yield _number(contact_stiffness(scene))
-    yield "*CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE"
-    yield "PIN_ARC_SURFACE, HOLE_ARC_SURFACE"
-    yield "*BOUNDARY"
-    if scene.pin.rigid:
-        yield "PIN_NODES, 1, 1"
+    held = ["PIN_NODES, 1, 1"] if scene.pin.rigid else []
+    yield from (*_CONTACT.format(_number(contact_stiffness(scene))).splitlines(), *held)
     yield from ("SYMMETRY, 1, 1", "BLOCK_HELD, 1, 2")
 
 
 def _step_lines(scene: Scene) -> Iterator[str]:
-    loaded, n = loaded_nodes(scene), len(scene.targets)
-    for k, target in enumerate(scene.targets, start=1):
-        yield from ("*STEP, INC=1000", "*STATIC", "1., 1.", "*BOUNDARY")
-        yield f"{loaded}, 2, 2, {_number(-target)}"
-        for support in (loaded, "BLOCK_HELD"):
-            yield from (f"*NODE PRINT, NSET={support}, TOTALS=ONLY", "RF")
-        if k == n:
+    loaded = loaded_nodes(scene)
+    for k, target in enumerate(scene.targets, 1):
+        yield from _STEP.format(loaded, _number(-target)).splitlines()
+        if k == len(scene.targets):
             yield from ("*NODE FILE, OUTPUT=2D", "U", "*CONTACT FILE", "CSTR")
             for body in Cells if scene.plastic else ():
                 yield from (f"*EL PRINT, ELSET={body.name}", "PEEQ")
         yield "*END STEP"
-
-
-def _material(name: str, solid: Pin | Solid) -> Iterator[str]:
-    yield from (f"*MATERIAL, NAME={name}", "*ELASTIC", f"{solid.E!r}, {solid.nu!r}")
-    if solid.yield_stress is not None:
-        yield from ("*PLASTIC", f"{_number(solid.yield_stress)}, 0.")
-        if solid.hardening:
-            yield f"{_number(solid.yield_stress + solid.hardening)}, 1."
-
-
-def _node_set(name: str, nodes: Ints) -> Iterator[str]:
-    yield f"*NSET, NSET={name}"
-    listed = np.unique(nodes) + 1
-    yield from (", ".join(map(str, listed[i : i + 10])) for i in range(0, len(listed), 10))
 
 
 def _number(value: float) -> str:

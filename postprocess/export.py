@@ -7,57 +7,41 @@ the pressure, the gap and the displacement of the points, so that the same filte
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from archord.output.step_file import step_name
-from archord.output.user_file import check_output, make_folder, writing
+from archord.output.user_file import check_target, make_folder, writing
 from archord.postprocess.fields import Fields
 from archord.postprocess.run import Run
-from archord.scene.errors import InputError
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _DATA_OF_ARC = ("pressure", "raw_pressure", "gap", "angle", "s")
 
 
-def export_csv(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> list[Path]:
-    """Write history.csv, contact.csv (all steps) and, of a run with fields, nodes and cells of ``step`` (the last) into
+def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
+    """Write history.csv and contact.csv (all steps, with step and delta before the columns of `Run.pressure`) into
     ``folder``, which is made if need be; returns the files. Columns are headed ``name [unit]``.
 
-    Raises `InputError` if the run has no such step, a file of it is damaged, or one that would be written is there
+    Raises `InputError` if the run has no accepted step, a file of it is damaged, or one that would be written is there
     already and ``force`` is not given.
     """
-    from archord.postprocess.frames import cell_frame, node_frame, with_headings
-
-    number = run.number(step)
-    tables = {"history.csv": run.history, "contact.csv": _contact_of_all_steps(run)}
-    if run.scene.output.fields:
-        fields = run.fields(number)
-        tables[f"nodes_{step_name(number)}.csv"] = node_frame(fields, run.scene)
-        tables[f"cells_{step_name(number)}.csv"] = cell_frame(fields, run.scene)
-    files = [folder / name for name in tables]
-    _check_new(files, folder, force)
-    for file, table in zip(files, tables.values(), strict=True):
-        with writing(file):
-            with_headings(table).to_csv(file, index=False, float_format="%.12g", lineterminator="\n")
-    return files
-
-
-def _contact_of_all_steps(run: Run) -> pd.DataFrame:
-    """The contact with step and delta before it."""
     import pandas as pd
 
-    parts = {(n, delta): run.pressure(n) for n, delta in enumerate(run.columns["delta"], 1)}
-    table = pd.concat(parts, names=["step", "delta"]).reset_index(level=[0, 1])
-    table.attrs["units"] = run.pressure().attrs["units"] | {"delta": run.scene.units.length}
-    return table
+    from archord.postprocess.frames import with_headings
+
+    run.number(None)
+    steps = {(n, delta): run.pressure(n) for n, delta in enumerate(run.columns["delta"], 1)}
+    contact = pd.concat(steps, names=["step", "delta"]).reset_index(level=[0, 1])
+    contact.attrs["units"] = run.pressure().attrs["units"] | {"delta": run.scene.units.length}
+    tables = {folder / "history.csv": run.history, folder / "contact.csv": contact}
+    _check_new(tables, folder, force)
+    for file, table in tables.items():
+        with writing(file):
+            with_headings(table).to_csv(file, index=False, float_format="%.12g", lineterminator="\n")
+    return list(tables)
 
 
 def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> list[Path]:
@@ -69,25 +53,22 @@ def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool =
     """
     import meshio
 
-    steps = [run.number(step)] if step is not None else list(range(1, run.number(None) + 1))
+    steps = [run.number(step)] if step is not None else range(1, run.number(None) + 1)
     run.fields(steps[-1])
-    names = {n: [f"{part}_{step_name(n)}.vtu" for part in ("bodies", "contact")] for n in steps}
-    files = [folder / name for name in ("run.pvd", *(name for both in names.values() for name in both))]
-    _check_new(files, folder, force)
-    delta = run.columns["delta"]
+    files = {(n, part): folder / f"{part}_{step_name(n)}.vtu" for n in steps for part in ("bodies", "contact")}
+    collection, delta, entries = folder / "run.pvd", run.columns["delta"], ""
+    _check_new([collection, *files.values()], folder, force)
     grows = all(a < b for a, b in pairwise(delta))
-    entries = ""
-    for n, both in names.items():
-        time = delta[n - 1] if grows else float(n)
-        for part, (name, mesh) in enumerate(zip(both, (_bodies(run.fields(n)), _contact(run, n)), strict=True)):
-            with writing(folder / name):
-                meshio.Mesh(**mesh).write(folder / name)
-            called = quoteattr(name.partition("_")[0])
-            entries += f'<DataSet timestep="{time!r}" part="{part}" name={called} file={quoteattr(name)}/>\n'
+    for (n, part), file in files.items():
+        mesh = _bodies(run.fields(n)) if part == "bodies" else _contact(run, n)
+        with writing(file):
+            meshio.Mesh(**mesh).write(file)
+        time, number = delta[n - 1] if grows else float(n), int(part == "contact")
+        entries += f'<DataSet timestep="{time!r}" part="{number}" name="{part}" file="{file.name}"/>\n'
     text = f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n{entries}</Collection>\n'
-    with writing(files[0]):
-        files[0].write_text(f"{text}</VTKFile>\n", encoding="utf-8")
-    return files
+    with writing(collection):
+        collection.write_text(f"{text}</VTKFile>\n", encoding="utf-8")
+    return [collection, *files.values()]
 
 
 def _bodies(fields: Fields) -> dict:
@@ -114,15 +95,11 @@ def _contact(run: Run, step: int) -> dict:
     }
 
 
-def _check_new(files: Sequence[Path], folder: Path, force: bool) -> None:
+def _check_new(files: Iterable[Path], folder: Path, force: bool) -> None:
     """Make ``folder`` and check that all ``files`` in it can be written, over others only with ``force``.
 
     Raises `InputError`.
     """
-    present = [file for file in files if file.exists()]
-    if present and not force:
-        more = f" (and {len(present) - 1} more)" if len(present) > 1 else ""
-        raise InputError(f"{present[0]}: is there already{more}; choose another folder, or overwrite with --force.")
     make_folder(folder)
     for file in files:
-        check_output(file)
+        check_target(file, (), force=force)

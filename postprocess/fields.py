@@ -13,7 +13,6 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -90,24 +89,20 @@ def read_fields(folder: str | Path, scene: Scene, step: int) -> Fields:
     at = step_name(step)
     try:
         with h5py.File(path) as file:
-            accepted = int(file["accepted"][()])
-            if not 1 <= step <= accepted:
-                held = f"steps 1 to {accepted}" if accepted > 1 else "step 1 alone" if accepted else "none"
-                raise InputError(f"{path}: has no step {step}; it holds {held}.")
-            values: dict[str, Any] = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
+            if int(file["accepted"][()]) < step:
+                raise KeyError(step)
+            mesh = file["mesh"]
             return Fields(
-                step=step,
-                delta=float(file["load"][step - 1]),
-                coordinates=file["mesh/coordinates"][:, :2],
-                cells=file["mesh/cells"][()],
-                body=file["mesh/body"][()],
-                displacement=file[f"displacement/{at}"][:, :2],
-                **values,
+                step,
+                float(file["load"][step - 1]),
+                mesh["coordinates"][:, :2],
+                mesh["cells"][()],
+                mesh["body"][()],
+                file[f"displacement/{at}"][:, :2],
+                *(file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS),
             )
-    except InputError:
-        raise
     except (OSError, KeyError, RuntimeError, TypeError, ValueError, IndexError):
-        raise InputError(f"{path}: cannot be read as the fields of a run: it is damaged.") from None
+        raise InputError(f"{path}: cannot be read as the fields of a run at step {step}.") from None
 
 
 def magnification(scene: Scene, fields: Fields) -> float:
@@ -115,24 +110,16 @@ def magnification(scene: Scene, fields: Fields) -> float:
     R, dR = scene.joint.radius, abs(scene.joint.dR)
     near = np.hypot(*fields.coordinates.T) < _NEAR * R
     farthest = dR + max(float(np.abs(fields.displacement[near]).max()), abs(fields.delta))
-    wanted = min(_VISIBLE * R / dR, _FARTHEST * R / farthest)
-    if wanted <= 1:
-        return 1.0
+    wanted = max(1.0, min(_VISIBLE * R / dR, _FARTHEST * R / farthest))
     decade = 10.0 ** math.floor(math.log10(wanted))
     return max(step * decade for step in (1, 2, 3, 5) if step * decade <= wanted * (1 + 1e-9))
-
-
-def pin_centre(scene: Scene, delta: float = 0.0) -> float:
-    """Height of the centre of a rigid pin pressed by ``delta``, or of an elastic one before it is pressed; that of the
-    hole is 0."""
-    return -delta - scene.joint.pin_depth
 
 
 def nominal(scene: Scene, fields: Fields) -> Array:
     """Places ``(n, 2)`` of the nodes in the joint without clearance."""
     X, pin = fields.coordinates, fields.body_of_node == BODIES["pin"]
     places = X * (1 - scene.joint.dR / np.maximum(np.hypot(*X.T), scene.joint.radius / 2))[:, None]
-    places[pin] = X[pin] - [0.0, pin_centre(scene)]
+    places[pin] = X[pin] + [0.0, scene.joint.pin_depth]
     return places
 
 
@@ -145,6 +132,5 @@ def magnified(scene: Scene, fields: Fields, factor: float, displaced: bool = Tru
 
 def rigid_arc(scene: Scene, delta: float, factor: float) -> Array:
     """Points ``(91, 2)`` along the quarter arc of a rigid pin pressed by ``delta``, as drawn."""
-    angle = np.linspace(0, math.pi / 2, 91)
-    R = scene.joint.radius
-    return np.stack([R * np.sin(angle), factor * pin_centre(scene, delta) - R * np.cos(angle)], axis=1)
+    angle, R = np.linspace(0, math.pi / 2, 91), scene.joint.radius
+    return np.stack([R * np.sin(angle), -factor * (delta + scene.joint.pin_depth) - R * np.cos(angle)], axis=1)

@@ -11,12 +11,10 @@ import numpy as np
 import pandas as pd
 
 from archord.postprocess.arc import undeformed
-from archord.postprocess.fields import BODIES, Fields
 from archord.presets.arc import ArcProfile
 from archord.scene.scene import Scene
 
 _TEXT = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
-_BODY = {number: name for name, number in BODIES.items()}
 
 
 def frame_of(columns: Mapping[str, Any], units: Mapping[str, str]) -> pd.DataFrame:
@@ -63,21 +61,3 @@ def contact_frame(arcs: dict[str, ArcProfile], scene: Scene) -> pd.DataFrame:
         columns |= {"x": x, "y": y, "ux": moved[..., 0], "uy": moved[..., 1]}
         parts.append(pd.DataFrame({"side": side} | {name: values.ravel() for name, values in columns.items()}))
     return frame_of(pd.concat(parts, ignore_index=True), units)
-
-
-def node_frame(fields: Fields, scene: Scene) -> pd.DataFrame:
-    """The nodes with their body, undeformed coordinates and displacement."""
-    (x, y), (ux, uy) = fields.coordinates.T, fields.displacement.T
-    number, body = np.arange(1, len(x) + 1), [_BODY[body] for body in fields.body_of_node]
-    columns = {"node": number, "body": body, "x": x, "y": y, "ux": ux, "uy": uy}
-    return frame_of(columns, dict.fromkeys(("x", "y", "ux", "uy"), scene.units.length))
-
-
-def cell_frame(fields: Fields, scene: Scene) -> pd.DataFrame:
-    """The triangles with their body, nodes (numbered from 1: three corners, three between), centre and mean fields."""
-    x, y = fields.coordinates[fields.cells[:, :3]].mean(axis=1).T
-    columns = {"cell": np.arange(1, len(x) + 1), "body": [_BODY[body] for body in fields.body]}
-    columns |= {f"node{k}": nodes + 1 for k, nodes in enumerate(fields.cells.T, 1)}
-    units = dict.fromkeys(("von_mises", "mean_stress", "contact_pressure"), scene.units.stress)
-    units |= dict.fromkeys(("x", "y"), scene.units.length)
-    return frame_of(columns | {"x": x, "y": y} | fields.cell_fields(), units)

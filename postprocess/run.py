@@ -10,9 +10,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from archord.output.folder import no_run
+from archord.output.history import read_history
 from archord.postprocess.arc import read_arcs
-from archord.postprocess.curve import Columns, RunCurve, curve_of, read_columns
+from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import Fields, read_fields
 from archord.presets.arc import ArcProfile
 from archord.scene.errors import InputError
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 
 
 _KNOWN = {"status", "message", "warnings", "versions", "seconds", "totals", "steps"}  # keys of a run.json
+_NEEDED = (*CURVES, "step", "delta/dR", "P/(E* R)", "p0/E*", "iterations", "cutbacks", "seconds")
 _WHOLE = ("step", "iterations", "cutbacks")  # columns of whole numbers
 
 
@@ -42,7 +46,7 @@ class Run:
         for name in ("scene.toml", "history.csv", "run.json"):
             if not (self.folder / name).is_file():
                 raise no_run(self.folder, name)
-        self.columns: Columns = read_columns(self.folder / "history.csv")
+        self.columns = _read_columns(self.folder / "history.csv")
         self.scene: Scene = load_scene(self.folder / "scene.toml")
         self.summary: dict[str, Any] = _read_report(self.folder / "run.json")
         self.status, self.message, self.warnings = (self.summary[key] for key in ("status", "message", "warnings"))
@@ -64,7 +68,9 @@ class Run:
     @cached_property
     def curve(self) -> RunCurve:
         """P, p0 and eps over delta as arrays, for laws and fits. Raises `InputError` without an accepted step."""
-        return curve_of(self.folder, self.scene, self.columns)
+        self.number(None)
+        columns = {name: np.array(self.columns[name]) for name in CURVES}
+        return RunCurve(str(self.folder), self.scene, **columns, folder=self.folder)
 
     def contact(self, step: int | None = None) -> dict[str, ArcProfile]:
         """The contact along the arcs at ``step`` (the last), arrays by side: "pin", "hole".
@@ -105,6 +111,16 @@ class Run:
         if not 1 <= step <= self.steps:
             raise InputError(f"{self.folder}: has no step {step}; its accepted steps are 1 to {self.steps}.")
         return int(step)
+
+
+def _read_columns(path: Path) -> dict[str, list[float]]:
+    try:
+        columns = read_history(path)
+        if not np.isfinite([columns[name] for name in _NEEDED]).all():
+            raise ValueError("numbers that are not finite")
+    except (ValueError, IndexError, KeyError, OSError):
+        raise InputError(f"{path}: cannot be read as the history of a run.") from None
+    return columns
 
 
 def _read_report(path: Path) -> dict[str, Any]:

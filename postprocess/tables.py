@@ -12,20 +12,17 @@ from archord.postprocess.comparison import COMPARED, Comparison, differing_keys
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.report.table import Table
-from archord.scene.sections import Pin, Solid
+from archord.scene.faults import shortened
 
 _MOST = 40  # rows of a table
-_LONGEST = 40  # characters of a value
-_PARTS = 5  # parts of a run's time that are told
 _LAST = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "steps", "iterations", "cutbacks", "seconds")
-# what `comparison_text` says of each run
-_OF_A_RUN = {
+_OF_A_RUN = {  # what a comparison tells of each run
     "status": lambda run: run.status,
     "steps": lambda run: f"{run.steps} of {len(run.scene.targets)}",
     "dofs": lambda run: run.summary.get("mesh", {}).get("dofs", "-"),
     "ranks": lambda run: run.summary.get("ranks", "-"),
     "iterations": lambda run: run.summary["totals"].get("newton_iterations", "-"),
-    "seconds": lambda run: f"{run.summary['seconds'].get('total', math.nan):.1f}",
+    "seconds": lambda run: run.summary["seconds"].get("total", "-"),
     "archord": lambda run: run.summary["versions"].get("archord", "-"),
 }
 
@@ -34,13 +31,10 @@ def run_text(run: Run) -> str:
     """State, joint, history, peaks, cost and warnings of a run."""
     words = {"running": "running, or killed (if no archord works there, --restart continues it)"}
     state = f"{run.folder}: {words.get(run.status, run.status)}; {run.steps} of {len(run.scene.targets)} steps"
-    parts = [f"{state}: {run.message}" if run.message else state, _named(_joint(run))]
+    parts = [f"{state}: {run.message}" if run.message else state, Table("", "", rows=_joint(run), left=2)]
     if run.steps:
-        parts += [
-            _thinned(_history(run), run.folder / "history.csv"),
-            _named([("largest", peak) for peak in _peaks(run)]),
-        ]
-    return "\n\n".join([*parts, _named(_cost(run))])
+        parts += [_thinned(_history(run), run.folder / "history.csv"), _peaks(run)]
+    return "\n\n".join(map(str, (*parts, Table("", "", rows=_cost(run), left=2))))
 
 
 def sweep_text(sweep: Sweep) -> str:
@@ -59,14 +53,13 @@ def sweep_text(sweep: Sweep) -> str:
 
 
 def comparison_text(comparison: Comparison) -> str:
-    """Each quantity of all runs at common loads, the keys in which the scenes differ, and what the runs cost."""
+    """Each quantity of all runs at common loads, the keys in which the scenes differ, and how the runs went."""
     names = names_of(comparison.runs)
     parts = [_thinned(_differences(comparison, name, names), "history.csv") for name in COMPARED]
     rows = differing_keys([run.scene for run in comparison.runs])
-    keys = ([key, *(_shortened(value) or "-" for value in values)] for key, values in rows.items())
-    scenes = Table("key", *names, rows=keys, left=1 + len(names)) if rows else "scenes: the same in every key"
-    runs = Table("", *names, rows=([n, *map(get, comparison.runs)] for n, get in _OF_A_RUN.items()), left=1)
-    return "\n\n".join(map(str, (*parts, _note(comparison), scenes, runs)))
+    rows |= {name: [str(get(run)) for run in comparison.runs] for name, get in _OF_A_RUN.items()}
+    cells = ([key, *(shortened(value) or "-" for value in values)] for key, values in rows.items())
+    return "\n\n".join(map(str, (*parts, _note(comparison), Table("", *names, rows=cells, left=1 + len(names)))))
 
 
 def names_of(runs: Iterable[Run]) -> list[str]:
@@ -83,15 +76,6 @@ def first_of_each_kind(warnings: list[str]) -> list[str]:
     return list(first.values())
 
 
-def _named(lines: Iterable[tuple[str, str]]) -> str:
-    """Names on the left, each only once, and their lines on the right."""
-    table, last = Table("", "", left=2), ""
-    for name, text in lines:
-        table.add("" if name == last else name, text)
-        last = name
-    return str(table)
-
-
 def _thinned(table: Table, whole: object) -> str:
     """Up to 40 rows of the ``table``, evenly spaced, first and last included, and where the ``whole`` of it is."""
     n = len(table.rows)
@@ -102,23 +86,14 @@ def _thinned(table: Table, whole: object) -> str:
 
 
 def _joint(run: Run) -> Iterable[tuple[str, str]]:
-    scene, mesh, ranks = run.scene, run.summary.get("mesh", {}), run.summary.get("ranks", 1)
+    scene, mesh = run.scene, run.summary.get("mesh", {})
     g, a, length, stress = scene.joint, scene.analysis, scene.units.length, scene.units.stress
     yield "joint", f"{g.model}, R = {g.radius:g} {length}, dR = {g.dR:g} {length}, dR/R = {g.dR / g.radius:g}"
-    yield "joint", f"plane {a.plane}, contact {a.kinematics}, E* = {scene.E_star:g} {stress}"
-    yield "pin", _body(scene.pin, stress)
-    yield "block", f"{_body(scene.block, stress)}, size {g.W:g} {length}"
-    size = f"{mesh.get('cells', '?')} curved triangles of degree {a.degree}, {mesh.get('dofs', '?')} dofs"
-    yield "mesh", f"{size}, {ranks} rank{'s' if ranks != 1 else ''}"
-
-
-def _body(body: Pin | Solid, stress: str) -> str:
-    if isinstance(body, Pin) and body.rigid:
-        return "rigid"
-    text = f"E = {body.E:g} {stress}, nu = {body.nu:g}"
-    if body.yield_stress is None:
-        return f"{text}, elastic"
-    return f"{text}, yield stress {body.yield_stress:g} {stress}, hardening {body.hardening or 0:g} {stress}"
+    yield "", f"plane {a.plane}, contact {a.kinematics}, E* = {scene.E_star:g} {stress}"
+    for name, body in (("pin", scene.pin), ("block", scene.block)):
+        yield name, ", ".join(f"{key} = {value}" for key, value in body.model_dump(exclude_none=True).items())
+    counts = f"{mesh.get('cells', '?')} curved triangles of degree {a.degree}, {mesh.get('dofs', '?')} dofs"
+    yield "mesh", f"{counts}; ranks: {run.summary.get('ranks', '?')}"
 
 
 def _history(run: Run) -> Table:
@@ -138,34 +113,26 @@ def _history(run: Run) -> Table:
     return table
 
 
-def _peaks(run: Run) -> Iterable[str]:
+def _peaks(run: Run) -> str:
     """Largest values over the run, and where it first yielded."""
-    unit, h = run.scene.units, run.columns
-    for name, of in {"P": unit.force, "p0": unit.stress, "eps": "rad", "peeq_max": ""}.items():
+    h, said = run.columns, []
+    for name, unit in {"P": run.scene.units.force, "p0": run.scene.units.stress, "eps": "rad", "peeq_max": ""}.items():
         k = int(np.argmax(h[name]))
-        yield f"{name} = {h[name][k]:.6g} {of}".rstrip() + f" at step {h['step'][k]:g}"
+        said.append(f"{name} = {' '.join([f'{h[name][k]:.6g}', unit]).rstrip()} at step {h['step'][k]:g}")
     if any(h["peeq_max"]):
-        yield f"plastic strain first at step {h['step'][np.flatnonzero(h['peeq_max'])[0]]:g}"
+        said.append(f"plastic strain first at step {h['step'][np.flatnonzero(h['peeq_max'])[0]]:g}")
+    return f"largest: {', '.join(said)}"
 
 
 def _cost(run: Run) -> Iterable[tuple[str, str]]:
     """Iterations, errors, seconds by part, memory, versions, warnings."""
-    report, totals = run.summary, run.summary["totals"]
-    counts = [f"{value:g} {name.replace('_', ' ')}" for name, value in totals.items() if isinstance(value, int)]
-    yield "solver", ", ".join(counts)
-    known = {name: value for name, value in report.get("error_estimates", {}).items() if value is not None}
-    if known:
-        yield "errors", ", ".join(f"{name.replace('_', ' ')} {value:.1e}" for name, value in known.items())
-    seconds = dict(report["seconds"])
-    total, parts = seconds.pop("total", 0.0), sorted(seconds.items(), key=lambda item: -item[1])[:_PARTS]
-    yield "seconds", f"{total:.1f} in all: {', '.join(f'{name} {value:.1f}' for name, value in parts)}"
-    if memory := report.get("peak_memory"):
-        yield "memory", f"{max(memory) / 1e6:.0f} MB at most on a rank"
-    yield "made", f"{report.get('started', '?')}; {', '.join(f'{name} {v}' for name, v in report['versions'].items())}"
-    for restart in report.get("restarts", []):
-        yield "restarts", f"{restart['when']} after step {restart['after_step'] - 1}"
-    for warning in first_of_each_kind(run.warnings) or ["none"]:
-        yield "warnings", warning
+    for name in ("totals", "error_estimates", "seconds"):
+        values = {key.replace("_", " "): value for key, value in run.summary.get(name, {}).items() if value is not None}
+        yield name.replace("_", " "), ", ".join(f"{key} {value:.3g}" for key, value in values.items())
+    yield "memory", f"{max(run.summary.get('peak_memory') or [0]) / 1e6:.0f} MB at most on a rank"
+    yield "versions", ", ".join(f"{key} {value}" for key, value in run.summary["versions"].items())
+    for warning in first_of_each_kind(run.warnings):
+        yield "warning", warning
 
 
 def _differences(comparison: Comparison, quantity: str, names: list[str]) -> Table:
@@ -203,7 +170,3 @@ def _cell(value: object) -> str:
     if isinstance(value, float):
         return "-" if math.isnan(value) else f"{value:.6g}"
     return str(value)
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 12]} ... {text[-7:]}"

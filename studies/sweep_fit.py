@@ -10,7 +10,7 @@ from typing import Any
 
 from archord.output.user_file import check_target, writing
 from archord.postprocess.convergence import Refined, group
-from archord.postprocess.curve import RunCurve, read_run
+from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws import study_report
 from archord.postprocess.laws.calibrated import JSON_BEGINS, CalibratedModel, shipped_model
 from archord.postprocess.laws.calibration import check_compatible, fit_plateau
@@ -28,6 +28,7 @@ from archord.postprocess.laws.study import (
     table_of,
     usable,
 )
+from archord.postprocess.run import Run
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.studies.cases import Case, read_sweep
@@ -187,6 +188,6 @@ def _run(case: Case, folder: Path) -> RunCurve:
     status = result_of(case, folder)
     if status.status not in ("done", "stopped") or not status.steps:
         raise InputError(f"{status.status}: {status.message}" if status.message else status.status)
-    curve = read_run(of_case(case, folder)).loading()
+    curve = Run(of_case(case, folder)).curve.loading()
     check_compatible([curve])
     return curve

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from archord.postprocess.curve import _NEEDED
+from archord.postprocess.run import _NEEDED
 from tests.test_cli import SCENE, archord
 
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
@@ -86,7 +86,7 @@ def test_a_process_tells_bad_input_once(tmp_path, ranks, arguments, said):
     assert {path.name for path in tmp_path.iterdir()} == {"bad.toml", "bad.sweep.toml"}
 
 
-FIELDS = "run/fields.h5: cannot be read as the fields of a run: it is damaged."
+FIELDS = "run/fields.h5: cannot be read as the fields of a run at step 6."
 CONTACT = "run/contact.h5: cannot be read as the contact of a run."
 HISTORY = "run/history.csv: cannot be read as the history of a run."
 REPORT = "run/run.json: cannot be read as the report of a run."

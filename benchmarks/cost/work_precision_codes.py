@@ -28,9 +28,8 @@ from archord.benchmarks.peers.installed import Peer, installed
 from archord.benchmarks.timing import Failure, Process
 from archord.geometry.basis import Array
 from archord.output.history import read_history
-from archord.postprocess.arc import read_arcs
-from archord.postprocess.curve import read_run
 from archord.postprocess.deck import deck_mesh
+from archord.postprocess.run import Run
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.scene.file import resolved
@@ -114,7 +113,7 @@ def _archord(scene: Scene, folder: Path) -> Process:
     def read() -> dict[str, Any]:
         report, history = json.loads((run / "run.json").read_text(encoding="utf-8")), read_history(run / "history.csv")
         # the unbiased contact integrates one half of the pressure on either side
-        sides = read_arcs(read_run(run), len(history["eps"])).values()
+        sides = Run(run).contact().values()
         return {
             **{name: history[column][-1] for name, column in _COLUMNS.items()},
             "profile": np.mean([profile(arc.angle.ravel(), arc.pressure.ravel()) for arc in sides], axis=0),

@@ -17,7 +17,8 @@ from archord.benchmarks.case import Case, E, paper_joint, side_by_side
 from archord.materials.material import Plane
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
-from archord.postprocess.curve import RunCurve, read_run
+from archord.postprocess.curve import RunCurve
+from archord.postprocess.run import Run
 
 PLANES: tuple[Plane, ...] = ("strain", "stress")
 MESHES = {"coarse": 0.04, "fine": 0.02}  # element size on the arcs over R
@@ -77,7 +78,7 @@ class Runs:
 
     def curve(self, joint: str, plane: Plane, mesh: str = "fine") -> RunCurve:
         """The curves of a run."""
-        return read_run(self.folder / run_name(joint, plane, mesh))
+        return Run(self.folder / run_name(joint, plane, mesh)).curve
 
 
 def solve_missing(

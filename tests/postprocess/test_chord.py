@@ -7,7 +7,7 @@ from scipy.integrate import quad
 import archord
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.chord import arc_angle, chord_coordinate, chord_projection, read_chord_pressure
-from archord.postprocess.curve import read_run
+from archord.postprocess.run import Run
 
 
 @pytest.mark.parametrize("eps", [0.01, 0.5, 1.2, np.pi / 2])
@@ -77,7 +77,7 @@ def test_an_arc_may_go_on_where_nothing_presses():
 def test_a_runs_chord_carries_its_force(runs, name):
     """Every step and side: chord = arc to 1e-8; the side's arc = P of history.csv to dR/R (undeformed arcs differ by
     that), and so is the table of pressures; the mean of both sides is nearer than either where the joint is elastic."""
-    run = read_run(runs[name])
+    run = Run(runs[name]).curve
     for step in range(1, len(run.delta) + 1):
         P = run.P[step - 1]
         sides = {}

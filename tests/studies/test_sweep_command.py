@@ -7,7 +7,7 @@ import pytest
 
 from archord.cli import run
 from archord.output.history import read_history
-from archord.postprocess.curve import read_run
+from archord.postprocess.run import Run
 from archord.studies.cases import read_sweep
 from archord.studies.tables import result_of
 from tests.studies.parts import SOFT, STUCK, break_mesh, numbers, sweep, table, times, written
@@ -58,7 +58,7 @@ def test_tables_are_tidy(solved):
 def test_softer_pins_give_way(solved):
     """P grows with the pin's stiffness, at each of the equal displacements."""
     ends = [row for row in table(solved / "out" / "cases.csv") if row["load.steps"] == "3"]
-    P = [float(row["P/(E* R)"]) * read_run(solved / "out" / "cases" / row["run"]).E_star for row in ends]
+    P = [float(row["P/(E* R)"]) * Run(solved / "out" / "cases" / row["run"]).curve.E_star for row in ends]
     assert (np.diff(P) > 0).all()
     assert P[0] < 0.6 * P[-1]
 

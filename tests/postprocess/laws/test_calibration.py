@@ -8,9 +8,9 @@ from scipy.stats import linregress
 
 from archord.postprocess.arc import median_pressure
 from archord.postprocess.convergence import group
-from archord.postprocess.curve import read_run
 from archord.postprocess.laws.calibration import calibrate
 from archord.postprocess.laws.curve_fit import fit_curve
+from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from tests.postprocess.synthetic import LOADS, arc, curve
 from tests.solver.solving import scene
@@ -229,11 +229,11 @@ def test_the_median_of_a_cut_off_pressure_is_the_plateau():
 
 def test_solved_runs(runs):
     """Elastic k of both curves near 0.83 on two meshes; a thin plate's plateau is a little above sigY and flat."""
-    elastic = calibrate([read_run(runs["elastic"]), read_run(runs["coarse"])]).joint
+    elastic = calibrate([Run(runs["elastic"]).curve, Run(runs["coarse"]).curve]).joint
     assert elastic.P.k.value == pytest.approx(0.83, abs=0.01)
     assert elastic.p0.k.value == pytest.approx(0.83, abs=0.03)
     assert 0 < elastic.P.k.discretisation_error < 0.01
-    plastic = calibrate([read_run(runs["plastic"])], (0.25, 2)).joint
+    plastic = calibrate([Run(runs["plastic"]).curve], (0.25, 2)).joint
     assert plastic.P.k.discretisation_error is None
     assert plastic.plateau.c.value == pytest.approx(1.03, abs=0.05)
     assert plastic.plateau.flatness[0] > 0.9

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from archord.cli import run
-from archord.postprocess.curve import read_run
 from archord.postprocess.laws.fitted_law import FittedLaw
+from archord.postprocess.run import Run
 from tests.postprocess.synthetic import curve
 
 
@@ -26,7 +26,7 @@ def test_fit_prints_a_table_and_writes_what_is_asked_for(runs, tmp_path, capsys)
     assert len(data["joint"]["P"]["residuals"][0]["relative"]) == 8
     assert "discretisation error is unknown" in printed
     assert files["png"].read_bytes()[1:4] == b"PNG"
-    history = read_run(runs["plastic"])
+    history = Run(runs["plastic"]).curve
     values: dict = {}
     exec(files["py"].read_text(), values)
     forces = [values["force"](d) for d in history.delta]
@@ -116,7 +116,8 @@ def test_bad_input_is_one_sentence(runs, tmp_path, refused, arguments, said):
     texts |= {"apart": f"{heading}\n{apart}\n", "level": f"{heading}\n{level}\n"}
     for name, text in texts.items():
         (tmp_path / name).mkdir()
-        (tmp_path / name / "scene.toml").write_text((runs["elastic"] / "scene.toml").read_text())
+        for file in ("scene.toml", "run.json"):
+            (tmp_path / name / file).write_text((runs["elastic"] / file).read_text())
         (tmp_path / name / "history.csv").write_text(text)
     assert refused(["fit", *(a.format(**folders) for a in arguments)]).startswith(said.format(**folders))
     assert not list((tmp_path / "empty").iterdir())
@@ -129,7 +130,7 @@ def _through(delta, P):
 
 def test_unloading_is_left_out(runs):
     """Of a way there, back and further, the steps on new ground remain."""
-    curve = read_run(runs["elastic"])
+    curve = Run(runs["elastic"]).curve
     there, back = np.arange(len(curve.delta)), np.arange(len(curve.delta))[::-1]
     path = np.concatenate([there[:5], back[4:], there])
     loop = replace(curve, **{name: getattr(curve, name)[path] for name in ("delta", "P", "p0", "eps", "peeq_max")})

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from archord.cli import run
-from archord.postprocess.curve import read_run
 from archord.postprocess.laws.calibrated import ROWS, TABLE, CalibratedModel
 from archord.postprocess.laws.calibration import calibrate
 from archord.postprocess.laws.study import read_cases
+from archord.postprocess.run import Run
 from archord.studies.cases import read_sweep
 
 SWEEP = """
@@ -47,7 +47,7 @@ def test_a_small_sweep_gets_its_table(solved, capsys):
     stored, notes = read_cases(solved / "fit.csv")
     assert list(stored.run) == [cases[0].run, cases[1].run]
     for case, row in zip(cases[:2], stored.itertuples(), strict=True):
-        k = calibrate([read_run(solved / "cases" / case.run)]).joint.P.k
+        k = calibrate([Run(solved / "cases" / case.run).curve]).joint.P.k
         assert row.k == pytest.approx(k.value, rel=1e-6)
         assert row.k_error == pytest.approx(k.standard_error, rel=1e-6)
         assert f" {row.k:.4f} " in printed
