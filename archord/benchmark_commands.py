@@ -53,13 +53,11 @@ def reproduce(figures: tuple[str, ...], output: Path, quiet: bool) -> int:
     """
     from mpi4py import MPI
 
-    from archord.benchmarks.paper.reproduce import chosen
     from archord.benchmarks.paper.reproduce import reproduce as make
 
     comm, say = MPI.COMM_WORLD, _telling(quiet)
-    wanted = chosen(list(figures) or ["all"])
     try:
-        files = make(wanted, output, comm, lambda case, P: say(f"{case.name:34s} P(2 dR)/(E* R) = {P:.6f}"))
+        files = make(figures or ["all"], output, comm, lambda case, P: say(f"{case.name}: P(2 dR)/(E* R) = {P:.6f}"))
     except RuntimeError as error:
         if comm.rank == 0:
             print(f"archord: {error}.", file=sys.stderr)

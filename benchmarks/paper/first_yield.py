@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from archord.benchmarks.paper.runs import MILD_YIELD, PLANES, Runs
-from archord.materials.material import Plane
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.fields import BODIES, read_fields
 
@@ -40,9 +38,8 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
     centroid = fields[0].coordinates[fields[0].cells[:, :3]].mean(axis=1)
     stress = np.array([np.zeros(len(centroid)), *(field.von_mises for field in fields)])
     delta = np.concatenate([[0.0], elastic.delta])
-    above = stress >= yield_stress
-    step = np.where(above.any(axis=0), above.argmax(axis=0), len(delta) - 1)
-    cell = np.arange(len(centroid))
+    above, cell = stress >= yield_stress, np.arange(len(centroid))
+    step = np.maximum(above.argmax(axis=0), 1)
     low, high = stress[step - 1, cell], stress[step, cell]
     share = (yield_stress - low) / np.maximum(high - low, 1e-300)
     when = np.where(above.any(axis=0), delta[step - 1] + share * (delta[step] - delta[step - 1]), np.inf)
@@ -54,9 +51,3 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
     first = int(np.argmin(when))
     body = "pin" if pin[first] else "block"
     return FirstYield(float(when[first]) / elastic.dR, body, float(depth[first]), float(angle[first]))
-
-
-def first_yields(runs: Runs, near_contact: float = 2.0) -> dict[Plane, FirstYield]:
-    """First yield of the pair of figure 8 in both planes, see `first_yield`."""
-    stress = MILD_YIELD[1] / 100
-    return {plane: first_yield(runs.curve("elastic_0.1", plane), stress, near_contact) for plane in PLANES}

@@ -2,45 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
 from archord.benchmarks.case import Case
-from archord.benchmarks.paper.claims import CLAIMS
-from archord.benchmarks.paper.figures import Figure, fig2, fig3, fig4, fig5, fig7, fig8, fig9
-from archord.benchmarks.paper.runs import (
-    FULL_YIELD,
-    JOINTS,
-    MILD_YIELD,
-    PAIRS,
-    PLANES,
-    Runs,
-    cases,
-    plastic,
-    solve_missing,
-)
+from archord.benchmarks.paper.claims import judged
+from archord.benchmarks.paper.figures import FIGURES, LAYOUTS, draw_zones, write
+from archord.benchmarks.paper.runs import JOINTS, PLANES, Runs, cases, solve_missing
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
 from archord.output.user_file import check_output
-from archord.report.table import Table
 from archord.scene.errors import InputError
 
-# what makes it, and the joints it needs
-FIGURES: dict[str, tuple[Callable[[Runs], Figure], list[str]]] = {
-    "fig2": (fig2, ["elastic"]),
-    "fig3": (fig3, ["elastic"]),
-    "fig4": (fig4, ["elastic"]),
-    "fig5": (fig5, [plastic(FULL_YIELD)]),
-    "fig7": (fig7, [plastic(pair) for pair in PAIRS]),
-    "fig8": (fig8, [plastic(MILD_YIELD), "elastic_0.1"]),
-    "fig9": (fig9, ["elastic", plastic(FULL_YIELD)]),
-}
+ZONES, REPORT = "fig8_zones.png", "report.md"
 
 
-def chosen(names: list[str]) -> list[str]:
+def chosen(names: Sequence[str]) -> list[str]:
     """The figures that ``names`` (or "all") ask for, in order. Raises `InputError` for an unknown one."""
     for name in names:
         if name not in (*FIGURES, "all"):
@@ -48,9 +28,7 @@ def chosen(names: list[str]) -> list[str]:
     return [name for name in FIGURES if name in names or "all" in names]
 
 
-def reproduce(
-    names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[Case, float], None] = lambda case, P: None
-) -> list[Path]:
+def reproduce(names: Sequence[str], folder: Path, comm: MPI.Comm, said: Callable[[Case, float], None]) -> list[Path]:
     """Solve what ``names`` need and is not in ``folder`` yet, and write their CSV files and pictures.
 
     With all figures also ``report.md``. ``said(case, P)`` follows every run. Returns the files, on
@@ -58,22 +36,28 @@ def reproduce(
     failed. Collective.
     """
     wanted = chosen(names)
-    agreed(comm, lambda: _claim(folder, wanted))
+
+    def claim() -> None:
+        claim_folder(folder, force=True)
+        for name in [*(f"{name}.{kind}" for name in wanted for kind in ("csv", "png")), ZONES, REPORT]:
+            check_output(folder / name)
+
+    agreed(comm, claim)
     runs = Runs(folder / "runs")
-    needed = cases(joint for name in wanted for joint in FIGURES[name][1])
+    needed = cases(joint for name in wanted for joint in LAYOUTS[name]["joints"])
     if complaints := solve_missing(needed, runs.folder, comm, said):
         raise RuntimeError("; ".join(complaints))
     if comm.rank != 0:
         return []
-    files = [file for name in wanted for file in FIGURES[name][0](runs).write(folder, name)]
-    return files + ([_report(runs, folder)] if len(wanted) == len(FIGURES) else [])
-
-
-def _claim(folder: Path, wanted: list[str]) -> None:
-    claim_folder(folder, force=True)
-    for name in wanted:
-        for kind in ("csv", "png"):
-            check_output(folder / f"{name}.{kind}")
+    tables = {name: FIGURES[name](runs) for name in wanted}
+    files = [file for name in wanted for file in write(tables[name], folder, name)]
+    if "fig8" in wanted:
+        files.append(draw_zones(runs, folder / ZONES))
+    if len(wanted) == len(FIGURES):
+        pictures = [file.name for file in files if file.suffix == ".png"]
+        files.append(folder / REPORT)
+        files[-1].write_text(report(runs, judged(runs, tables).markdown(), pictures), encoding="utf-8")
+    return files
 
 
 def mesh_errors(runs: Runs) -> dict[str, float]:
@@ -87,24 +71,17 @@ def mesh_errors(runs: Runs) -> dict[str, float]:
     return errors
 
 
-def _report(runs: Runs, folder: Path) -> Path:
-    """Write the claims, judged, and the figures to ``report.md``."""
-    errors = mesh_errors(runs)
-    worst = max(errors, key=lambda name: errors[name])
-    table = Table("claim", "figure", "the paper", *(f"ours, plane {plane}" for plane in PLANES), "verdict")
-    for claim in (judged(runs) for judged in CLAIMS):
-        table.add(claim.name, claim.figure, claim.text, *claim.found.values(), claim.verdict)
-    pictures = "\n".join(f"![figure {name[3:]}]({name}.png)\n" for name in FIGURES)
-    text = f"""# The claims of Hu et al., judged
+def report(runs: Runs, claims: str, pictures: list[str]) -> str:
+    """The judged ``claims`` and the figures as Markdown."""
+    worst, error = max(mesh_errors(runs).items(), key=lambda item: item[1])
+    shown = "\n".join(f"![{name}]({name})\n" for name in pictures)
+    return f"""# The claims of Hu et al., judged
 
 Hu et al., *A new model for elasto-plastic conformal contact between cylinders*. Like bodies, nu = 0.3 (the paper \
 gives neither), block of 100 R, closest points on the deformed curves, small strains; E* = 1.
 
-Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {errors[worst]:.2%} from 0.2 dR on ({worst}): the \
+Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {error:.2%} from 0.2 dR on ({worst}): the \
 discretisation error of the finer one, which all numbers come from, is below that.
 
-{table.markdown()}
-{pictures}"""
-    file = folder / "report.md"
-    file.write_text(text, encoding="utf-8")
-    return file
+{claims}
+{shown}"""

@@ -22,35 +22,25 @@ from archord.postprocess.run import Run
 
 PLANES: tuple[Plane, ...] = ("strain", "stress")
 MESHES = {"coarse": 0.04, "fine": 0.02}  # element size on the arcs over R
-PAIRS = ((0.1, 0.1), (0.5, 0.1), (0.5, 0.2), (0.5, 0.4), (1.0, 0.6))  # dR/R and sigY/E* in percent
-FULL_YIELD, MILD_YIELD = (0.5, 0.2), (0.1, 0.1)  # the pairs of figures 5 and 8
 STEPS = 20  # twice as many where dR/R = 0.1 %
-
-
-def plastic(pair: tuple[float, float]) -> str:
-    """Name of the joint of a (dR/R, sigY/E*) pair in percent."""
-    return f"plastic_{pair[0]}_{pair[1]}"
-
-
-# dR/R and sigY/E* in percent by name; longest runs first
-JOINTS = {
-    plastic(PAIRS[0]): PAIRS[0],
+# dR/R and sigY/E* in percent; longest runs first
+JOINTS: dict[str, tuple[float, float | None]] = {
+    "plastic_0.1_0.1": (0.1, 0.1),
     "elastic_0.1": (0.1, None),
-    **{plastic(pair): pair for pair in PAIRS[1:]},
+    "plastic_0.5_0.1": (0.5, 0.1),
+    "plastic_0.5_0.2": (0.5, 0.2),
+    "plastic_0.5_0.4": (0.5, 0.4),
+    "plastic_1.0_0.6": (1.0, 0.6),
     "elastic": (0.5, None),
 }
-
-
-def run_name(joint: str, plane: Plane, mesh: str = "fine") -> str:
-    """Name of a run and of its folder."""
-    return f"{joint}-{plane}-{mesh}"
+FULL_YIELD, MILD_YIELD = "plastic_0.5_0.2", "plastic_0.1_0.1"  # the joints of figures 5 and 8
 
 
 def case(joint: str, plane: Plane, mesh: str = "fine") -> Case:
     """One run, delta = 2 dR: E* = 1 in either plane."""
     ratio, strength = JOINTS[joint]
-    modulus = E if plane == "strain" else 2.0
-    solid = {"E": modulus, "nu": 0.3, "yield_stress": None if strength is None else strength / 100}
+    yields = {} if strength is None else {"yield_stress": strength / 100}
+    solid = {"E": E if plane == "strain" else 2.0, "nu": 0.3, **yields}
     size = {"element_size": None, "relative_element_size": MESHES[mesh]}
     scene = paper_joint(
         steps=STEPS if ratio > 0.1 else 2 * STEPS,
@@ -60,7 +50,7 @@ def case(joint: str, plane: Plane, mesh: str = "fine") -> Case:
         block=solid,
         analysis={"plane": plane},
     )
-    return Case(run_name(joint, plane, mesh), scene)
+    return Case(f"{joint}-{plane}-{mesh}", scene)
 
 
 def cases(joints: Iterable[str]) -> list[Case]:
@@ -78,12 +68,10 @@ class Runs:
 
     def curve(self, joint: str, plane: Plane, mesh: str = "fine") -> RunCurve:
         """The curves of a run."""
-        return Run(self.folder / run_name(joint, plane, mesh)).curve
+        return Run(case(joint, plane, mesh).folder(self.folder)).curve
 
 
-def solve_missing(
-    wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[Case, float], None] = lambda case, P: None
-) -> list[str]:
+def solve_missing(wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[Case, float], None]) -> list[str]:
     """Solve the cases that are not done yet into ``folder``, each on one rank, the ranks side by side.
 
     ``said(case, P)`` follows each on the rank that solved it. Returns the complaints of all that failed. Raises

@@ -35,31 +35,26 @@ def _case(name: str, group: str, keys: dict[str, Any]) -> Case:
 def _expected(keys: dict[str, Any], stops: bool) -> tuple[Expected, ...]:
     """What a case must give, by the ``keys`` that say so, which are taken out."""
     quantities, like, value, fine = (keys.pop(key, None) for key in ("of", "like", "value", "fine"))
-    quantities = quantities or ["P/(E* R)"]
-    if like:
-        other, tolerance, why, *factor = like
-        return tuple(Expected(quantity, other, tolerance, why, *factor) for quantity in quantities)
-    if value:
-        return tuple(Expected(quantity, *value) for quantity in quantities)
-    if "persson" in keys and not fine:
+    if "persson" in keys and not (like or fine):
         eps, peak = theory(keys["persson"])
         known = Expected("eps", eps, 0.02, "Ciavarella and Decuzzi 2001")
         return Expected("p0/P", peak, 0.01, "Persson 1964"), known
-    if stops and not fine:
+    if stops and not (like or fine):
         return ()
-    return tuple(Expected(quantity, FINE, fine or _WITHIN, "fine mesh") for quantity in quantities)
+    said = like or value or (FINE, fine or _WITHIN, "fine mesh")
+    return tuple(Expected(quantity, *said) for quantity in quantities or ["P/(E* R)"])
 
 
 def _scene(keys: dict[str, Any]) -> Scene:
     """The joint that the rest of the ``keys`` of a case describe."""
     size, steps = keys.pop("size", _COARSE), keys.pop("steps", _STEPS)
-    strength, load, both = keys.pop("yield_stress", None), keys.pop("persson", None), keys.pop("both", {})
+    strength, load, both = keys.pop("yield_stress", None), keys.pop("persson", None), keys.pop("both", None)
     if "ratio" in keys or "nu" in keys:
         ratio, nu = keys.pop("ratio", 1.0), keys.pop("nu", 0.3)
         E = (1 - nu**2) * (1 + 1 / ratio)
         keys = {"pin": {"E": ratio * E, "nu": nu}, "block": {"E": E, "nu": nu} | keys.pop("block", {}), **keys}
-    for body in ("pin", "block") if both else ():
-        keys[body] = both
+    if both:
+        keys |= {"pin": both, "block": both}
     if "relative_force" in keys.get("load", {}):
         keys["load"] = {"displacement": None, **keys["load"]}
     if load is not None:

@@ -1,23 +1,21 @@
-"""Fine-mesh values for the stability benchmark: ``python3 -m archord.benchmarks.stability.fine [PATTERN]``.
+"""Fine-mesh values for the stability benchmark: ``python3 -m archord.benchmarks.stability.fine``.
 
-Solves the joints of the cases (those that are missing, or those whose name or group matches PATTERN) on fine meshes
-and writes ``fine.json``: by case the quantities of the last step, the element size over R and the number of steps.
+Solves the joints of the cases that ``fine.json`` lacks on fine meshes, and writes the quantities of their last step
+there, by case.
 """
 
 from __future__ import annotations
 
 import json
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
 
-from archord.benchmarks.case import Case, matches, quantities, varied
+from archord.benchmarks.case import quantities, varied
 from archord.benchmarks.stability.cases import FINE, cases
-from archord.scene.file import resolved
 from archord.scene.scene import Scene
 
+Values = dict[str, dict[str, float]]  # by case and quantity
 FILE = Path(__file__).with_name("fine.json")
 _SIZE, _TINY = 0.025, 0.0025  # element size over R, where a few elements of 10 %R touch
 _TINY_LOAD = 0.02  # delta/dR up to which the contact is tiny
@@ -38,42 +36,23 @@ def fine_scene(scene: Scene) -> Scene:
     )
 
 
-def read_fine() -> dict[str, dict[str, float]]:
-    """The stored values by case and quantity."""
-    return json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+def read_fine() -> Values:
+    """The stored values."""
+    return json.loads(FILE.read_text(encoding="utf-8"))
 
 
-def _solve(case: Case) -> dict[str, float]:
-    """What is stored of a case that has its fine scene. Raises RuntimeError if its run stopped."""
-    with tempfile.TemporaryDirectory() as folder:
-        steps = case.solve(Path(folder)).steps
-    mesh = {"element_size/R": case.scene.joint.h / case.scene.joint.radius, "steps": len(steps)}
-    return quantities(case.scene, steps[-1]) | mesh
-
-
-def main(pattern: str = "") -> None:
-    """Solve what is asked for and write after each."""
-    known = cases()
-    fine = {
-        name: replace(case, scene=fine_scene(case.scene))
-        for name, case in known.items()
-        if any(expected.value == FINE for expected in case.expected)
-    }
-    values = read_fine()
-    wanted = [c for c in fine.values() if (matches(pattern, c.name, c.group) if pattern else c.name not in values)]
-    # cases that differ in gamma, mesh or steps only have the same fine scene
-    same = {} if pattern else {resolved(fine[name].scene): values[name] for name in values if name in fine}
-    for case in wanted:
-        begun, scene = perf_counter(), resolved(case.scene)
-        try:
-            same[scene] = values[case.name] = same.get(scene) or _solve(case)
-        except RuntimeError as error:
-            print(error, flush=True)
-            continue
-        print(f"{perf_counter() - begun:6.1f} s  {case.group}: {case.name}: {same[scene]}", flush=True)
-        kept = {name: values[name] for name in known if name in values}
-        FILE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+def main() -> None:
+    """Solve what is missing, and write after each. Raises RuntimeError if a run stops."""
+    known, values = cases(), read_fine()
+    for name, case in known.items():
+        if name not in values and any(expected.value == FINE for expected in case.expected):
+            fine = replace(case, scene=fine_scene(case.scene))
+            with tempfile.TemporaryDirectory() as folder:
+                values[name] = quantities(fine.scene, fine.solve(Path(folder)).steps[-1])
+            print(f"{case.group}: {name}: {values[name]}", flush=True)
+            kept = {other: values[other] for other in known if other in values}
+            FILE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -18,7 +16,7 @@ from mpi4py import MPI
 
 from archord.benchmarks.case import Case, Expected, matches, quantities, side_by_side
 from archord.benchmarks.stability.cases import FINE, cases
-from archord.benchmarks.stability.fine import read_fine
+from archord.benchmarks.stability.fine import Values, read_fine
 from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.run import Outcome
@@ -28,17 +26,32 @@ from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.solver.stepping import Step, StepFailure
 
-GOOD = ("converges", "stops, as it must")
 _BALANCE = 1e-8  # largest difference of forces over P, unless round-off is known to be larger
 _SPREAD = 10.0  # a sum of forces may be off by so many times the norm of their residual
 
 
+@dataclass(frozen=True)
+class Check:
+    """An ``error`` that must not be larger than ``allowed``; ``fault`` says so where it is."""
+
+    error: float
+    allowed: float
+    fault: str
+
+    @property
+    def share(self) -> float:
+        """The error over what is allowed; infinite for a nan."""
+        if self.error <= self.allowed:
+            return self.error / self.allowed if self.allowed else 0.0
+        return self.error / self.allowed if self.error < math.inf and self.allowed else math.inf
+
+
 @dataclass
 class Result:
-    """How a case went. ``status`` is "done", "stopped" (exit code 3) or "failed" (an error, or out of time).
+    """How a case went. ``status`` is "done", "stopped" (exit code 3) or "failed" (an error).
 
-    ``quantities`` are those of the last step, or of the last force that held; ``balance_limit`` and ``energy_limit``
-    are what ``balance`` and ``energy`` (errors over P and over the work) may be.
+    ``quantities`` are those of the last step, or of the last force that held. ``forces`` checks the balance of forces
+    over P, ``energy`` that of energies over the work; None where nothing was solved, or nothing is known.
     """
 
     status: str = ""
@@ -47,66 +60,36 @@ class Result:
     steps: int = 0
     iterations: int = 0
     cutbacks: int = 0
-    dofs: int = 0
-    balance: float = 0.0
-    balance_limit: float = _BALANCE
-    energy: float = 0.0
-    energy_limit: float = 0.0
+    forces: Check | None = None
+    energy: Check | None = None
     quantities: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     not_finite: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """A quantity of a result beside what was expected; ``deviation`` is relative, absolute where zero is expected."""
+class Comparison(Check):
+    """A ``value`` beside the ``reference`` that was ``expected``; the error is relative, absolute where that is 0."""
 
     expected: Expected
     value: float
     reference: float
 
-    @property
-    def deviation(self) -> float:
-        """How far off the value is."""
-        return abs(self.value / self.reference - 1) if self.reference else abs(self.value)
-
-    @property
-    def holds(self) -> bool:
-        """Whether that is within the tolerance; a nan is not."""
-        return self.deviation <= self.expected.tolerance
-
-    @property
-    def share(self) -> float:
-        """The deviation over the tolerance; infinite for a nan."""
-        if self.holds and not self.expected.tolerance:
-            return 0.0
-        share = self.deviation / (self.expected.tolerance or math.nan)
-        return math.inf if math.isnan(share) else share
-
 
 @dataclass(frozen=True)
 class Line:
-    """A line of the table: a case, its result, what it was compared with, and what is wrong with it, if anything."""
+    """A line of the table: a case, its result, the comparison that takes the largest share of its tolerance, if there
+    is any, and what is wrong."""
 
     case: Case
     result: Result
-    comparisons: list[Comparison]
+    worst: Comparison | None
     faults: list[str]
 
     @property
     def verdict(self) -> str:
         """How it ended, or the faults."""
-        return "; ".join(self.faults) or GOOD[bool(self.case.stops)]
-
-    @property
-    def iterations_per_step(self) -> float:
-        """Newton iterations, failed attempts included, over accepted output steps."""
-        return self.result.iterations / max(1, self.result.steps)
-
-    @property
-    def worst(self) -> Comparison | None:
-        """The comparison that takes the largest share of its tolerance, if there is any."""
-        return max(self.comparisons, key=lambda c: c.share) if self.comparisons else None
+        return "; ".join(self.faults) or ("stops, as it must" if self.case.stops else "converges")
 
 
 def chosen(pattern: str | None) -> list[str]:
@@ -130,9 +113,7 @@ def with_references(names: list[str]) -> list[str]:
     return [name for name in table if name in wanted]
 
 
-def run(
-    names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[Case, Result], None] = lambda case, result: None
-) -> list[Line]:
+def run(names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[Case, Result], None]) -> list[Line]:
     """Solve the cases ``names`` and those they are compared with below ``folder``, each on one rank; judge ``names``.
 
     ``said(case, result)`` follows each on the rank that solved it. The lines are the same on all ranks. Collective.
@@ -155,10 +136,6 @@ def solve_case(case: Case, folder: Path) -> Result:
     """
     claim_folder(case.folder(folder), force=True)
     result, begun = Result(), perf_counter()
-    outcome: Outcome | None = None
-
-    def started(joint) -> None:
-        result.dofs = joint.n_dofs
 
     def attempted(load: float, iterations: int) -> None:
         result.iterations += iterations
@@ -166,33 +143,13 @@ def solve_case(case: Case, folder: Path) -> Result:
             raise StepFailure(f"more than the {case.budget} Newton iterations allowed", Step(load))
 
     try:
-        with _time_limit(case.seconds):
-            outcome = case.attempt(folder, on_start=started, on_attempt=attempted)
+        outcome = case.attempt(folder, on_attempt=attempted)
         result.status, result.message = outcome.status, outcome.message
+        _look(result, case.scene, outcome)
     except Exception as error:
         result.status, result.message = "failed", f"{type(error).__name__}: {error}"
-        if perf_counter() - begun >= case.seconds:
-            result.message = f"more than the {case.seconds:g} s allowed"
     result.seconds = perf_counter() - begun
-    if outcome is not None:
-        _look(result, case.scene, outcome)
     return result
-
-
-@contextmanager
-def _time_limit(seconds: float) -> Iterator[None]:
-    """Raises TimeoutError in what runs within, after so many ``seconds``."""
-
-    def out_of_time(number, frame) -> None:
-        raise TimeoutError
-
-    before = signal.signal(signal.SIGALRM, out_of_time)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def _look(result: Result, scene: Scene, outcome: Outcome) -> None:
@@ -203,10 +160,13 @@ def _look(result: Result, scene: Scene, outcome: Outcome) -> None:
     result.steps = len(outcome.steps)
     result.cutbacks = sum(m.cutbacks for m in outcome.steps) + report.get("failed_step", {}).get("cutbacks", 0)
     if outcome.steps:
-        result.balance = float(report["error_estimates"]["force_balance"])
-        result.balance_limit = max(_BALANCE, _SPREAD * report["error_estimates"]["newton_residual"])
-        result.energy = report["error_estimates"]["energy_balance"] or 0.0
-        result.energy_limit = _energy_limit(scene, outcome.steps)
+        estimates = report["error_estimates"]
+        balance, energy = estimates["force_balance"], estimates["energy_balance"] or 0.0
+        allowed = max(_BALANCE, _SPREAD * estimates["newton_residual"])
+        result.forces = Check(balance, allowed, f"forces differ by {balance:.1e} of P")
+        result.energy = Check(
+            energy, 1.001 * _energy_limit(scene, outcome.steps) + 1e-8, f"energy is off by {energy:.1e} of the work"
+        )
         result.quantities = quantities(scene, outcome.steps[-1])
     held = re.search(r"last load that held is P = (\S+?)(;|$)", outcome.message)
     if held:
@@ -242,10 +202,11 @@ def not_finite(folder: Path) -> list[str]:
     return found
 
 
-def judge(case: Case, results: dict[str, Result], fine: dict[str, dict[str, float]]) -> Line:
+def judge(case: Case, results: dict[str, Result], fine: Values) -> Line:
     """Hold the result of ``case`` against its checks, the other ``results`` and the ``fine``-mesh values."""
-    result, faults, comparisons = results[case.name], [], []
-    if result.status != ("stopped" if case.stops else "done"):
+    result, faults = results[case.name], []
+    ended = result.status == ("stopped" if case.stops else "done")
+    if not ended:
         faults.append(f"{'went on' if result.status == 'done' else result.status}: {result.message}".rstrip(": "))
     elif case.stops not in result.message:
         faults.append(f"stopped, but said {result.message}")
@@ -253,24 +214,17 @@ def judge(case: Case, results: dict[str, Result], fine: dict[str, dict[str, floa
         faults.append(f'does not warn "{case.warns}"')
     if result.not_finite:
         faults.append(f"not finite: {', '.join(result.not_finite)}")
-    if not result.balance <= result.balance_limit:
-        faults.append(f"forces differ by {result.balance:.1e} of P")
-    if not result.energy <= 1.001 * result.energy_limit + 1e-8:
-        faults.append(f"energy is off by {result.energy:.1e} of the work")
-    if result.status == ("stopped" if case.stops else "done"):
-        for expected in case.expected:
-            value = result.quantities.get(expected.quantity, math.nan)
-            comparisons.append(Comparison(expected, value, _reference(case, expected, results, fine)))
-    faults += [
-        f"{c.expected.quantity} is {c.value:.6g}, not {c.reference:.6g} ({c.expected.source})"
-        for c in comparisons
-        if not c.holds
-    ]
-    return Line(case, result, comparisons, faults)
+    comparisons = [_compare(case, expected, results, fine) for expected in case.expected if ended]
+    checks = [check for check in (result.forces, result.energy, *comparisons) if check]
+    faults += [check.fault for check in checks if check.share > 1]
+    return Line(case, result, max(comparisons, key=lambda c: c.share, default=None), faults)
 
 
-def _reference(case: Case, expected: Expected, results: dict[str, Result], fine: dict[str, dict[str, float]]) -> float:
-    if isinstance(expected.value, float):
-        return expected.value
-    values = fine.get(case.name, {}) if expected.value == FINE else results[expected.value].quantities
-    return expected.factor * values.get(expected.quantity, math.nan)
+def _compare(case: Case, expected: Expected, results: dict[str, Result], fine: Values) -> Comparison:
+    value, reference = results[case.name].quantities.get(expected.quantity, math.nan), expected.value
+    if isinstance(reference, str):
+        values = fine.get(case.name, {}) if reference == FINE else results[reference].quantities
+        reference = expected.factor * values.get(expected.quantity, math.nan)
+    deviation = abs(value / reference - 1) if reference else abs(value)
+    fault = f"{expected.quantity} is {value:.6g}, not {reference:.6g} ({expected.source})"
+    return Comparison(deviation, expected.tolerance, fault, expected, value, reference)
