@@ -68,23 +68,20 @@ class Case:
             return False
         return report.get("status") == "done" and scene == resolved(self.scene)
 
-    def attempt(self, parent: Path, comm: MPI.Comm = MPI.COMM_SELF, **hooks: Any) -> Outcome:
-        """Solve into the folder below ``parent``; ``hooks`` are those of `solve_scene`.
+    def attempt(self, parent: Path, **hooks: Any) -> Outcome:
+        """Solve into the folder below ``parent``, on this rank alone; ``hooks`` are those of `solve_scene`.
 
         Raises KeyboardInterrupt if a signal interrupted the run, and `InputError` if the folder cannot be written.
-        Collective.
         """
-        if comm.rank == 0:
-            claim_folder(self.folder(parent), force=True)
-        comm.Barrier()
-        outcome = solve_scene(self.scene, self.folder(parent), comm, **hooks)
+        claim_folder(self.folder(parent), force=True)
+        outcome = solve_scene(self.scene, self.folder(parent), MPI.COMM_SELF, **hooks)
         if outcome.status == "interrupted":
             raise KeyboardInterrupt
         return outcome
 
-    def solve(self, parent: Path, comm: MPI.Comm = MPI.COMM_SELF, **hooks: Any) -> Outcome:
+    def solve(self, parent: Path, **hooks: Any) -> Outcome:
         """`attempt`, to the end. Raises RuntimeError with a sentence if the run stopped before."""
-        outcome = self.attempt(parent, comm, **hooks)
+        outcome = self.attempt(parent, **hooks)
         if outcome.status != "done":
             raise RuntimeError(f"{self.name}: {outcome.message}")
         return outcome

@@ -2,7 +2,7 @@
 
 All assume ``f(h) = f(0) + C h^p`` (Richardson 1911) and differ in what is known of the order p. `Refined` extrapolates
 the curves of runs, with the order of three meshes; `mesh_error` and `step_error` bound the error of a curve, for a
-solver that refines until it is small; `extrapolated` finds the limit of one number on many meshes, with the order free.
+solver that refines until it is small.
 """
 
 from __future__ import annotations
@@ -28,8 +28,6 @@ _LOWEST, _HIGHEST = 0.5, 2.0  # below, extrapolation multiplies noise; above, th
 _SHOWN = 0.05, 12.0  # orders that three meshes can show
 _SLOWEST = 1.5  # order that `mesh_error` takes at least
 _USUAL = 3.0  # order of P on meshes that are refined everywhere (docs/accuracy.md)
-_ORDER_TOLERANCE = 1e-9
-_FREE = 1.4, 4.0  # of a clamped corner's singularity, twice its exponent of 0.7, and of smooth solutions in P2
 
 
 def richardson(difference: Real, ratio: float, order: float) -> Real:
@@ -157,40 +155,3 @@ def step_error(coarse: Curve, fine: Curve) -> float:
     """Relative error of ``fine``, whose steps are half as long as those of ``coarse``, by backward Euler, of first
     order: their difference. That of ``coarse`` is twice as much."""
     return difference(coarse, fine, float(np.abs(fine).max()))
-
-
-@dataclass(frozen=True)
-class Limit:
-    """``value`` at size zero, the ``order`` of convergence, and ``error``: how far the value moves if any one of the
-    sizes is left out."""
-
-    value: float
-    order: float
-    error: float
-
-
-def extrapolated(sizes: Sequence[float], values: Sequence[float]) -> Limit:
-    """Fit ``values`` = limit + c ``sizes``^order by least squares, the order between 1.4 and 4.
-
-    The order is free: that of unlike meshes scatters. Raises ValueError for fewer than three different sizes.
-    """
-    h, v = np.asarray(sizes, dtype=float), np.asarray(values, dtype=float)
-    if len(np.unique(h)) < 3:
-        raise ValueError("an extrapolation needs three element sizes")
-    h = h / h.max()
-    low, high = _FREE
-    while high - low > _ORDER_TOLERANCE:  # the misfit can have several minima: ever finer scans around the best order
-        orders = np.linspace(low, high, 33)
-        best = int(np.argmin([_fit(h, v, order)[1] for order in orders]))
-        low, high = orders[max(best - 1, 0)], orders[min(best + 1, 32)]
-    order = float(low + high) / 2
-    limit = _fit(h, v, order)[0]
-    others = [_fit(np.delete(h, i), np.delete(v, i), order)[0] for i in range(len(h))]
-    return Limit(limit, order, float(np.abs(np.array(others) - limit).max()))
-
-
-def _fit(h: Array, v: Array, order: float) -> tuple[float, float]:
-    """Limit and root mean square residual at a given order."""
-    A = np.stack([np.ones_like(h), h**order], axis=1)
-    found = np.linalg.lstsq(A, v, rcond=None)[0]
-    return float(found[0]), float(np.sqrt(np.mean((A @ found - v) ** 2)))
