@@ -1,11 +1,8 @@
-"""Progress on rank 0: a bar on a terminal, plain lines otherwise."""
+"""A solve and its progress on rank 0: a bar on a terminal, plain lines otherwise."""
 
 from __future__ import annotations
 
 import math
-import os
-import sys
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
@@ -20,28 +17,30 @@ if TYPE_CHECKING:
     from archord.output.restart import Start
     from archord.output.run import Outcome
     from archord.studies.accuracy import Level
-    from archord.studies.tables import Result
 
 
-def say(text: str) -> None:
-    """Print a line; if nobody reads any more, that is no reason to stop, nor to leave other ranks waiting."""
-    try:
-        print(text, flush=True)
-    except OSError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+class Progress:
+    """Reports steps as they are accepted; of a scene with an accuracy mesh after mesh, and off a terminal only the
+    steps of the last one, at the end. ``done`` steps are there already."""
 
-
-class _Bar:
-    """``done`` of ``total`` things as a bar, where somebody watches; ``shown`` tells whether there is one."""
-
-    def __init__(self, thing: str, total: int, done: int, text: str, *, silent: bool) -> None:
-        self.silent, self.shown = silent, not silent and on_terminal()
+    def __init__(self, scene: Scene, silent: bool, done: int = 0) -> None:
+        self.scene, self.by_mesh = scene, scene.analysis.accuracy is not None
+        self.dR, self.force_unit = scene.joint.dR, scene.E_star * scene.joint.radius
+        self.silent, self.shown = silent, not silent and on_terminal()  # shown: as a bar
         if self.shown:
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+            from rich.progress import Progress as Bar
 
             columns = (MofNCompleteColumn(), BarColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-            self._bar = Progress(TextColumn(thing), *columns)
-            self._task = self._bar.add_task(text, total=total, completed=done)
+            self._bar = Bar(TextColumn("step"), *columns)
+            self._task = self._bar.add_task("meshing", total=len(scene.targets), completed=done)
+        kind = "elastic-plastic" if scene.plastic else "elastic"
+        self._joint = f"{kind} joint, plane {scene.analysis.plane}, dR/R = {self.dR / scene.joint.radius:g}"
+        if self.by_mesh:
+            name, last = ("delta", "delta/dR") if scene.force_controlled else ("P", "P/(E* R)")
+            self.print(f"{self._joint}: {name} to {scene.analysis.accuracy:g} of its largest value")
+            costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
+            self.print(f" mesh  elements/R  growth  {costs}")
 
     def __enter__(self) -> Self:
         """Show the bar."""
@@ -65,23 +64,6 @@ class _Bar:
             self._bar.console.print(text, highlight=False)
         elif not self.silent:
             print(text, flush=True)
-
-
-class Progress(_Bar):
-    """Reports steps as they are accepted; of a scene with an accuracy mesh after mesh, and off a terminal only the
-    steps of the last one, at the end."""
-
-    def __init__(self, scene: Scene, silent: bool, done: int = 0) -> None:
-        super().__init__("step", len(scene.targets), done, "meshing", silent=silent)
-        self.scene, self.by_mesh = scene, scene.analysis.accuracy is not None
-        self.dR, self.force_unit = scene.joint.dR, scene.E_star * scene.joint.radius
-        kind = "elastic-plastic" if scene.plastic else "elastic"
-        self._joint = f"{kind} joint, plane {scene.analysis.plane}, dR/R = {self.dR / scene.joint.radius:g}"
-        if self.by_mesh:
-            name, last = ("delta", "delta/dR") if scene.force_controlled else ("P", "P/(E* R)")
-            self.print(f"{self._joint}: {name} to {scene.analysis.accuracy:g} of its largest value")
-            costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
-            self.print(f" mesh  elements/R  growth  {costs}")
 
     def start(self, joint) -> None:
         """Say what is going to be solved."""
@@ -170,27 +152,3 @@ def solve_and_report(
         outcome = solve_as_asked(scene, folder, comm, start=start, **options)
     report.finish(outcome)
     return scene, outcome
-
-
-class SweepProgress(_Bar):
-    """Reports cases as they end, of ``total``, with those that had ``ended`` before. ``results`` keeps what ended."""
-
-    def __init__(self, total: int, ended: list[Result], begun: float, *, silent: bool) -> None:
-        super().__init__("case", total, len(ended), "starting", silent=silent)
-        self.results: list[Result] = []
-        self.begun, self.total = begun, total
-        self._count = Counter(result.status for result in ended)
-        if ended and not silent:
-            say(f"{len(ended)} of {total} cases are there already")
-
-    def ended(self, result: Result) -> None:
-        """Show a case that ended."""
-        self.results.append(result)
-        self._count[result.status] += 1
-        told = f"{self._count['done']} of {self.total} done"
-        failed = self._count["stopped"] + self._count["failed"]
-        told += f", {failed} failed" if failed else ""
-        self.update(told, advance=1)
-        if not self.silent and not self.shown and result.status != "open":
-            word = f"{result.status}, {result.steps} steps in {result.seconds:.1f} s"
-            say(f"{perf_counter() - self.begun:7.1f} s  {result.run} {word}; {told}")

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections import Counter
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import click
 
 from archord.options import argument, flag, output, overrides, quiet
 from archord.report.table import Table
 from archord.scene.errors import InputError
+
+if TYPE_CHECKING:
+    from archord.studies.tables import Result
 
 
 @click.command()
@@ -42,10 +47,9 @@ def sweep(
     from mpi4py import MPI
 
     from archord.output.ranks import agreed
-    from archord.progress import SweepProgress, say
     from archord.studies import tables
     from archord.studies.cases import read_sweep
-    from archord.studies.sweep import FILE, claim, open_cases, part_of
+    from archord.studies.sweep import FILE, claim, expected_seconds, open_cases, part_of
 
     comm = MPI.COMM_WORLD
     source = file / FILE if file.is_dir() else file
@@ -53,39 +57,48 @@ def sweep(
     show = comm.rank == 0 and not quiet
 
     def prepared():
-        if file.is_dir() and not source.is_file():
-            raise InputError(f"{file}: is not the folder of a sweep: {FILE} is missing.")
         design = read_sweep(source, overrides)
         mine = part_of(design.distinct, array)
         if show:
-            say(_announced(design))
+            minutes = sum(expected_seconds(case.scene) for case in design.distinct) / 60
+            distinct = f"{len(design.distinct)} of them distinct"
+            _say(f"{len(design.cases)} cases, {distinct}; about {minutes:.1f} min on one rank")
         if dry_run:
             print(_table(design))
             return design, mine, [], []
         if gather and not (folder / FILE).exists():
             raise InputError(f"{folder}: holds no sweep to gather.")
         claim(design, folder)
-        return design, mine, *(([], []) if gather else open_cases(mine, folder, retry=retry))
+        ended, left = ([], []) if gather else open_cases(mine, folder, retry=retry)
+        if ended and show:
+            _say(f"{len(ended)} of {len(mine)} cases are there already")
+        return design, mine, ended, left
 
     found: list = []
     agreed(comm, lambda: found.append(prepared()))  # rank 0 keeps what it found: the others need none of it
     if dry_run:
         return 0
-    design, mine, ended, cases = found[0] if found else (None, [], [], [])
-    received, results = 0, []
+    design, mine, results, cases = found[0] if found else (None, [], [], [])
+
+    def ended(result: Result) -> None:
+        results.append(result)
+        if show and result.status != "open":
+            done = f"{sum(result.status == 'done' for result in results)} of {len(mine)} done"
+            word = f"{result.status}, {result.steps} steps in {result.seconds:.1f} s"
+            _say(f"{perf_counter() - begun:7.1f} s  {result.run} {word}; {done}")
+
+    received = 0
     if comm.bcast(bool(cases)):
         from archord.studies.farm import solve_cases  # imports PETSc, on all ranks together
 
-        with SweepProgress(len(mine), ended, begun, silent=not show) as progress:
-            received = solve_cases(comm, cases, folder, progress.ended)
-        results = progress.results
+        received = solve_cases(comm, cases, folder, ended)
 
     def concluded() -> bool:
         known = tables.write(design, folder, results)
         if show:
             counts = Counter(result.status for result in known.values())
             told = ", ".join(f"{n} {status}" for status, n in sorted(counts.items()))
-            say(f"{told} in {perf_counter() - begun:.1f} s, tables in {folder}")
+            _say(f"{told} in {perf_counter() - begun:.1f} s, tables in {folder}")
         failed = [case for case in mine if known[case.run].status in ("stopped", "failed")]
         for case in failed:
             result = known[case.run]
@@ -96,12 +109,12 @@ def sweep(
     return 128 + received if received else 3 * failed
 
 
-def _announced(design) -> str:
-    from archord.studies.sweep import expected_seconds
-
-    minutes = sum(expected_seconds(case.scene) for case in design.distinct) / 60
-    n = len(design.cases)
-    return f"{n} case{'s' if n > 1 else ''}, {len(design.distinct)} distinct; about {minutes:.1f} min on one rank"
+def _say(text: str) -> None:
+    """Print a line; if nobody reads any more, that is no reason to stop, nor to leave other ranks waiting."""
+    try:
+        print(text, flush=True)
+    except OSError:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
 
 
 def _table(design) -> Table:

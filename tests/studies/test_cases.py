@@ -35,32 +35,21 @@ def faults(folder: Path, text: str, base: str = ELASTIC, overrides=()) -> list[s
     return str(caught.value).replace(f"{path}: ", "FILE: ").splitlines()
 
 
-@settings(max_examples=30, deadline=None)
-@given(
-    grid=st.lists(st.integers(1, 4), max_size=3),
-    zipped=st.integers(0, 4),
-    listed=st.integers(0, 3),
-    sampled=st.integers(0, 4),
-)
-def test_everything_is_multiplied(grid, zipped, listed, sampled):
+def test_everything_is_multiplied(tmp_path):
     """As many cases as the product of all lengths, all different, the last factor varying fastest."""
-    names = ["joint.radius", "joint.growth", "load.steps"]
     varied = {
-        "grid": {name: list(range(n)) for name, n in zip(names, grid, strict=False)},
-        "zip": {"pin.E": list(range(zipped)), "pin.nu": list(range(zipped))} if zipped else {},
-        "list": [{"block.E": i} for i in range(listed)],
-        "latin_hypercube": {"number": sampled, "ranges": {"block.nu": [0.0, 0.5]}} if sampled else None,
+        "grid": {"joint.radius": [1, 2], "load.steps": [1, 2, 3]},
+        "zip": {"pin.E": [1, 2, 3], "pin.nu": [1, 2, 3]},
+        "list": [{"block.E": 1}, {"block.E": 2}],
+        "latin_hypercube": {"number": 4, "ranges": {"block.nu": [0.0, 0.5]}},
     }
-    file = SweepFile.model_validate({"base": {}} | {name: some for name, some in varied.items() if some})
-    rows = combinations(factors(file))
-    lengths = [n for n in (listed, zipped, *grid, sampled) if n]
-    assert len(rows) == math.prod(lengths)
-    assert len({tuple(sorted(row.items())) for row in rows}) == len(rows)
-    for row in rows:
-        assert row.get("pin.E") == row.get("pin.nu")
-    keys = [key for key in ("block.E", "pin.E", *names) if any(key in row for row in rows)]
-    order = [tuple(row[key] for key in keys) for row in rows]
+    rows = combinations(factors(SweepFile.model_validate({"base": {}} | varied)))
+    assert len(rows) == 2 * 3 * (2 * 3) * 4
+    order = [tuple(row[key] for key in ("block.E", "pin.E", "joint.radius", "load.steps")) for row in rows]
     assert order == sorted(order)
+    assert len({(*first, row["block.nu"]) for first, row in zip(order, rows, strict=True)}) == len(rows)
+    assert all(row["pin.E"] == row["pin.nu"] for row in rows)
+    assert len(read_sweep(written(tmp_path, "")).cases) == 1
 
 
 @settings(max_examples=20, deadline=None)
@@ -76,8 +65,10 @@ def test_every_stratum_of_a_range_holds_one_sample(number, seed, low, factor):
         position = share * number
         # rounded to nine digits, a sample may lie on the edge of its stratum
         assert (np.abs(np.sort(position) - np.arange(number) - 0.5) <= 0.5 + 1e-5).all()
-    again = samples(LatinHypercube.model_validate({"number": number, "seed": seed, "ranges": ranges}))
-    other = samples(LatinHypercube.model_validate({"number": number, "seed": seed + 1, "ranges": ranges}))
+    again, other = (
+        samples(LatinHypercube.model_validate({"number": number, "seed": some, "ranges": ranges}))
+        for some in (seed, seed + 1)
+    )
     assert rows == again != other
 
 
@@ -151,27 +142,24 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "rows",
+    ("text", "said"),
     [
         ("gird = 3", "gird = 3: is not a known key."),
         ("grid = [1]", "grid = [1]: input should be a valid dictionary."),
         ("[grid]\njoint.clearance = 1", "grid.joint.clearance = 1: input should be a valid list."),
         ("[grid]\nclearance = [1]", "[grid] clearance: must read section.key, like joint.clearance."),
-        ('[grid]\nunits.length = ["m"]', "[grid] units.length: cannot vary; all cases of a table have the same units."),
+        ("grid.units.length = ['m']", "[grid] units.length: cannot vary; all cases of a table have the same units."),
         ("zip = {}", "zip: dictionary should have at least 1 item after validation, not 0."),
         ("list = 3", "list = 3: input should be a valid list."),
-        (
-            "[zip]\npin.E = [1.0, 2.0]\npin.nu = [0.3]",
-            "zip: must hold lists of one length, but pin.E has 2, pin.nu has 1.",
-        ),
+        ("[zip]\npin.E = [1, 2]\npin.nu = [0]", "zip: must hold lists of one length, but pin.E has 2, pin.nu has 1."),
         (
             "[grid]\njoint.clearance = [0.1]\n[[list]]\njoint.relative_clearance = 0.1",
             "[grid] joint.clearance: is varied by [[list]] joint.relative_clearance already.",
         ),
         (
             "latin_hypercube = { number = 0, sed = 1, ranges = { pin.nu = [0.3, 0.1] } }",
-            "latin_hypercube.number = 0: input should be greater than or equal to 1.",
-            "latin_hypercube.ranges.pin.nu = [0.3, 0.1]: must have a from that is less than its to.",
+            "latin_hypercube.number = 0: input should be greater than or equal to 1.\n"
+            "latin_hypercube.ranges.pin.nu = [0.3, 0.1]: must have a from that is less than its to.\n"
             "latin_hypercube.sed = 1: is not a known key.",
         ),
         (
@@ -180,30 +168,21 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
         ),
         (
             'latin_hypercube = { number = 2, ranges = { pin.E = ["a", 1.0], pin.nu = [0.1, nan] } }',
-            'latin_hypercube.ranges.pin.E.from = "a": input should be a valid number.',
+            'latin_hypercube.ranges.pin.E.from = "a": input should be a valid number.\n'
             "latin_hypercube.ranges.pin.nu.to = NaN: input should be a finite number.",
         ),
         (
-            "[grid]\njoint.relative_clearance = [0.005, 0.9]\nload.steps = [1, 2, 3]",
-            "case 4 and 2 more: joint.relative_clearance = 0.9 must be between 1e-6 and 0.5 "
-            "times the radius, in a ring or minus that.",
-        ),
-        (
             "[grid]\nload.steps = [1, 1.5]\npin.E = [1.82, -1.0]",
-            "case 2 and 1 more: pin.E = -1.0 must be greater than 0.",
+            "case 2 and 1 more: pin.E = -1.0 must be greater than 0.\n"
             "case 3 and 1 more: load.steps = 1.5 must be a whole number.",
         ),
-        (
-            "[grid]\npin.nu = [0.1, 0.2]\n[[list]]\nblock.nu = 0.7",
-            "every case: block.nu = 0.7 must be at most 0.499999.",
-        ),
+        ("[[list]]\nblock.nu = 0.7", "every case: block.nu = 0.7 must be at most 0.499999."),
         (f"[grid]\npin.E = {[1.0] * 400}\nload.steps = {[1] * 400}", "has 160000 cases; 100000 are allowed."),
     ],
 )
-def test_faults_are_told_in_a_sentence(tmp_path, rows):
+def test_faults_are_told_in_a_sentence(tmp_path, text, said):
     """File, key, value, and what is allowed; each fault once, however many cases have it."""
-    text, *said = rows
-    assert sorted(faults(tmp_path, text)) == sorted(f"FILE: {fault}" for fault in said)
+    assert sorted(faults(tmp_path, text)) == [f"FILE: {fault}" for fault in said.splitlines()]
 
 
 def test_of_many_faults_the_first_are_told(tmp_path):

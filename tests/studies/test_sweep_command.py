@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from archord.cli import run
 from archord.output.history import read_history
-from archord.postprocess.run import Run
 from archord.studies.cases import read_sweep
 from archord.studies.tables import result_of
 from tests.studies.parts import SOFT, STUCK, break_mesh, numbers, sweep, table, times, written
@@ -38,29 +36,16 @@ def test_tables_are_tidy(solved):
     """A row per case and step, the varied keys in columns with their units; a row per case with the last step."""
     rows = table(solved / "out" / "sweep.csv")
     assert list(rows[0])[:6] == ["case", "run", "status", "pin.E [E*]", "load.steps", "step"]
-    assert [(row["case"], row["step"]) for row in rows] == [
-        (str(case), str(step)) for case in range(1, 7) for step in range(1, 4 if case % 2 == 0 else 3)
-    ]
-    assert {(row["case"], row["pin.E [E*]"], row["load.steps"]) for row in rows} == {
-        (str(1 + 2 * i + j), f"{E:g}", str(n)) for i, E in enumerate((0.5, 1.0, 1.82)) for j, n in enumerate((2, 3))
-    }
+    assert "".join(row["case"] for row in rows) == "112223344455666"
+    assert [row["load.steps"] for row in rows] == 3 * ["2", "2", "3", "3", "3"]
+    assert [row["pin.E [E*]"] for row in rows] == 5 * ["0.5"] + 5 * ["1"] + 5 * ["1.82"]
     ends = table(solved / "out" / "cases.csv")
     assert len(ends) == 6
     for end in ends:
         own = [row for row in rows if row["case"] == end["case"]]
-        assert {name: end[name] for name in ("P [E* R]", "eps [rad]", "work/(E* R2)")} == {
-            name: own[-1][name] for name in ("P [E* R]", "eps [rad]", "work/(E* R2)")
-        }
+        assert all(end[name] == own[-1][name] for name in ("P [E* R]", "eps [rad]", "work/(E* R2)"))
         assert int(end["iterations"]) == sum(int(row["iterations"]) for row in own)
         assert (end["status"], end["message"], end["steps"]) == ("done", "", str(len(own)))
-
-
-def test_softer_pins_give_way(solved):
-    """P grows with the pin's stiffness, at each of the equal displacements."""
-    ends = [row for row in table(solved / "out" / "cases.csv") if row["load.steps"] == "3"]
-    P = [float(row["P/(E* R)"]) * Run(solved / "out" / "cases" / row["run"]).curve.E_star for row in ends]
-    assert (np.diff(P) > 0).all()
-    assert P[0] < 0.6 * P[-1]
 
 
 def test_what_is_solved_is_not_solved_again(solved, tmp_path, capsys):
@@ -92,16 +77,6 @@ def test_the_folder_of_another_sweep_is_left_alone(solved, tmp_path, refused):
     assert {p: p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()} == before
 
 
-def test_identical_cases_are_solved_once(tmp_path, capsys):
-    file = written(tmp_path, "[grid]\njoint.clearance = [0.005, 0.0050]\nload.steps = [1, 1]\n")
-    assert sweep(file, "-o", tmp_path / "out") == 0
-    assert "4 cases, 1 distinct" in capsys.readouterr().out
-    rows = numbers(tmp_path / "out")
-    assert [row.pop("case") for row in rows] == ["1", "2", "3", "4"]
-    assert rows == 4 * rows[:1]
-    assert len(list((tmp_path / "out" / "cases").iterdir())) == 1
-
-
 def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
     """A case that finds no equilibrium, and one with an error that nobody foresaw: noted, exit code 3, and left alone
     until --retry. The error's traceback is in failure.txt, its sentence in the table, and a retry removes it."""
@@ -130,19 +105,16 @@ def test_a_failure_stops_nobody_else(tmp_path, monkeypatch, capsys):
     assert not failure.exists()
 
 
-def test_a_file_in_a_case_s_place_is_its_failure(tmp_path, capsys):
-    file, out = written(tmp_path, "[grid]\npin.E = [0.5, 1.0]\n"), tmp_path / "out"
-    assert sweep(file, "-o", out, "--array", "1/2", "-q") == 0
-    (missing,) = {case.run for case in read_sweep(file).cases} - {path.name for path in (out / "cases").iterdir()}
-    (out / "cases" / missing).write_text("a file where the run folder belongs")
-    assert sweep(file, "-o", out) == 3
-    assert "1 failed" in capsys.readouterr().out
-
-
 def test_an_array_solves_the_whole(tmp_path, solved):
-    """Part by part into one folder; the last part leaves the table of the whole, and so does --gather."""
+    """Part by part into one folder, whatever is in a case's way; the last part leaves the whole, as does --gather."""
     file, out = written(tmp_path, SOFT), tmp_path / "out"
-    for part, done in (("2/2", 3), ("1/2", 6)):
+    out.joinpath("cases").mkdir(parents=True)
+    out.joinpath("sweep.toml").touch()
+    in_the_way = out / "cases" / read_sweep(file).cases[-1].run
+    in_the_way.write_text("a file where a run folder belongs")
+    assert sweep(file, "-o", out, "--array", "1/2", "-q") == 3
+    in_the_way.unlink()
+    for part, done in (("2/2", 5), ("1/2", 6)):
         assert sweep(file, "-o", out, "--array", part, "-q") == 0
         assert sum(row["status"] == "done" for row in table(out / "cases.csv")) == done
     assert numbers(out) == numbers(_again(solved))
@@ -171,7 +143,7 @@ def _again(solved: Path) -> Path:
         (["FILE", "-o", "full"], "full: is not empty and holds no sweep; choose another folder with -o.\n"),
         (["FILE", "-o", "full/file"], "full/file: cannot be used for a sweep: Not a directory.\n"),
         (["WRONG"], "WRONG: case 2: pin.E = -1.0 must be greater than 0.\n"),
-        (["full"], "full: is not the folder of a sweep: sweep.toml is missing.\n"),
+        (["full"], "full/sweep.toml: cannot be read: No such file or directory.\n"),
         (["nowhere.toml"], "nowhere.toml: cannot be read: No such file or directory.\n"),
     ],
 )
@@ -187,23 +159,28 @@ def test_nothing_is_written_by_a_dry_run_or_bad_input(tmp_path, monkeypatch, cap
     assert err == said.replace("WRONG", wrong)
     assert code == (2 if said else 0)
     if not said:
-        assert out.startswith("6 cases, 6 distinct; about ")
+        assert out.startswith("6 cases, 6 of them distinct; about ")
         assert [line.split()[0] for line in out.splitlines()[2:]] == ["1", "2", "3", "4", "5", "6"]
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_numbers_of_absent_and_mixed_keys(tmp_path):
-    """An absent key is empty, lists are as in TOML."""
+def test_absent_keys_lists_and_identical_cases(tmp_path, capsys):
+    """An absent key is empty, lists are as in TOML; cases of one scene are solved once and have their rows each."""
     text = """
         [[list]]
         block.yield_stress = "none"
         [[list]]
         block.yield_stress = 0.05
         [grid]
-        load.displacement = [0.5, [0.5, 0.2]]
+        load.displacement = [0.5, [0.5, 0.2], [0.5, 0.20]]
         analysis.plane = ["stress"]
     """
-    assert sweep(written(tmp_path, text), "-o", tmp_path / "out", "-q") == 0
-    rows = table(tmp_path / "out" / "cases.csv")
-    assert [row["block.yield_stress [E*]"] for row in rows] == ["", "", "0.05", "0.05"]
-    assert [row["load.displacement"] for row in rows] == 2 * ["0.5", "[0.5, 0.2]"]
+    out = tmp_path / "out"
+    assert sweep(written(tmp_path, text), "-o", out) == 0
+    assert "6 cases, 4 of them distinct" in capsys.readouterr().out
+    rows = numbers(out, "cases.csv")
+    assert [row.pop("case") for row in rows] == ["1", "2", "3", "4", "5", "6"]
+    assert (rows[1], rows[4]) == (rows[2], rows[5])
+    assert len(list((out / "cases").iterdir())) == 4
+    assert [row["block.yield_stress [E*]"] for row in rows] == ["", "", "", "0.05", "0.05", "0.05"]
+    assert [row["load.displacement"] for row in rows] == 2 * ["0.5", "[0.5, 0.2]", "[0.5, 0.2]"]
