@@ -146,7 +146,7 @@ def solve_and_report(
     if report.by_mesh:
         options["on_level"] = report.level
     elif begun is not None:
-        options |= {"begun": begun, "timer": Timer({"start-up": perf_counter() - begun})}
+        options["timer"] = Timer({"start-up": perf_counter() - begun})
     options |= {"on_start": report.start, "on_step": report.step, "on_attempt": report.attempt}
     with report:
         outcome = solve_as_asked(scene, folder, comm, start=start, **options)

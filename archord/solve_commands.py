@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 @output("run folder [runs/<scene name>]")
 @flag("--force", "overwrite the results in the run folder")
 @flag("--restart", "continue the interrupted run in the run folder")
-@flag("--extend", "continue the finished run to the scene's load")
-@flag("--debug", "write the fields of a step that cannot be solved to debug.xdmf")
+@flag("--extend", "continue the run along the scene's path, which must go further")
 @quiet()
 @click.pass_obj
 def solve(
@@ -35,7 +34,6 @@ def solve(
     force: bool,
     restart: bool,
     extend: bool,
-    debug: bool,
     quiet: bool,
 ) -> int:
     """Solve a scene into a run folder. Under mpirun, all ranks work on it.
@@ -48,7 +46,7 @@ def solve(
         raise click.UsageError("choose one of --force, --restart and --extend")
     if not (restart or extend):
         folder = output or Path("runs") / scene.stem
-        return _solve(lambda: load_scene(scene, overrides), folder, begun, quiet, force=force, debug=debug)
+        return _solve(lambda: load_scene(scene, overrides), folder, begun, quiet, force=force)
     if output is not None and scene.is_dir():
         raise click.UsageError("-o does not go with a run folder")
     folder, file = (scene, scene / "scene.toml") if scene.is_dir() else (output or Path("runs") / scene.stem, scene)
@@ -57,7 +55,7 @@ def solve(
         print(f"{planned.said}.", flush=True)
     if planned.finished:
         return 0
-    return _solve(lambda: planned.scene, folder, begun, quiet, force=True, debug=debug, start=planned.start)
+    return _solve(lambda: planned.scene, folder, begun, quiet, force=True, start=planned.start)
 
 
 def _planned(load: Callable[[], Scene], folder: Path, *, extend: bool) -> Plan:
@@ -68,9 +66,9 @@ def _planned(load: Callable[[], Scene], folder: Path, *, extend: bool) -> Plan:
     from mpi4py import MPI
 
     from archord.output.ranks import agreed
-    from archord.output.restart import plan_extension, plan_restart  # on all ranks: it imports PETSc
+    from archord.output.restart import plan_restart  # on all ranks: it imports PETSc
 
-    return agreed(MPI.COMM_WORLD, lambda: (plan_extension if extend else plan_restart)(folder, load()))
+    return agreed(MPI.COMM_WORLD, lambda: plan_restart(folder, load(), extend=extend))
 
 
 def _solve(load: Callable[[], Scene], folder: Path, begun: float, quiet: bool, **options: Any) -> int:

@@ -10,8 +10,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import re
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.output.disk import replace_file
+from archord.output.step_file import all_arrays, hdf5_in_memory, image, put
 from archord.presets.measures import Measures, Work
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
@@ -28,26 +28,7 @@ from archord.solver.mesh_order import Arrays, MeshOrder
 from archord.solver.newton import Newton
 from archord.solver.stepping import Step
 
-FORMAT = 1
 _HEADER = 512  # HDF5 looks for its own beginning at powers of two from here
-_FIRST_LINE = re.compile(rb"archord checkpoint, format (\d+), sha256 ([0-9a-f]{64})\n")
-
-
-@dataclass
-class Checkpoint:
-    """State of a run after ``step`` output steps.
-
-    ``fields`` are nodal ``(n, 2)`` and ``history`` is as `MeshOrder.collect_history` returns it, both in the mesh
-    generator's order; ``scalars`` is whatever JSON can hold, ``scene`` the resolved scene as TOML.
-    """
-
-    step: int
-    scene: str
-    mesh: str
-    fields: dict[str, Array]
-    history: dict[str, Arrays]
-    scalars: dict[str, Any] = field(default_factory=dict)
-    version: str = VERSION
 
 
 @dataclass
@@ -61,128 +42,103 @@ class RunState:
     work: Work
 
 
-def collect(order: MeshOrder, step: int, scene: str, fields: dict[str, Array], scalars: dict[str, Any]) -> Checkpoint:
-    """The history of all points, nodal ``fields`` ``(n_local, 2)`` and ``scalars`` after ``step``, on rank 0.
+@dataclass
+class Checkpoint:
+    """What the file holds of a run after ``step`` output steps.
 
-    Collective.
+    ``arrays`` are in the mesh generator's order: "fields/displacement" and "fields/increment" ``(n, 2)``, and what
+    `MeshOrder.collect_history` returns. ``scalars`` is whatever JSON can hold, ``scene`` the resolved scene as TOML.
     """
-    whole = {name: order.collect(values) for name, values in fields.items()}
-    history = order.collect_history()
-    mesh = order.mesh_digest() if order.system.comm.rank == 0 else ""
-    return Checkpoint(step, scene, mesh, whole, history, scalars)
 
-
-def restore(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Give the points the history of ``checkpoint`` (known on rank 0, read from ``path``); returns this rank's nodal
-    fields ``(n_local, 2)`` and the scalars. Collective. Raises `InputError` on every rank if it is of another mesh."""
-    comm = order.system.comm
-    fault = None
-    if checkpoint is not None and checkpoint.mesh != order.mesh_digest():
-        fault = (
-            f"{path}: belongs to another mesh than the scene makes here (another version of gmsh?), so that the run "
-            "cannot be continued."
-        )
-    fault = comm.bcast(fault)
-    if fault:
-        raise InputError(fault)
-    order.spread_history(None if checkpoint is None else checkpoint.history)
-    names, scalars = comm.bcast(None if checkpoint is None else (list(checkpoint.fields), checkpoint.scalars))
-    fields = {name: order.spread(None if checkpoint is None else checkpoint.fields[name]) for name in names}
-    return fields, scalars
+    step: int
+    scene: str
+    mesh: str
+    scalars: dict[str, Any]
+    arrays: Arrays
 
 
 def halt(order: MeshOrder, scene: str, at: RunState) -> Checkpoint:
     """The checkpoint (on rank 0) of a run of ``scene``, from which `resume` goes on. Collective."""
     system, position = order.system, at.position
-    state = system.equilibrium.state()
-    fields = {"displacement": _nodal(state)}
+    state, increment = system.equilibrium.state(), position.increment
     scalars = {
         "measures": asdict(at.measures),
         "step": asdict(at.step),
-        "work": vars(at.work),
+        "work": asdict(at.work),
         "position": {name: value for name, value in vars(position).items() if name != "increment"},
         "largest_reaction": system.equilibrium.largest_reaction,
         "gamma_by_and_by": system.solver.continues_gamma,
         "level": float(state[-1]),
     }
-    if position.increment is not None:
-        fields["increment"] = _nodal(position.increment)
-        scalars["level_increment"] = float(position.increment[-1])
-    return collect(order, at.measures.step, scene, fields, scalars)
+    arrays = order.collect_history() | {"fields/displacement": order.collect(state[:-1].reshape(-1, 2))}
+    if increment is not None:
+        scalars["level_increment"] = float(increment[-1])
+        arrays["fields/increment"] = order.collect(increment[:-1].reshape(-1, 2))
+    mesh = order.mesh_digest() if system.comm.rank == 0 else ""
+    return Checkpoint(at.measures.step, scene, mesh, scalars, arrays)
 
 
 def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> RunState:
     """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``). Collective.
 
-    Raises `InputError` if it is of another mesh.
+    Raises `InputError` on every rank if it is of another mesh.
     """
-    fields, scalars = restore(order, path, checkpoint)
+    equilibrium = order.system.equilibrium
+    known = checkpoint and (checkpoint.mesh == order.mesh_digest(), checkpoint.scalars)
+    same_mesh, scalars = order.system.comm.bcast(known)
+    if not same_mesh:
+        raise InputError(
+            f"{path}: belongs to another mesh than the scene makes here (another version of gmsh?), so that the run "
+            "cannot be continued."
+        )
+    order.spread_history(checkpoint.arrays if checkpoint else None)
+
+    def state(name: str, level: str) -> Array:
+        return np.append(order.spread(checkpoint.arrays[name] if checkpoint else None), scalars[level])
+
     position = Position(**scalars["position"])
-    if "increment" in fields:
-        position.increment = np.append(fields["increment"], scalars["level_increment"])
-    work = Work()
-    vars(work).update(scalars["work"])
+    if "level_increment" in scalars:
+        position.increment = state("fields/increment", "level_increment")
+    order.system.solver.continues_gamma = scalars["gamma_by_and_by"]
+    equilibrium.resume(position.load, state("fields/displacement", "level"), scalars["largest_reaction"])
     step = Step(**scalars["step"])
     step.attempts = [_newton(attempt) for attempt in scalars["step"]["attempts"]]
-    state = np.append(fields["displacement"], scalars["level"])
-    order.system.solver.continues_gamma = scalars.get("gamma_by_and_by", False)
-    order.system.equilibrium.resume(position.load, state, scalars["largest_reaction"])
-    return RunState(Measures(**scalars["measures"]), step, position, work)
+    return RunState(Measures(**scalars["measures"]), step, position, Work(**scalars["work"]))
 
 
 def _newton(attempt: dict[str, Any]) -> Newton:
     """A solve as a checkpoint holds it; version 0.1 called active-set changes flips."""
-    changes = {"active_set_changes": attempt.pop("flips")} if "flips" in attempt else {}
-    return Newton(**attempt, **changes)
-
-
-def _nodal(state: Array) -> Array:
-    """The displacements ``(n_local, 2)`` in a state of the equilibrium."""
-    return state[:-1].reshape(-1, 2)
+    return Newton(**{"active_set_changes" if name == "flips" else name: value for name, value in attempt.items()})
 
 
 def write(path: Path, checkpoint: Checkpoint) -> None:
     """Replace ``path`` by ``checkpoint``. Raises `OSError`."""
-    memory = io.BytesIO()
-    with h5py.File(memory, "w") as file:
-        facts = {"archord": checkpoint.version, "step": checkpoint.step, "scene": checkpoint.scene}
+    facts = {"archord": VERSION, "step": checkpoint.step, "scene": checkpoint.scene, "scalars": checkpoint.scalars}
+    with hdf5_in_memory() as file:
         file.attrs["mesh"] = checkpoint.mesh
-        file["facts"] = json.dumps(facts | {"scalars": checkpoint.scalars})
-        for name, values in checkpoint.fields.items():
-            file[f"fields/{name}"] = values
-        for place, arrays in checkpoint.history.items():
-            for name, values in arrays.items():
-                file[f"history/{place}/{name}"] = values
-    body = memory.getvalue()
-    line = f"archord checkpoint, format {FORMAT}, sha256 {hashlib.sha256(body).hexdigest()}\n"
-    replace_file(path, line.encode().ljust(_HEADER, b"\0") + body, durable=True)
+        file["facts"] = json.dumps(facts)
+        for name, values in checkpoint.arrays.items():
+            put(file, name, values)
+        body = image(file)
+    replace_file(path, _header(body) + body, durable=True)
+
+
+def _header(body: bytes) -> bytes:
+    """What stands before the HDF5 file ``body``."""
+    line = f"archord checkpoint, format 1, sha256 {hashlib.sha256(body).hexdigest()}\n"
+    return line.encode().ljust(_HEADER, b"\0")
 
 
 def read(path: Path) -> Checkpoint:
-    """Read ``path``. Raises `InputError` if it is missing, damaged, or of a newer archord."""
+    """Read ``path``, of this version or 0.1. Raises `InputError` if it is missing, damaged, or of a newer archord."""
     try:
         content = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: is missing, so that the run cannot be continued.") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}.") from None
-    line = _FIRST_LINE.match(content)
-    if line is None:
-        raise InputError(f"{path}: is damaged or no checkpoint, so that the run cannot be continued.")
-    if int(line[1]) > FORMAT:
-        raise InputError(
-            f"{path}: has format {int(line[1])}, of a newer archord; this one ({VERSION}) reads up to {FORMAT}."
-        )
+        raise InputError(f"{path}: cannot be read, so that the run cannot be continued: {error.strerror}.") from None
     body = content[_HEADER:]
-    padding = content[line.end() : _HEADER]
-    if any(padding) or hashlib.sha256(body).hexdigest().encode() != line[2]:
-        raise InputError(f"{path}: is damaged (its checksum is wrong), so that the run cannot be continued.")
+    if content[:_HEADER] != _header(body):
+        raise InputError(f"{path}: is damaged or of a newer archord, so that the run cannot be continued.")
     with h5py.File(io.BytesIO(body), "r") as file:
-        facts = json.loads(file["facts"].asstr()[()])
-        history = {
-            place: {name: values[()] for name, values in group.items()}
-            for place, group in file.get("history", {}).items()
-        }
-        fields = {name: values[()] for name, values in file["fields"].items()}
-        mesh = file.attrs["mesh"]
-    return Checkpoint(facts["step"], facts["scene"], mesh, fields, history, facts["scalars"], facts["archord"])
+        mesh, arrays = file.attrs["mesh"], dict(all_arrays(file))
+    facts = json.loads(bytes(arrays.pop("facts")))
+    return Checkpoint(facts["step"], facts["scene"], mesh, facts["scalars"], arrays)

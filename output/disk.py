@@ -8,8 +8,6 @@ composed in memory, and what goes wrong on disk is an `OSError` that names the f
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -30,22 +28,12 @@ def replace_file(path: Path, content: bytes | str, *, durable: bool = False) -> 
     """
     new = new_name(path)
     try:
-        with naming(path):
-            with new.open("wb") as file:
-                file.write(content.encode() if isinstance(content, str) else content)
-                if durable:
-                    file.flush()
-                    os.fsync(file.fileno())
-            new.replace(path)
-    except OSError:
-        new.unlink(missing_ok=True)
-        raise
-
-
-@contextmanager
-def naming(path: Path) -> Iterator[None]:
-    """Within this context every `OSError` names ``path``."""
-    try:
-        yield
+        with new.open("wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
+        new.replace(path)
     except OSError as error:
+        new.unlink(missing_ok=True)
         raise OSError(error.errno, error.strerror or str(error), str(path)) from None

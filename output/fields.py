@@ -1,9 +1,7 @@
-"""fields.xdmf and fields.h5: the fields of all bodies over the steps, for ParaView and pyvista. debug.xdmf and .h5:
-the last state that a solve without success tried, with its residual forces and increments of PEEQ.
+"""fields.xdmf and fields.h5: the fields of all bodies over the steps, for ParaView and pyvista.
 
 Displacements are nodal on curved second-order triangles, whatever the degree of the elements; stress measures, PEEQ and
-the contact are means over cells. The arrays are in the order of the mesh generator, whatever the number of ranks. Rank
-0 writes.
+the contact are means over cells. The arrays are in the order of the mesh generator, whatever the number of ranks.
 """
 
 from __future__ import annotations
@@ -16,7 +14,6 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import lagrange
 from archord.geometry.plane_mesh import distinct_edges
 from archord.output.disk import replace_file
-from archord.output.ranks import agreed
 from archord.output.step_file import StepFile
 from archord.solver.mesh_order import MeshOrder
 
@@ -24,102 +21,69 @@ _EDGES = [(1, 2), (0, 2), (0, 1)]  # vertices of a cell's edges, in basix' order
 _VTK_ORDER = [0, 1, 2, 5, 3, 4]  # VTK counts edge nodes from the edge between the first two vertices
 
 
-class FieldWriter:
-    """Writes ``folder``/fields.xdmf and .h5 (see `StepFile`); goes on ``after`` some steps that are there.
+def collect_fields(order: MeshOrder) -> dict[str, Array]:
+    """Displacements of the nodes ``(n, 2)`` and values ``(m,)`` of the cells at the last accepted state, by name: of
+    the whole mesh on rank 0, nothing elsewhere. Collective."""
+    system = order.system
+    u = system.equilibrium.displacement()
+    values = system.bulk.cell_fields(u)
+    share, pressure = np.zeros(order.n_cells), np.zeros(order.n_cells)
+    for pair in system.contact.pairs:
+        side = pair.surface
+        w = side.weight / side.weight.sum(axis=1, keepdims=True)
+        share[side.cells] = (w * (pair.pressure > 0)).sum(axis=1)
+        pressure[side.cells] = (w * pair.pressure).sum(axis=1)
+    values |= {"contact_state": share, "contact_pressure": pressure}
+    return {"displacement": order.collect(u)} | {name: order.cells(value) for name, value in values.items()}
 
-    Times are the steps' loads, or with ``numbered`` their numbers. With ``debug`` the files are debug.xdmf and .h5, and
-    hold what tells why a solve fails. Collective. Raises `WriteError`, and `InputError` if the files that should go on
-    are not this run's.
+
+class FieldWriter:
+    """Writes ``folder``/fields.xdmf and .h5 (see `StepFile`) on rank 0; goes on ``after`` some steps that are there.
+
+    ``bodies`` are as `MeshOrder.bodies` returns them. Times are the steps' loads, or with ``numbered`` their numbers.
+    Raises `OSError`, and `InputError` if the files that should go on are not this run's.
     """
 
-    def __init__(
-        self, folder: Path, order: MeshOrder, *, after: int = 0, numbered: bool = False, debug: bool = False
-    ) -> None:
-        system = order.system
-        self.order, self._numbered = order, numbered
-        self.path = folder / ("debug.xdmf" if debug else "fields.xdmf")
-        self.nodal = ["displacement", "residual"] if debug else ["displacement"]
-        body_of = order.bodies()
-        self.names = ["von_mises", "mean_stress", "contact_state", "contact_pressure"]
-        if system.bulk.plastic:
-            self.names[1:1] = ["peeq", "peeq_increment"] if debug else ["peeq"]
+    def __init__(self, folder: Path, order: MeshOrder, bodies: np.ndarray, after: int, numbered: bool) -> None:
+        self.path, self._numbered = folder / "fields.xdmf", numbered
+        self._nodes = SecondOrder(order.nodes_of_cell, order.system.problem.degree)
+        cells, points = self._nodes.cells[:, _VTK_ORDER], self._nodes(order.coordinates)
+        self._sizes = len(points), len(cells)
+        fixed = {"mesh/coordinates": points, "mesh/cells": cells, "mesh/body": bodies}
+        self._file = StepFile(folder / "fields.h5", fixed, after, apart=True)
 
-        def make() -> None:
-            self._nodes = SecondOrder(order.nodes_of_cell, system.problem.degree)
-            cells, points = self._nodes.cells[:, _VTK_ORDER], self._nodes(order.coordinates)
-            self._n_nodes, self._n_cells = len(points), len(cells)
-            fixed = {"mesh/coordinates": points, "mesh/cells": cells, "mesh/body": body_of}
-            names = [*self.names, *self.nodal]
-            self._file = StepFile(self.path.with_suffix(".h5"), fixed, names, after=after, apart=not debug)
-            if not after:
-                self._write_xdmf()
-
-        agreed(system.comm, make, asleep=False)
-
-    def write(self, load: float) -> None:
-        """Add the last accepted state as a step, reached at ``load``. Collective. Raises `WriteError`."""
-        system = self.order.system
-        u = system.equilibrium.displacement()
-        values = system.bulk.cell_fields(u)
-        values["contact_state"], values["contact_pressure"] = self._contact_on_cells()
-        arrays = {name: self.order.cells(values[name]) for name in self.names}
-        on_nodes = {"displacement": u, "residual": system.equilibrium.residual()}
-        nodal = {name: self.order.collect(on_nodes[name]) for name in self.nodal}
-
-        def write() -> None:
-            vectors = {k: np.pad(self._nodes(v), ((0, 0), (0, 1))) for k, v in nodal.items()}
-            self._file.write(load, arrays | vectors)
-            self._write_xdmf()
-
-        agreed(system.comm, write, asleep=False)
-
-    def _contact_on_cells(self) -> tuple[Array, Array]:
-        """Share of each cell's contact facet in contact, and the mean pressure on it; zero elsewhere."""
-        share, pressure = np.zeros(self.order.n_cells), np.zeros(self.order.n_cells)
-        contact = self.order.system.contact
-        for pair in contact.pairs if contact else ():
-            side = pair.surface
-            w = side.weight / side.weight.sum(axis=1, keepdims=True)
-            share[side.cells] = (w * (pair.pressure > 0)).sum(axis=1)
-            pressure[side.cells] = (w * pair.pressure).sum(axis=1)
-        return share, pressure
-
-    def _write_xdmf(self) -> None:
+    def write(self, load: float, fields: dict[str, Array]) -> None:
+        """Add a step, reached at ``load``, with what `collect_fields` returned. Raises `OSError`."""
+        displacement = np.pad(self._nodes(fields["displacement"]), ((0, 0), (0, 1)))
+        self._file.write(load, fields | {"displacement": displacement})
+        of_cells = [name for name in fields if name != "displacement"]
         loads = enumerate(self._file.loads, start=1)
-        grids = [self._grid(k, float(k if self._numbered else load)) for k, load in loads]
-        text = (
-            '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
-            '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
-            + "".join(grids)
-            + "</Grid>\n</Domain>\n</Xdmf>\n"
-        )
-        replace_file(self.path, text)
+        grids = [self._grid(k, float(k if self._numbered else load), of_cells) for k, load in loads]
+        head = '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
+        collection = '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
+        replace_file(self.path, head + collection + "".join(grids) + "</Grid>\n</Domain>\n</Xdmf>\n")
 
-    def _grid(self, step: int, time: float) -> str:
-        file, nodes, cells = self._file, f"{self._n_nodes} 3", f"{self._n_cells}"
-        nodal = "".join(_attribute(n, "Vector", "Node", _data(nodes, file.place(n, step))) for n in self.nodal)
-        cell = "".join(_attribute(n, "Scalar", "Cell", _data(cells, file.place(n, step))) for n in self.names)
-        return (
-            f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>\n'
-            f'<Topology TopologyType="Triangle_6" NumberOfElements="{cells}">'
-            f"{_data(f'{cells} 6', file.place('mesh/cells'), 'Int')}</Topology>\n"
-            f'<Geometry GeometryType="XYZ">{_data(nodes, file.place("mesh/coordinates"))}</Geometry>\n'
-            + nodal
-            + cell
-            + _attribute("body", "Scalar", "Cell", _data(cells, file.place("mesh/body"), "Char", 1))
-            + "</Grid>\n"
-        )
+    def _grid(self, step: int, time: float, of_cells: list[str]) -> str:
+        place, (n_nodes, n_cells) = self._file.place, self._sizes
+        cells = _data(f"{n_cells} 6", place("mesh/cells"), "Int")
+        lines = [
+            f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>',
+            f'<Topology TopologyType="Triangle_6" NumberOfElements="{n_cells}">{cells}</Topology>',
+            f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", place("mesh/coordinates"))}</Geometry>',
+            _attribute("displacement", "Vector", "Node", _data(f"{n_nodes} 3", place("displacement", step))),
+            *(_attribute(name, "Scalar", "Cell", _data(f"{n_cells}", place(name, step))) for name in of_cells),
+            _attribute("body", "Scalar", "Cell", _data(f"{n_cells}", place("mesh/body"), "Char", 1)),
+        ]
+        return "\n".join([*lines, "</Grid>\n"])
 
 
 def _attribute(name: str, rank: str, centre: str, data: str) -> str:
-    return f'<Attribute Name="{name}" AttributeType="{rank}" Center="{centre}">{data}</Attribute>\n'
+    return f'<Attribute Name="{name}" AttributeType="{rank}" Center="{centre}">{data}</Attribute>'
 
 
-def _data(dimensions: str, place: str, kind: str = "Float", precision: int = 8) -> str:
-    return (
-        f'<DataItem Dimensions="{dimensions}" NumberType="{kind}" Precision="{precision}" Format="HDF">'
-        f"{place}</DataItem>"
-    )
+def _data(shape: str, place: str, kind: str = "Float", precision: int = 8) -> str:
+    attributes = f'Dimensions="{shape}" NumberType="{kind}" Precision="{precision}" Format="HDF"'
+    return f"<DataItem {attributes}>{place}</DataItem>"
 
 
 class SecondOrder:
@@ -130,19 +94,13 @@ class SecondOrder:
     """
 
     def __init__(self, nodes_of_cell: np.ndarray, degree: int) -> None:
-        vertices, index = np.unique(nodes_of_cell[:, :3], return_inverse=True)
-        corners = index.reshape(-1, 3)
-        along = degree - 1
-        edges = np.concatenate(
-            [
-                np.column_stack([nodes_of_cell[:, list(ends)], nodes_of_cell[:, 3 + k * along : 3 + (k + 1) * along]])
-                for k, ends in enumerate(_EDGES)
-            ]
-        )
+        self._vertices, index = np.unique(nodes_of_cell[:, :3], return_inverse=True)
+        inner = np.split(nodes_of_cell[:, 3 : 3 * degree], 3, axis=1)  # nodes within the edges
+        ends = [nodes_of_cell[:, edge] for edge in _EDGES]
+        edges = np.concatenate([np.hstack(pair) for pair in zip(ends, inner, strict=True)])
         first, of_edge = distinct_edges(edges[:, :2])
-        middles = len(vertices) + of_edge.reshape(3, -1).T
-        self.cells = np.concatenate([corners, middles], axis=1)
-        self._vertices, self._edges = vertices, edges[first]
+        self._edges = edges[first]
+        self.cells = np.hstack([index.reshape(-1, 3), len(self._vertices) + of_edge.reshape(3, -1).T])
         weights = lagrange(degree) @ 0.5 ** np.arange(degree + 1)  # of equispaced nodes, at the middle
         self._weights = weights[[0, degree, *range(1, degree)]]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 from collections.abc import Iterator
@@ -13,7 +14,6 @@ from archord.scene.errors import InputError
 
 FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
 APART = "fields"  # the folder of the files that fields.h5 has links to
-DEBUG = ("debug.xdmf", "debug.h5")
 CHECKPOINT = "checkpoint.h5"
 # drawn later, from a run's files
 PICTURES = ("picture.png", "force.png", "pressure.png", "field.png", "iterations.png")
@@ -21,7 +21,7 @@ PICTURES = ("picture.png", "force.png", "pressure.png", "field.png", "iterations
 
 def clear(folder: Path) -> None:
     """Remove an old run's files, and what a kill left half done of them. Raises `OSError`."""
-    for name in (CHECKPOINT, *FILES, *DEBUG, *PICTURES):
+    for name in (CHECKPOINT, *FILES, *PICTURES):
         (folder / name).unlink(missing_ok=True)
         new_name(folder / name).unlink(missing_ok=True)
     for file in (folder / APART).glob("[0-9]*.h5*"):
@@ -35,12 +35,11 @@ def occupied(folder: Path) -> Iterator[None]:
     """Keep other processes from writing to ``folder``; a kill ends that, too. Raises `InputError` if one does."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(f"{folder}: another archord is solving into it.") from None
-        except OSError:  # a file system without locks
-            pass
+        with suppress(OSError):  # a file system without locks
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InputError(f"{folder}: another archord is solving into it.") from None
         yield
     finally:
         os.close(descriptor)
@@ -50,17 +49,15 @@ def claim_folder(folder: Path, force: bool) -> None:
     """Make ``folder`` ready for a run. Raises `InputError` if it cannot be, or holds something already without
     ``force``."""
     try:
-        if folder.exists() and not folder.is_dir():
-            raise InputError(f"{folder}: is a file, not a run folder.")
-        if folder.exists() and any(folder.iterdir()) and not force:
-            raise InputError(
-                f"{folder}: is not empty; choose another folder with -o, or overwrite a run in it with --force."
-            )
         folder.mkdir(parents=True, exist_ok=True)
+        empty = not any(folder.iterdir())
         if not os.access(folder, os.W_OK):
-            raise InputError(f"{folder}: cannot be used as run folder: Permission denied.")
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
         raise InputError(f"{folder}: cannot be used as run folder: {error.strerror}.") from None
+    if not (empty or force):
+        said = "is not empty; choose another folder with -o, or overwrite a run in it with --force"
+        raise InputError(f"{folder}: {said}.")
 
 
 def is_sweep(folder: str | Path) -> bool:

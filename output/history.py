@@ -18,28 +18,30 @@ if TYPE_CHECKING:
 def _columns(scene: Scene) -> list[tuple[str, str, float]]:
     """Heading, attribute of `Measures` and divisor of every column."""
     units, R, dR, E = scene.units, scene.joint.radius, scene.joint.dR, scene.E_star
+    energy = "E* R2", E * R * R
     table: list[tuple[str, str, str, float]] = [
-        # name, unit, dimensionless form, its divisor
-        ("delta", units.length, "delta/dR", dR),
-        ("P", units.force, "P/(E* R)", E * R),
-        ("p0", units.stress, "p0/E*", E),
+        # attribute, unit, what makes it dimensionless, its value
+        ("step", "", "", 1.0),
+        ("delta", units.length, "dR", dR),
+        ("P", units.force, "E* R", E * R),
+        ("p0", units.stress, "E*", E),
         ("eps", "rad", "", 1.0),
-        ("contact_area", units.length, "contact_area/R", R),
+        ("contact_area", units.length, "R", R),
         ("peeq_max", "", "", 1.0),
-        ("peeq_integral", f"{units.length}2", "peeq_integral/R2", R * R),
-        ("elastic_energy", units.energy, "elastic_energy/(E* R2)", E * R * R),
-        ("plastic_dissipation", units.energy, "plastic_dissipation/(E* R2)", E * R * R),
-        ("work", units.energy, "work/(E* R2)", E * R * R),
+        ("peeq_integral", f"{units.length}2", "R2", R * R),
+        ("elastic_energy", units.energy, *energy),
+        ("plastic_dissipation", units.energy, *energy),
+        ("work", units.energy, *energy),
         ("force_balance", "", "", 1.0),
         ("iterations", "", "", 1.0),
         ("cutbacks", "", "", 1.0),
         ("seconds", "s", "", 1.0),
     ]
-    columns = [("step", "step", 1.0)]
-    for name, unit, dimensionless, divisor in table:
+    columns = []
+    for name, unit, scale, divisor in table:
         columns.append((f"{name} [{unit}]" if unit else name, name, 1.0))
-        if dimensionless:
-            columns.append((dimensionless, name, divisor))
+        if scale:
+            columns.append((f"{name}/({scale})" if " " in scale else f"{name}/{scale}", name, divisor))
     return columns
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from time import sleep
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from mpi4py import MPI
 
@@ -22,17 +22,18 @@ def agreed(comm: MPI.Comm, function: Callable[[], Result], *, asleep: bool = Tru
     meanwhile, which leaves their cores to rank 0, unless that is soon done. ``function`` must not call or import
     anything collective; importing petsc4py is.
     """
-    answer: list = [None, None]
+    result: Any = None
+    fault: Exception | None = None
     if comm.rank == 0:
         try:
-            answer[0] = function()
+            result = function()
         except InputError as error:
-            answer[1] = error
+            fault = error
         except OSError as error:
-            answer[1] = WriteError(f"{error.filename} cannot be written: {error.strerror or error}")
+            fault = WriteError(f"{error.filename} cannot be written: {error.strerror or error}")
     if asleep and comm.size > 1:
         arrived_before(comm)
-    result, fault = comm.bcast(answer)
+    result, fault = comm.bcast((result, fault))
     if fault is not None:
         raise fault
     return result

@@ -15,11 +15,12 @@ from archord.output.checkpoint import Checkpoint
 from archord.output.folder import CHECKPOINT
 from archord.presets.measures import Measures
 from archord.scene.errors import InputError
-from archord.scene.file import load_scene, parse_scene, resolved
+from archord.scene.file import load_scene, parse_scene, scene_keys
 from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
 
-_MAY_DIFFER = ("stepping.", "analysis.max_iterations")
+_TARGETS = ("load.displacement", "load.relative_force", "load.force", "load.steps")
+_MAY_DIFFER = ("stepping.", "analysis.max_iterations", *_TARGETS)
 _SAME = 1e-9  # relative difference up to which two targets are one
 
 
@@ -45,86 +46,36 @@ class Plan:
     finished: bool = False
 
 
-def plan_restart(folder: Path, scene: Scene | None = None) -> Plan:
-    """How to continue the interrupted run in ``folder`` with ``scene``, by default the run's own.
+def plan_restart(folder: Path, scene: Scene | None = None, *, extend: bool = False) -> Plan:
+    """How to continue the run in ``folder`` with ``scene``, by default the run's own; to ``extend`` it, that must go
+    further than the run did.
 
-    Raises `InputError` if the scene is another one than the run's or its files do not allow it.
+    Raises `InputError` if the accepted steps are not the first ones of the scene, or the run's files do not allow it.
     """
-    if scene is not None and not (folder / "scene.toml").exists() and not (folder / CHECKPOINT).exists():
-        return Plan(scene, None, f"{folder} holds no run yet: starting from the beginning")
-    own = load_scene(folder / "scene.toml")
-    scene = own if scene is None else scene
-    _same_but_for(folder, own, scene, ())
-    if not (folder / CHECKPOINT).exists():
+    scene = load_scene(folder / "scene.toml") if scene is None else scene
+    if not extend and not (folder / CHECKPOINT).exists():
         return Plan(scene, None, f"{folder} holds no accepted step: starting from the beginning")
     start = _start(folder, scene)
     step, total = start.checkpoint.step, len(scene.targets)
+    if extend and step == total:
+        raise InputError(f"{folder}: ends at {scene.targets[-1]:g} already; load.{scene.load.name} goes no further.")
     if step == total and start.report["status"] == "done":
         return Plan(scene, None, f"the run in {folder} is finished: nothing to do", finished=True)
-    return Plan(scene, start, f"continuing {folder} after step {step} of {total}")
-
-
-def plan_extension(folder: Path, scene: Scene) -> Plan:
-    """How to continue the finished run in ``folder`` to the end of the path of ``scene``.
-
-    That path begins with the run's own, or both only grow; then its targets beyond the run's end are added. Raises
-    `InputError` if neither holds, another key differs, or the run is not finished.
-    """
-    if not (folder / "scene.toml").exists():
-        raise InputError(f"{folder}: is not a run folder: scene.toml is missing.")
-    own = load_scene(folder / "scene.toml")
-    _same_but_for(folder, own, scene, ("load.displacement", "load.relative_force", "load.force", "load.steps"))
-    if own.force_controlled != scene.force_controlled:
-        raise InputError(f"{folder}: was loaded by load.{own.load.name}; load.{scene.load.name} cannot extend it.")
-    done, wanted = np.array(own.targets), np.array(scene.targets)
-    scale = np.abs(done).max()
-    if len(wanted) >= len(done) and np.allclose(wanted[: len(done)], done, rtol=0, atol=_SAME * scale):
-        added = wanted[len(done) :]
-    elif own.monotonic and scene.monotonic:
-        added = wanted[wanted > done[-1] + _SAME * scale]
-    else:
-        raise InputError(
-            f"{folder}: its path does not begin the new one; unless both only grow, load.{scene.load.name} must start "
-            "with the targets and steps of the run."
-        )
-    if not len(added):
-        raise InputError(f"{folder}: ends at {own.targets[-1]:g} already; load.{scene.load.name} goes no further.")
-    if not (folder / CHECKPOINT).exists():
-        raise InputError(f"{folder / CHECKPOINT}: is missing, so that the run cannot be continued.")
-    longer = _extended(own, scene, added)
-    start = _start(folder, longer)
-    step, total = start.checkpoint.step, len(own.targets)
-    if start.report["status"] != "done" or step != total:
-        raise InputError(f"{folder}: is not finished ({step} of {total} steps); finish it with --restart first.")
-    return Plan(longer, start, f"extending {folder} from step {step} to step {len(longer.targets)}")
-
-
-def _extended(own: Scene, scene: Scene, added: np.ndarray) -> Scene:
-    """``scene`` with the path of ``own`` and, behind it, the targets ``added``, evenly spaced ones in one leg."""
-    name = own.load.name
-    begin, legs, steps = own.targets[-1], list(own.load.legs), list(own.load.leg_steps)
-    spacing = np.diff([begin, *added])
-    n_own = len(legs)
-    for end, width, before in zip(added, spacing, [np.nan, *spacing], strict=False):
-        leg = float(f"{end / own.load_unit:.15g}")
-        if len(legs) > n_own and abs(width - before) <= _SAME * abs(width):
-            legs[-1], steps[-1] = leg, steps[-1] + 1
-        else:
-            legs.append(leg)
-            steps.append(1)
-    data = tomllib.loads(resolved(scene))
-    load = own.load.model_dump(exclude_none=True)
-    return parse_scene(data | {"load": load | {name: legs, "steps": steps}}, "the extended scene")
+    return Plan(scene, start, f"{'extending' if extend else 'continuing'} {folder} after step {step} of {total}")
 
 
 def _start(folder: Path, scene: Scene) -> Start:
-    """Read and compare what the run left."""
-    found = checkpoints.read(folder / CHECKPOINT)
-    before = parse_scene(tomllib.loads(found.scene), str(folder / CHECKPOINT))
-    _same_but_for(folder, before, scene, ("load.",))
-    n = found.step
-    if not np.allclose(before.targets[:n], scene.targets[:n], rtol=_SAME, atol=0) or len(scene.targets) < n:
-        raise InputError(f"{folder / CHECKPOINT}: was reached on another path than that of the scene.")
+    """Read what the run left. Raises `InputError` if that is not the first steps of ``scene``."""
+    path = folder / CHECKPOINT
+    checkpoint = checkpoints.read(path)
+    before = parse_scene(tomllib.loads(checkpoint.scene), str(path))
+    _same_but_for_the_load(folder, before, scene)
+    n = checkpoint.step
+    if len(scene.targets) < n or not _same(before.targets[:n], scene.targets[:n]):
+        raise InputError(
+            f"{path}: its {n} steps are not the first ones of the scene's path; load.{scene.load.name} and load.steps "
+            f"must begin as those of the run, {before.load.legs} and {before.load.leg_steps}."
+        )
     path = folder / "run.json"
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
@@ -132,31 +83,25 @@ def _start(folder: Path, scene: Scene) -> Start:
         done = [Measures(**{name: step[name] for name in names}) for step in report["steps"][: n - 1]]
         if len(done) < n - 1 or not {"status", "started", "command", "warnings"} <= report.keys():
             raise KeyError("steps")
-    except FileNotFoundError:
-        raise InputError(f"{path}: is missing, so that the run cannot be continued.") from None
     except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(f"{path}: does not hold the {n - 1} steps before the checkpoint's.") from None
-    return Start(found, report, done)
+        raise InputError(f"{path}: is missing or lacks some of the {n - 1} steps before the checkpoint's.") from None
+    return Start(checkpoint, report, done)
 
 
-def _same_but_for(folder: Path, own: Scene, scene: Scene, free: tuple[str, ...]) -> None:
+def _same(done: list[float], wanted: list[float]) -> bool:
+    """Whether both are the same targets."""
+    return np.allclose(done, wanted, rtol=0, atol=_SAME * np.abs(done).max())
+
+
+def _same_but_for_the_load(folder: Path, own: Scene, scene: Scene) -> None:
     """Raise `InputError` naming a key that differs between the run's ``own`` scene and ``scene``, unless it may."""
-    a, b = (_keys(s) for s in (own, scene))
+    if own.force_controlled != scene.force_controlled:
+        raise InputError(f"{folder}: was loaded by load.{own.load.name}; load.{scene.load.name} cannot continue it.")
+    a, b = scene_keys(own), scene_keys(scene)
     for key in sorted({*a, *b}):
-        if a.get(key) != b.get(key) and not key.startswith((*_MAY_DIFFER, *free)):
-            there, here = (toml_value(v[key]) if key in v else "absent" for v in (a, b))
+        if a.get(key) != b.get(key) and not key.startswith(_MAY_DIFFER):
+            there, here = (toml_value(keys[key]) if key in keys else "absent" for keys in (a, b))
             raise InputError(
-                f"{folder}: was solved with {key} = {there}, the scene says {here}; only [stepping] and "
-                f"analysis.max_iterations may change{' besides the load' if free else ''}."
+                f"{folder}: was solved with {key} = {there}, the scene says {here}; only [stepping], "
+                "analysis.max_iterations and the load's further targets may change."
             )
-
-
-def _keys(scene: Scene) -> dict[str, Any]:
-    """Every key of the resolved scene by its dotted name."""
-    found: dict[str, Any] = {}
-    for section, keys in tomllib.loads(resolved(scene)).items():
-        if isinstance(keys, dict):
-            found |= {f"{section}.{name}": value for name, value in keys.items()}
-        else:
-            found[section] = keys
-    return found

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -14,17 +13,18 @@ from mpi4py import MPI
 
 from archord.output.checkpoint import RunState, halt, resume
 from archord.output.checkpoint import write as write_checkpoint
-from archord.output.contact import ContactWriter
-from archord.output.disk import WriteError, naming, replace_file
+from archord.output.contact import FIXED, PER_STEP, contact_arrays
+from archord.output.disk import WriteError, replace_file
 from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import History
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
 from archord.output.stale_jit import without_stale_forms
+from archord.output.step_file import StepFile
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
-from archord.presets.joint_report import UNSEEN, step_warnings
+from archord.presets.joint_report import APART, UNSEEN, step_warnings
 from archord.presets.measures import Measures, Work, arc_profiles, measure
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
@@ -63,9 +63,7 @@ def solve_scene(
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
     start: Start | None = None,
-    debug: bool = False,
     timer: Timer | None = None,
-    begun: float | None = None,
     interrupt: Interrupt | None = None,
     on_start: Callable[[Joint], None] = lambda joint: None,
     on_step: Callable[[Measures], None] = lambda measures: None,
@@ -74,37 +72,32 @@ def solve_scene(
     """Solve ``scene`` and write everything to the existing ``folder`` (see `folder.claim_folder`). Collective.
 
     ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``, ``on_step`` and
-    ``on_attempt(load, Newton iterations)`` report progress on every rank. ``begun`` is the ``perf_counter`` from which
-    the seconds count. ``debug`` writes the fields of a step that cannot be solved to debug.xdmf. A step that cannot be
-    solved, or a file that cannot be written, ends the run with status "stopped", Ctrl-C, SIGTERM and SIGHUP with
-    "interrupted"; what was accepted before stays. ``interrupt``, if given, is one that the caller heeds, too. Raises
-    `InputError` if another process solves into ``folder``, what is there cannot be continued, or the scene leaves the
-    mesh to `studies.accuracy.solve_to_accuracy`.
+    ``on_attempt(load, Newton iterations)`` report progress on every rank. ``timer`` has the seconds spent before. A
+    step that cannot be solved, or a file that cannot be written, ends the run with status "stopped", Ctrl-C, SIGTERM
+    and SIGHUP with "interrupted"; what was accepted before stays. ``interrupt``, if given, is one that the caller
+    heeds, too. Raises `InputError` if another process solves into ``folder``, what is there cannot be continued, or the
+    scene leaves the mesh to `studies.accuracy.solve_to_accuracy`.
     """
-    begun = perf_counter() if begun is None else begun
+    timer = timer or Timer()
+    begun = perf_counter() - sum(timer.seconds.values())
     with ExitStack() as stack:
         agreed(comm, lambda: bool(stack.enter_context(occupied(folder))), asleep=False)
         joint = without_stale_forms(lambda: Joint(scene, comm, timer=timer))
         on_start(joint)
-        output = _Output(folder, joint, begun)
+        output = _Output(folder, joint, begun, start)
         status, message, failed, received = "done", "", None, 0
         try:
             with nullcontext(interrupt) if interrupt else Interrupt() as joint.equilibrium.interrupt:
-                position, work = output.begin(start)
+                position, work = output.begin()
                 # what a coarse mesh went through before a halt is not kept
                 coarse = coarse_start(joint) if position is None else None
-
-                def target_done(step: Step, position: Position) -> None:
-                    on_step(output.add(step, position, work))
-
                 march(
                     joint.load_path(position, coarse),
                     scene.targets,
                     rules=StepRules(**scene.stepping.model_dump()),
                     substep_done=lambda load: work.add(joint.delta(), joint.driving_force()),
-                    target_done=target_done,
+                    target_done=lambda step, position: on_step(output.add(step, position, work)),
                     attempted=on_attempt,
-                    gave_up=output.debug if debug else lambda load: None,
                 )
         except StepFailure as failure:
             status, message, failed = "stopped", str(failure), failure.attempt
@@ -113,13 +106,12 @@ def solve_scene(
         except Interrupted as interrupted:
             status, message = "interrupted", f"{interrupted} after step {len(output.steps)}"
             received = interrupted.number
-        # pressed together, but no contact point ever noticed
-        pressed, noticed = any(m.delta > 0 for m in output.steps), any(m.contact_area for m in output.steps)
-        unseen = status == "done" and pressed and not noticed
+        apart = status == "done" and not any(m.contact_area for m in output.steps)
+        unseen = apart and any(m.delta > 0 for m in output.steps)  # pressed together, but no contact point noticed
         if unseen:
             status, message = "stopped", UNSEEN
         try:
-            warnings = output.finish(status, message, failed)
+            warnings = output.finish(status, message, [APART] if apart and not unseen else [], failed)
         except WriteError as error:
             status, message, warnings = "stopped", message if status == "stopped" else str(error), []
         return Outcome(folder, status, message, output.steps, warnings, received, unseen)
@@ -131,52 +123,37 @@ class _Output:
     A step counts once the checkpoint has it: the other files follow, and a run that goes on writes what they lack.
     """
 
-    def __init__(self, folder: Path, joint: Joint, begun: float) -> None:
-        self.folder, self.joint = folder, joint
-        self.steps: list[Measures] = []
-        self._begun = self._last = begun
-        self._report: Report | None = None  # of rank 0
-        self._on_root = partial(agreed, joint.comm, asleep=False)
-
-    def begin(self, start: Start | None) -> tuple[Position | None, Work]:
-        """Make the files, or open those of the run that goes on from ``start`` (known on rank 0) and give its state to
-        the joint. Collective."""
-        joint, comm = self.joint, self.joint.comm
+    def __init__(self, folder: Path, joint: Joint, begun: float, start: Start | None) -> None:
+        self.folder, self.joint, self._start, comm = folder, joint, start, joint.comm
+        self._scene, self._last = resolved(joint.scene), perf_counter()
+        self.steps: list[Measures] = comm.bcast(start.done if start else [])
         with joint.timer("output"):
             self._order = MeshOrder(joint)
-            self.steps = comm.bcast(start.done if start else [])
-            self._on_root(lambda: self._prepare(start))
-            self._fields: FieldWriter | None = None
-            if joint.scene.output.fields:
-                from archord.output.fields import FieldWriter
+            self._bodies = self._order.bodies()
+        self._fields: FieldWriter | None = None  # with the first step, on rank 0
+        self._contact: StepFile | None = None
+        if comm.rank == 0:
+            self._history = History(folder / "history.csv", joint.scene, self.steps)
+            self._report = Report(folder / "run.json", joint, begun, self.steps, start.report if start else {})
 
-                numbered = joint.scene.force_controlled or not joint.scene.monotonic
-                self._fields = FieldWriter(self.folder, self._order, after=len(self.steps), numbered=numbered)
-            self._on_root(self._write_scene)
-        self._last = perf_counter()
-        if not comm.bcast(start is not None):
-            self._on_root(self._write_tables)
+    def begin(self) -> tuple[Position | None, Work]:
+        """Make the files, or write the step that the run goes on from, and give its state to the joint. Collective."""
+        joint = self.joint
+        if not joint.comm.bcast(self._start is not None):
+            self._on_root(self._make)
             return None, Work()
         with joint.timer("checkpoint"):
-            at = resume(self._order, self.folder / CHECKPOINT, start.checkpoint if start else None)
+            at = resume(self._order, self.folder / CHECKPOINT, self._start.checkpoint if self._start else None)
         self._write(at.measures, at.step, arc_profiles(joint))
+        self._on_root(lambda: replace_file(self.folder / "scene.toml", self._scene))
         return at.position, at.work
 
-    def _prepare(self, start: Start | None) -> None:
-        if start is None:
-            with naming(self.folder):
-                clear(self.folder)
-            self._write_scene()
-        before = start.report if start else None
-        self._history = History(self.folder / "history.csv", self.joint.scene, self.steps)
-        self._report = Report(self.folder / "run.json", self.joint, self._begun, self.steps, before)
-        self._contact = ContactWriter(self.folder)
+    def _on_root(self, function: Callable[[], Any]) -> Any:
+        return agreed(self.joint.comm, function, asleep=False)
 
-    def _write_scene(self) -> None:
-        replace_file(self.folder / "scene.toml", resolved(self.joint.scene))
-
-    def _write_tables(self) -> None:
-        assert self._report is not None
+    def _make(self) -> None:
+        clear(self.folder)
+        replace_file(self.folder / "scene.toml", self._scene)
         self._history.write()
         self._report.write()
 
@@ -189,41 +166,38 @@ class _Output:
             largest = max((abs(m.P) for m in self.steps), default=0.0)
             m = measure(joint, len(self.steps) + 1, step, profiles, work, seconds, largest)
         with joint.timer("checkpoint"):
-            checkpoint = halt(self._order, resolved(joint.scene), RunState(m, step, position, work))
+            checkpoint = halt(self._order, self._scene, RunState(m, step, position, work))
             self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
         self._write(m, step, profiles)
         return m
 
     def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
         """Make ``m`` the last step of all files but the checkpoint. Collective."""
-        warnings = step_warnings(self.joint, profiles, m, step.residual)
-
-        def add() -> None:
-            assert self._report is not None
-            self._contact.write(m.step, m.delta, profiles)
-            self._history.add(m)
-            self._report.add(m, step, warnings)
-
+        scene, after = self.joint.scene, len(self.steps)
         with self.joint.timer("output"):
-            if self._fields is not None:
-                self._fields.write(m.delta)
-            self._note_memory()
-            self._on_root(add)
+            warnings = step_warnings(self.joint, profiles, m, step.residual)
+            if scene.output.fields:
+                from archord.output.fields import FieldWriter, collect_fields
+
+                fields = collect_fields(self._order)
+
+            def write() -> None:
+                if scene.output.fields:
+                    numbered = scene.force_controlled or not scene.monotonic
+                    if not self._fields:
+                        self._fields = FieldWriter(self.folder, self._order, self._bodies, after, numbered)
+                    self._fields.write(m.delta, fields)
+                if not self._contact:
+                    self._contact = StepFile(self.folder / "contact.h5", contact_arrays(profiles, FIXED), after)
+                self._contact.write(m.delta, contact_arrays(profiles, PER_STEP))
+                self._history.add(m)
+                self._report.add(m, step, warnings)
+
+            self._on_root(write)
         self.steps.append(m)
 
-    def _note_memory(self) -> None:
+    def finish(self, status: str, message: str, warnings: list[str], failed: Step | None) -> list[str]:
+        """Note how the run ended, with ``warnings`` beside those of the steps; returns all on rank 0. Collective."""
         memory = self.joint.comm.gather(peak_memory())
-        if self._report is not None:
-            self._report.peak_memory = memory or []
-
-    def debug(self, load: float) -> None:
-        """Write the state that the last solve left, without success at ``load``. Collective."""
-        from archord.output.fields import FieldWriter
-
-        FieldWriter(self.folder, self._order, debug=True).write(load)
-
-    def finish(self, status: str, message: str, failed: Step | None) -> list[str]:
-        """Note how the run ended; returns the warnings on rank 0. Collective."""
-        self._note_memory()
-        found = self._on_root(lambda: self._report.finish(status, message, failed) if self._report else [])
+        found = self._on_root(lambda: self._report.finish(status, message, warnings, memory, failed))
         return found if self.joint.comm.rank == 0 else []

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
 import platform
-import resource
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -28,13 +26,12 @@ from archord.solver.stepping import Step
 from archord.solver.timer import BEFORE_SOLVING
 
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")
-_KILOBYTES = 1 if sys.platform == "darwin" else 1024  # unit of ru_maxrss in bytes
 
 
 class Report:
-    """The content of run.json for ``joint``; ``begun`` is the ``perf_counter`` from which the seconds count.
+    """run.json of ``joint``; ``begun`` is the ``perf_counter`` from which the seconds count.
 
-    A run that goes on has the steps ``done`` behind it, and ``before`` is its run.json.
+    A run that goes on has the steps ``done`` behind it, and its run.json ``before``.
     """
 
     def __init__(
@@ -42,79 +39,74 @@ class Report:
         path: Path,
         joint: Joint,
         begun: float,
-        done: Sequence[Measures] = (),
-        before: dict[str, Any] | None = None,
+        done: Sequence[Measures],
+        before: dict[str, Any],
     ) -> None:
-        self.path, self.joint, self.begun = path, joint, begun
+        self.path, self.joint, self.begun, self._before = path, joint, begun, before
         self.measures = list(done)
-        self._residual = 0.0
-        self.peak_memory: list[int] = []  # bytes, per rank; whoever knows all ranks sets it
+        now, n, comm = datetime.now(UTC).isoformat(timespec="seconds"), len(done), joint.comm
+        restart = {"when": now, "after_step": n + 1, "ranks": comm.size, "command": sys.argv}
+        restarts = [*before.get("restarts", []), *([restart] if before else [])]
+        warnings = before.get("warnings", rough_arcs(joint))
         self.content: dict[str, Any] = {
             "status": "running",
             "message": "",
-            "started": datetime.now(UTC).isoformat(timespec="seconds"),
-            "command": sys.argv,
-            "versions": _versions(),
-            "ranks": joint.comm.size,
+            "started": before.get("started", now),
+            "command": before.get("command", sys.argv),
+            "versions": {
+                "archord": VERSION,
+                "dolfinx": dolfinx.__version__,
+                "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
+                "mpi": MPI.Get_library_version().split(",")[0].strip(),
+                "numpy": np.__version__,
+                "python": platform.python_version(),
+            },
+            "ranks": comm.size,
+            "peak_memory": [],
             "mesh": mesh_facts(joint),
             "model": model_facts(joint),
-            "tolerances": {
-                "newton": joint.problem.tolerance,
-                "gamma_factor": joint.scene.analysis.gamma_factor,
-            },
-            "linear_solver": {},
-            "restarts": [],
-            "warnings": rough_arcs(joint),
-            "steps": [],
-        }
-        self._before: dict[str, Any] = before or {}
-        if before is not None:
-            self._go_on(before, len(self.measures))
-
-    def _go_on(self, before: dict[str, Any], done: int) -> None:
-        """Take over what the run's earlier processes noted, and note this one."""
-        now, steps = self.content["started"], before["steps"][:done]
-        restart = {"when": now, "after_step": done + 1, "ranks": self.joint.comm.size, "command": sys.argv}
-        self._residual = max((r[-1][-1] or 0.0 for step in steps if (r := step["residuals"]) and r[-1]), default=0.0)
-        self.content |= {
-            "started": before["started"],
-            "command": before["command"],
-            "restarts": [*before.get("restarts", []), restart],
-            "warnings": [w for w in before["warnings"] if _step_of(w) <= done and w != APART],
-            "steps": steps,
+            "tolerances": {"newton": joint.problem.tolerance, "gamma_factor": joint.scene.analysis.gamma_factor},
+            "restarts": restarts,
+            # the step after those done is noted once more
+            "warnings": [w for w in warnings if not w.startswith(f"step {n + 1}:") and w != APART],
+            "steps": before.get("steps", [])[:n],
         }
 
     def add(self, m: Measures, step: Step, warnings: Sequence[str]) -> None:
-        """Note an accepted output step, and what to warn of at it."""
+        """Note an accepted output step, and what to warn of at it. Raises `OSError`."""
         self.measures.append(m)
-        if m.contact_area:
-            self._residual = max(self._residual, step.residual)
         self.content["warnings"] += [f"step {m.step}: {text}" for text in warnings]
-        self.content["steps"].append(
-            asdict(m)
-            | {"substeps": step.substeps, "coarse_iterations": step.coarse_iterations}
-            | {"factorisations": sum(a.factorisations for a in step.attempts)}
-            | {"evaluations": sum(a.evaluations for a in step.attempts)}
-            | {"residuals": [a.residuals for a in step.attempts]}
-        )
+        cost = {
+            "substeps": step.substeps,
+            "coarse_iterations": step.coarse_iterations,
+            "factorisations": sum(a.factorisations for a in step.attempts),
+            "evaluations": sum(a.evaluations for a in step.attempts),
+            "residuals": [a.residuals for a in step.attempts],
+        }
+        self.content["steps"].append(_finite(asdict(m) | cost))
         self.write()
 
-    def finish(self, status: str, message: str, failed: Step | None = None) -> list[str]:
-        """Note how the run ended, and the output step that ``failed``; returns all warnings."""
-        self.content |= {"status": status, "message": message}
-        if status == "done" and not any(m.contact_area for m in self.measures):
-            self.content["warnings"].append(APART)
+    def finish(
+        self, status: str, message: str, warnings: list[str], memory: list[int], failed: Step | None
+    ) -> list[str]:
+        """Note how the run ended, the ``memory`` of all ranks and the output step that ``failed``; returns all
+        warnings. Raises `OSError`."""
+        self.content |= {"status": status, "message": message, "peak_memory": memory}
+        self.content["warnings"] += warnings
         if failed is not None:
-            self.content["failed_step"] = asdict(failed)
+            self.content["failed_step"] = _finite(asdict(failed))
         self.write()
         return self.content["warnings"]
 
     def write(self) -> None:
         """Replace run.json in one move, so that a reader never sees half of it. Raises `OSError`."""
-        self.content |= {"totals": self._totals(), "seconds": self._seconds(), "error_estimates": self._errors()}
-        self.content["linear_solver"] = self.joint.equilibrium.choice.words()  # a matrix may decide otherwise later
-        self.content["peak_memory"] = self.peak_memory
-        replace_file(self.path, json.dumps(_finite(self.content), indent=1, allow_nan=False) + "\n")
+        content = self.content | {
+            "linear_solver": self.joint.equilibrium.choice.words(),  # a matrix may decide otherwise later
+            "totals": self._totals(),
+            "seconds": self._seconds(),
+            "error_estimates": self._errors(),
+        }
+        replace_file(self.path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
     def _totals(self) -> dict[str, int]:
         counts, before = self.joint.timer.counts, self._before.get("totals", {})
@@ -128,11 +120,11 @@ class Report:
 
     def _seconds(self) -> dict[str, float]:
         s = dict(self.joint.timer.seconds)
-        if "solve" in s:
-            s["linear solve"] = s.pop("solve") - sum(s.get(name, 0.0) for name in _INSIDE_SOLVE)
         before = s.pop(BEFORE_SOLVING, 0.0)
         s["setup"] -= before
-        s["linear solve"] = s.get("linear solve", 0.0) + before
+        s["linear solve"] = before
+        if "solve" in s:
+            s["linear solve"] += s.pop("solve") - sum(s.get(name, 0.0) for name in _INSIDE_SOLVE)
         s["total"] = perf_counter() - self.begun
         for name, value in self._before.get("seconds", {}).items():
             s[name] = s.get(name, 0.0) + value
@@ -141,45 +133,23 @@ class Report:
     def _errors(self) -> dict[str, float | None]:
         if not self.measures:
             return {}
+        touching = [step["residuals"] for step in self.content["steps"] if step["contact_area"]]
         return {
             "force_balance": max(m.force_balance for m in self.measures),
             "energy_balance": energy_balance(self.measures, press_fit=self.joint.scene.joint.dR < 0),
-            "newton_residual": self._residual,
+            "newton_residual": max((r[-1][-1] for r in touching if r and r[-1]), default=0.0),
         }
 
 
 def peak_memory() -> int:
     """The largest resident set of this process so far, in bytes.
 
-    Linux hands ``ru_maxrss`` down to the programs that a process starts; its own file of the process starts at zero.
+    `resource.getrusage` hands down that of the program that started this one; Linux' file of the process does not.
     """
-    try:
-        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
-        return 1024 * next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM:"))
-    except (OSError, StopIteration, ValueError):
-        return _KILOBYTES * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+    return 1024 * next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM:"))
 
 
-def _step_of(warning: str) -> int:
-    """The step that a warning is about; 0 if it is about the joint."""
-    return int(warning.removeprefix("step ").partition(":")[0]) if warning.startswith("step ") else 0
-
-
-def _finite(value: Any) -> Any:
+def _finite(value: dict[str, Any]) -> dict[str, Any]:
     """``value`` with null for numbers that are none, which JSON does not know (residuals of a solve that failed)."""
-    if isinstance(value, dict):
-        return {name: _finite(part) for name, part in value.items()}
-    if isinstance(value, list):
-        return [_finite(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _versions() -> dict[str, str]:
-    return {
-        "archord": VERSION,
-        "dolfinx": dolfinx.__version__,
-        "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
-        "mpi": MPI.Get_library_version().split(",")[0].strip(),
-        "numpy": np.__version__,
-        "python": platform.python_version(),
-    }
+    return json.loads(json.dumps(value), parse_constant=lambda name: None)

@@ -7,6 +7,7 @@ with their square. A reader opens one file and finds ``name/0001`` and so on, wh
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
@@ -28,36 +29,27 @@ class StepFile:
     """``path`` with the arrays ``fixed``, ``name/0001`` and so on for each step, ``accepted``, the number of steps, and
     ``load``, what each was reached at.
 
-    ``apart`` puts the arrays into files of their own, NAME/0000.h5 for the fixed ones. The file is made, or goes on
-    ``after`` some steps that are there, as this version or version 0.1 wrote them, with arrays of these ``names``.
-    Raises `OSError`, and `InputError` if a file that should go on is missing, damaged or does not hold these steps.
+    ``apart`` puts the arrays into files of their own, NAME/0000.h5 for the fixed ones. The file appears with the next
+    step, the first one or that ``after`` some steps that are there, as this version or version 0.1 wrote them. Raises
+    `OSError`, and `InputError` if a file that should go on is missing, damaged or does not hold these steps.
     """
 
-    def __init__(self, path: Path, fixed: Arrays, names: list[str], *, after: int = 0, apart: bool = False) -> None:
+    def __init__(self, path: Path, fixed: Arrays, after: int = 0, *, apart: bool = False) -> None:
         self.path, self._apart = path, apart
         self.loads: list[float] = []
-        earlier = list(self._earlier(fixed, names, after)) if after else []
-        self._file = _in_memory()
+        earlier = self._read(fixed, after) if after else []
+        self._file = hdf5_in_memory()
         self._file["accepted"] = 0
         self._file.create_dataset("load", (0,), "f8", maxshape=(None,), chunks=(64,))
         self._add(0, fixed)
         for load, arrays in earlier:
             self._add_step(load, arrays)
-        self._save()
 
     def write(self, load: float, arrays: Arrays) -> None:
-        """Add a step, reached at ``load``. Raises `OSError`; the file then is what it was."""
-        step = len(self.loads) + 1
-        try:
-            self._add_step(load, arrays)
-            self._save()
-        except OSError:
-            for name in arrays:
-                if _dataset(name, step) in self._file:
-                    del self._file[_dataset(name, step)]
-            del self.loads[step - 1 :]
-            self._count()
-            raise
+        """Add a step, reached at ``load``. Raises `OSError`: then the file is what it was, and this object of no
+        further use."""
+        self._add_step(load, arrays)
+        replace_file(self.path, image(self._file))
 
     def place(self, name: str, step: int = 0) -> str:
         """Where XDMF finds the array ``name`` of ``step``, by default a fixed one."""
@@ -65,68 +57,61 @@ class StepFile:
             return f"{self.path.stem}/{step_name(step)}.h5:/{name}"
         return f"{self.path.name}:/{_dataset(name, step)}"
 
-    def _save(self) -> None:
-        replace_file(self.path, _image(self._file))
-
     def _add_step(self, load: float, arrays: Arrays) -> None:
-        self._add(len(self.loads) + 1, arrays)
         self.loads.append(load)
-        self._count()
-
-    def _count(self) -> None:
+        self._add(len(self.loads), arrays)
         self._file["accepted"][()] = len(self.loads)
         self._file["load"].resize((len(self.loads),))
-        self._file["load"][-1:] = self.loads[-1:]
+        self._file["load"][-1:] = load
 
     def _add(self, step: int, arrays: Arrays) -> None:
         """The arrays of ``step``, 0 for the fixed ones."""
-        values = arrays
-        if self._apart:
-            beside = Path(self.path.stem) / f"{step_name(step)}.h5"
-            with _in_memory() as own:
-                for name, array in arrays.items():
-                    _put(own, name, array)
-                content = _image(own)
-            (self.path.parent / beside.parent).mkdir(exist_ok=True)
-            replace_file(self.path.parent / beside, content)
-            values = {name: h5py.ExternalLink(str(beside), name) for name in arrays}
-        for name, value in values.items():
-            _put(self._file, _dataset(name, step), value)
+        if not self._apart:
+            for name, array in arrays.items():
+                put(self._file, _dataset(name, step), array)
+            return
+        beside = f"{self.path.stem}/{step_name(step)}.h5"
+        with hdf5_in_memory() as own:
+            for name, array in arrays.items():
+                put(own, name, array)
+            content = image(own)
+        self.path.with_suffix("").mkdir(exist_ok=True)
+        replace_file(self.path.parent / beside, content)
+        for name in arrays:
+            self._file[_dataset(name, step)] = h5py.ExternalLink(beside, name)
 
-    def _earlier(self, fixed: Arrays, names: list[str], after: int) -> Iterator[tuple[float, Arrays]]:
-        """Load and arrays of the steps that are there."""
+    def _read(self, fixed: Arrays, after: int) -> list[tuple[float, Arrays]]:
+        """Load and arrays of the first steps, as many as ``after``."""
+        steps: dict[str, Arrays] = defaultdict(dict)
         try:
             with h5py.File(self.path) as file:
-                if file["accepted"][()] < after or any(file[name].shape != a.shape for name, a in fixed.items()):
-                    raise InputError(
-                        f"{self.path}: does not hold the first {after} steps of this run, so that it cannot be "
-                        "continued."
-                    )
-                for step in range(1, after + 1):
-                    yield float(file["load"][step - 1]), {name: file[_dataset(name, step)][()] for name in names}
-        except FileNotFoundError:
-            raise InputError(f"{self.path}: is missing, so that the run cannot be continued.") from None
+                there = int(file["accepted"][()]) >= after and all(file[k].shape == a.shape for k, a in fixed.items())
+                for name, array in all_arrays(file):
+                    steps[name.rpartition("/")[2]][name.rpartition("/")[0]] = array
+                loads = file["load"][:after].tolist()
         except (OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
-            raise InputError(f"{self.path}: is damaged, so that the run cannot be continued ({error}).") from None
+            said = f"is missing or damaged, so that the run cannot be continued ({error})"
+            raise InputError(f"{self.path}: {said}.") from None
+        if not there:
+            said = f"does not hold the first {after} steps of this run, so that it cannot be continued"
+            raise InputError(f"{self.path}: {said}.")
+        return [(load, steps[step_name(step)]) for step, load in enumerate(loads, start=1)]
 
 
-def _put(file: h5py.File, name: str, value: np.ndarray | h5py.ExternalLink) -> None:
-    """``file[name] = value``, in a third of its time."""
-    if isinstance(value, h5py.ExternalLink):
-        file.id.links.create_external(name.encode(), value.filename.encode(), value.path.encode(), _GROUPS)
-        return
-    array = np.ascontiguousarray(value)
+def put(file: h5py.File, name: str, values: np.ndarray) -> None:
+    """``file[name] = values``, in a third of its time."""
+    array = np.ascontiguousarray(values)
     kind, space = h5py.h5t.py_create(array.dtype), h5py.h5s.create_simple(array.shape)
-    dataset = h5py.h5d.create(file.id, None, kind, space)
+    dataset = h5py.h5d.create(file.id, name.encode(), kind, space, lcpl=_GROUPS)
     dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, array)
-    h5py.h5o.link(dataset, file.id, name.encode(), _GROUPS)
 
 
-def _in_memory() -> h5py.File:
+def hdf5_in_memory() -> h5py.File:
+    """A new file that never comes near a disk."""
     return h5py.File(f"in memory {next(_NUMBERS)}", "w", driver="core", backing_store=False, block_size=4096)
 
 
-def _image(file: h5py.File) -> bytes:
+def image(file: h5py.File) -> bytes:
     """What the open ``file`` is as bytes."""
     file.flush()
     return file.id.get_file_image()
@@ -134,7 +119,8 @@ def _image(file: h5py.File) -> bytes:
 
 def all_arrays(group: h5py.Group, prefix: str = "") -> Iterator[tuple[str, np.ndarray]]:
     """Every array of an open file by its name, also those that lie apart, which `h5py.Group.visit` leaves out."""
-    for name, item in group.items():
+    for name in group:
+        item = group[name]
         if isinstance(item, h5py.Dataset):
             yield prefix + name, item[()]
         else:

@@ -8,10 +8,8 @@ between their steps the others are interpolated by monotone cubics (Fritsch and 
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +17,7 @@ from archord.materials.material import Array
 from archord.postprocess.curve import RunCurve, gap_name
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
-from archord.scene.file import resolved
+from archord.scene.file import scene_keys
 from archord.scene.scene import Scene
 
 COMPARED = ("P", "p0", "eps")
@@ -110,17 +108,9 @@ def same_size(scenes: Sequence[Scene]) -> bool:
     return len(units) == 1 and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0)
 
 
-def _scene_keys(scene: Scene) -> dict[str, Any]:
-    """Every key of the resolved scene by its dotted name."""
-    found: dict[str, Any] = {}
-    for section, keys in tomllib.loads(resolved(scene)).items():
-        found |= {f"{section}.{k}": v for k, v in keys.items()} if isinstance(keys, dict) else {section: keys}
-    return found
-
-
 def differing_keys(scenes: Sequence[Scene]) -> dict[str, list[str]]:
     """Keys in which the ``scenes`` differ, and their values as TOML writes them; empty where a scene has none."""
-    tables = [_scene_keys(scene) for scene in scenes]
+    tables = [scene_keys(scene) for scene in scenes]
     names = list(dict.fromkeys(name for table in tables for name in table))
     rows = {name: [json.dumps(t[name], ensure_ascii=False) if name in t else "" for t in tables] for name in names}
     return {name: values for name, values in rows.items() if len(set(values)) > 1}

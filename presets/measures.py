@@ -40,11 +40,14 @@ class Measures:
     seconds: float
 
 
+@dataclass
 class Work:
-    """Work of the load: the trapezoidal rule over every accepted step."""
+    """``total`` work of the load: the trapezoidal rule over every accepted step, the last of them at ``delta`` under
+    ``force``."""
 
-    def __init__(self) -> None:
-        self.delta = self.force = self.total = 0.0
+    delta: float = 0.0
+    force: float = 0.0
+    total: float = 0.0
 
     def add(self, delta: float, force: float) -> None:
         """Add the step from the last ``delta`` to this one, where the load is ``force``."""

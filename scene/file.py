@@ -134,3 +134,11 @@ def resolved(scene: Scene) -> str:
     if scene.pin.rigid:
         data["pin"] = {"rigid": True}
     return tomli_w.dumps(data)
+
+
+def scene_keys(scene: Scene) -> dict[str, Any]:
+    """Every key of the resolved scene by its dotted name."""
+    found: dict[str, Any] = {}
+    for section, keys in tomllib.loads(resolved(scene)).items():
+        found |= {f"{section}.{k}": v for k, v in keys.items()} if isinstance(keys, dict) else {section: keys}
+    return found

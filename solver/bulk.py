@@ -241,8 +241,8 @@ class Bulk:
 
     def cell_fields(self, u: Array) -> dict[str, Array]:
         """Means over each cell of this rank ``(n_cells,)`` at ``u`` ``(n_nodes, 2)``: "von_mises", "mean_stress" and,
-        where a body can yield, "peeq" and "peeq_increment" since the last step accepted."""
-        names = ["von_mises", "mean_stress", *(["peeq", "peeq_increment"] if self.plastic else [])]
+        where a body can yield, "peeq"."""
+        names = ["von_mises", "mean_stress", *(["peeq"] if self.plastic else [])]
         fields = {name: np.zeros(self.V.mesh.topology.index_map(2).size_local) for name in names}
         X, w = bulk_quadrature(self.degree)
         for tag, cells in self.cells.items():
@@ -250,7 +250,7 @@ class Bulk:
             if tag in self._plastic:
                 data = self._plastic[tag]
                 weight, stress = data.weight, data.stress
-                values = {"peeq": np.asarray(data.points.peeq), "peeq_increment": np.asarray(data.points.increment)}
+                values = {"peeq": np.asarray(data.points.peeq)}
             else:
                 material, basis = self.materials[tag], cell_basis(self.V.mesh, self.degree, cells, X)
                 eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)

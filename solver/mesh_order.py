@@ -87,34 +87,29 @@ class MeshOrder:
         u[self._dof] = values[np.searchsorted(index, self._index)]
         return u
 
-    def collect_history(self) -> dict[str, Arrays]:
-        """History of the points that have one, on rank 0: by place, their number and every array of their state."""
+    def collect_history(self) -> Arrays:
+        """History of the points that have one, on rank 0: "history/PLACE/point", their numbers in rising order, and
+        "history/PLACE/NAME" for every array of their state. Collective."""
         mine = {}
         for place, (points, number) in self._points().items():
             used = _used(points)
-            mine[place] = {"point": number[used]} | {k: v[used] for k, v in _arrays(points.state).items()}
-        parts = self.system.comm.gather(mine)
-        if parts is None:
-            return {}
-        whole = {}
+            mine[place] = {name: values[used] for name, values in ({"point": number} | _arrays(points.state)).items()}
+        parts, whole = self.system.comm.gather(mine) or [], {}
         for place in sorted({place for part in parts for place in part}):
             found = [part[place] for part in parts if place in part]
-            arrays = {name: np.concatenate([f[name] for f in found]) for name in found[0]}
-            order = np.argsort(arrays["point"])
-            whole[place] = {name: values[order] for name, values in arrays.items()}
+            order = np.argsort(np.concatenate([arrays["point"] for arrays in found]))
+            for name in found[0]:
+                whole[f"history/{place}/{name}"] = np.concatenate([arrays[name] for arrays in found])[order]
         return whole
 
-    def spread_history(self, whole: dict[str, Arrays] | None) -> None:
+    def spread_history(self, whole: Arrays | None) -> None:
         """The inverse of `collect_history`: give every point its history. Collective."""
-        stored_at: dict[str, Arrays] = self.system.comm.bcast(whole)
+        stored: Arrays = self.system.comm.bcast(whole)
         for place, (points, number) in self._points().items():
-            stored = stored_at[place]
-            virgin = points.material.state(len(number))
-            at = np.searchsorted(stored["point"], number)
-            at[at == len(stored["point"])] = 0
-            here = stored["point"][at] == number if len(stored["point"]) else np.zeros(len(number), dtype=bool)
+            virgin, known = points.material.state(len(number)), stored[f"history/{place}/point"]
+            _, mine, theirs = np.intersect1d(number, known, assume_unique=True, return_indices=True)
             for name, values in _arrays(virgin).items():
-                values[here] = stored[name][at[here]]
+                values[mine] = stored[f"history/{place}/{name}"][theirs]
             points.state = points.trial = virgin
 
     def _points(self) -> dict[str, tuple[Points, np.ndarray]]:

@@ -73,14 +73,13 @@ def march(
     substep_done: Callable[[float], None] = lambda load: None,
     target_done: Callable[[Step, Position], None] = lambda step, position: None,
     attempted: Callable[[float, int], None] = lambda load, iterations: None,
-    gave_up: Callable[[float], None] = lambda load: None,
 ) -> None:
     """Follow ``path`` to the loads ``targets`` in turn and, where a step fails or ``rules`` ask for it, to loads in
     between.
 
     ``substep_done(load)`` follows every accepted step with its history still to be committed,
-    ``target_done(step, position)`` every output target, ``attempted(load, iterations)`` every solve, ``gave_up(load)``
-    the one after which nothing smaller is allowed, before it is taken back. Raises `StepFailure`.
+    ``target_done(step, position)`` every output target, ``attempted(load, iterations)`` every solve. Raises
+    `StepFailure`.
     """
     at, rules = path.at, rules or StepRules()
     at.size = at.size or rules.initial
@@ -105,11 +104,8 @@ def march(
                 path.commit()
                 continue
             record.cutbacks += 1
-            smallest = at.size <= rules.minimum
-            if smallest:
-                gave_up(load)
             path.take_back()
-            if smallest:
+            if at.size <= rules.minimum:
                 raise StepFailure(_why(result, path.solver.equilibrium.problem, load, at), record)
             at.size, just_cut = max(rules.minimum, rules.cutback * at.size), True
         at.targets_done = number + 1

@@ -18,7 +18,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from archord.output.disk import WriteError, naming, replace_file
+from archord.output.disk import WriteError, replace_file
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
@@ -232,8 +232,7 @@ class _Search:
 
     def _note(self, outcome: Outcome, accuracy: Accuracy) -> None:
         path = self.folder / "run.json"
-        with naming(path):
-            content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8"))
         content |= {"status": outcome.status, "message": outcome.message, "warnings": outcome.warnings}
         content["accuracy"] = asdict(accuracy)
         content["error_estimates"] |= {"mesh": accuracy.mesh_error, "steps": accuracy.step_error}

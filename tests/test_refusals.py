@@ -32,7 +32,7 @@ RUN, OTHER = "{coarse}", "{elastic}"
         (["fit", RUN, "--json", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be written: it belongs to "),
         (["fit", RUN, "--json", "x", "--python", "./x"], "--json, --python, --picture: must be different files."),
         (["fit", RUN, "--json", "/dev/full"], "/dev/full: cannot be written: No space left on device."),
-        (["reproduce", "fig2", "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: is a file, not a run folder."),
+        (["reproduce", "fig2", "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be used as run folder: File"),
         (["export-deck", SCENE, "-o", RUN], f"{RUN}: cannot be written: it is a folder."),
         (["export-deck", SCENE, "-o", "no/x.inp"], "no/x.inp: cannot be written: no is not a folder."),
         (["export-deck", SCENE, "--set", "block.nu=2"], "--set block.nu=2: block.nu must be"),

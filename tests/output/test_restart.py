@@ -12,7 +12,7 @@ from archord.benchmarks.persson import persson_joint
 from archord.output import checkpoint
 from archord.output.folder import CHECKPOINT, claim_folder, occupied
 from archord.output.history import read_history
-from archord.output.restart import plan_extension, plan_restart
+from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
@@ -72,10 +72,15 @@ def run(problem, folder, comm=MPI.COMM_SELF, *, crash: int = 0, copies=None):
         assert solve_scene(problem, folder, comm, on_step=copy).status == "done"
 
 
-def go_on(problem, folder, comm=MPI.COMM_SELF):
-    """Continue the run in ``folder``, planned on rank 0."""
-    plan = plan_restart(folder, problem) if comm.rank == 0 else None
-    outcome = solve_scene(problem, folder, comm, start=plan.start if plan else None)
+def go_on(problem, folder, comm=MPI.COMM_SELF, *, extend: bool = False, crash: int = 0):
+    """Continue the run in ``folder``, planned on rank 0, perhaps up to a crash."""
+    plan = plan_restart(folder, problem, extend=extend) if comm.rank == 0 else None
+    problem, start = (plan.scene, plan.start) if plan else (problem, None)
+    if crash:
+        with pytest.raises(Crashed):
+            solve_scene(problem, folder, comm, start=start, on_step=crash_after(crash))
+        return None
+    outcome = solve_scene(problem, folder, comm, start=start)
     assert outcome.status == "done"
     return outcome
 
@@ -122,9 +127,7 @@ def test_a_run_may_be_halted_after_every_step(tmp_path):
     run(problem, tmp_path / "whole")
     run(problem, tmp_path / "halted", crash=1)
     for step in (2, 3, 4):
-        plan = plan_restart(tmp_path / "halted")
-        with pytest.raises(Crashed):
-            solve_scene(plan.scene, tmp_path / "halted", MPI.COMM_SELF, start=plan.start, on_step=crash_after(step))
+        go_on(problem, tmp_path / "halted", crash=step)
     go_on(problem, tmp_path / "halted")
     same_run(tmp_path / "whole", tmp_path / "halted", 1e-12)
     report = json.loads((tmp_path / "halted" / "run.json").read_text())
@@ -159,48 +162,20 @@ def test_ranks_may_change(tmp_path_factory, comm, name, before, after, tolerance
         same_run(folder / "whole", folder / "halted", tolerance, 30 * tolerance)
 
 
-def test_an_extended_run_equals_the_long_one(tmp_path):
-    """Two targets more: the resolved scene gives the same numbers from scratch, as does the scene asked for."""
-    short, long = (scene(0.2, n, **PLASTIC, load={"displacement": 0.5 * n}) for n in (2, 4))
-    run(short, tmp_path / "run")
-    plan = plan_extension(tmp_path / "run", long)
-    assert solve_scene(plan.scene, tmp_path / "run", MPI.COMM_SELF, start=plan.start).status == "done"
-    run(load_scene(tmp_path / "run" / "scene.toml"), tmp_path / "again")
-    same_run(tmp_path / "again", tmp_path / "run", 1e-12)
+SHORT = scene(0.2, **PLASTIC, load={"displacement": 1.5, "steps": 3})
+LONGER = scene(0.2, **PLASTIC, load={"displacement": 3.0, "steps": 6})
+
+
+@pytest.mark.parametrize("long", [LONGER, CASES["unloading"][0]], ids=["on", "back"])
+@pytest.mark.parametrize("steps", [3, 2], ids=["finished", "halted"])
+def test_an_extended_run_equals_the_long_one(tmp_path, long, steps):
+    """Further loading or unloading added to a run, which may be killed there and then is restarted like any other."""
+    run(SHORT, tmp_path / "run", crash=steps if steps < 3 else 0)
+    go_on(long, tmp_path / "run", extend=True, crash=5)
+    assert (tmp_path / "run" / "scene.toml").read_text() == resolved(long)
+    go_on(None, tmp_path / "run")
     run(long, tmp_path / "long")
-    same_run(tmp_path / "long", tmp_path / "run", 1e-10)
-    load = tomllib.loads((tmp_path / "run" / "scene.toml").read_text())["load"]
-    assert (load["displacement"], load["steps"]) == ([1.0, 2.0], [2, 2])
-
-
-def test_a_path_is_extended_by_a_path(tmp_path):
-    """Unloading added to a run that grew; interrupted in the added part, it is restarted like any other."""
-    short = scene(0.2, **PLASTIC, load={"displacement": 1.5, "steps": 3})
-    run(short, tmp_path / "run")
-    plan = plan_extension(tmp_path / "run", CASES["unloading"][0])
-    assert plan.scene.targets == pytest.approx(CASES["unloading"][0].targets, rel=1e-14)
-    with pytest.raises(Crashed):
-        solve_scene(plan.scene, tmp_path / "run", MPI.COMM_SELF, start=plan.start, on_step=crash_after(5))
-    go_on(plan.scene, tmp_path / "run")
-    run(plan.scene, tmp_path / "whole")
-    same_run(tmp_path / "whole", tmp_path / "run", 1e-12)
-
-
-@pytest.mark.parametrize(
-    ("load", "legs", "steps"),
-    [
-        ({"displacement": 4.0, "steps": 8}, [2.0, 4.0], [4, 4]),
-        ({"displacement": 4.0, "steps": 10}, [2.0, 4.0], [4, 5]),
-        ({"displacement": 3.0, "steps": 2}, [2.0, 3.0], [4, 1]),
-        ({"displacement": [1.0, 2.5, 4.0], "steps": [1, 1, 2]}, [2.0, 2.5, 4.0], [4, 1, 2]),
-        ({"displacement_absolute": [0.01, 0.005], "steps": [4, 1]}, [2.0, 1.0], [4, 1]),
-    ],
-)
-def test_targets_beyond_the_end_are_added(finished, load, legs, steps):
-    """Those of a growing path beyond the old end, or what follows the old path; in the words of the old scene."""
-    extended = plan_extension(finished, loaded(load, element_size=0.25)).scene.load
-    assert extended.displacement == pytest.approx(legs, rel=1e-14)
-    assert extended.steps == steps
+    same_run(tmp_path / "long", tmp_path / "run", 1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -215,15 +190,16 @@ def finished(tmp_path_factory):
     ("load", "said"),
     [
         ({"displacement": 2.0, "steps": 4}, "ends at 0.01 already"),
-        ({"displacement": 1.0, "steps": 4}, "ends at 0.01 already"),
-        ({"displacement": [1.0, 0.5, 4.0], "steps": 1}, "its path does not begin the new one"),
-        ({"relative_force": 0.1}, "load.relative_force cannot extend it"),
+        ({"displacement": 1.0, "steps": 2}, "4 steps are not the first ones of the scene's path"),
+        ({"displacement": 4.0, "steps": 4}, "4 steps are not the first ones of the scene's path"),
+        ({"displacement": [1.0, 0.5, 4.0], "steps": 2}, "4 steps are not the first ones of the scene's path"),
+        ({"relative_force": 0.1}, "load.relative_force cannot continue it"),
     ],
 )
 def test_a_path_that_does_not_go_on_is_refused(finished, load, said):
-    """Shorter, the same, another one, another kind of load."""
+    """The same, a shorter one, other steps, another path, another kind of load."""
     with pytest.raises(InputError, match=said):
-        plan_extension(finished, loaded(load, element_size=0.25))
+        plan_restart(finished, loaded(load, element_size=0.25), extend=True)
 
 
 def test_a_finished_run_is_left_alone(finished):
@@ -249,11 +225,11 @@ def halted(crashed, tmp_path):
     return shutil.copytree(crashed, tmp_path / "run")
 
 
-def test_only_step_control_may_change(crashed, halted):
+def test_only_step_control_may_change(halted):
     """Another key is named with both values; [stepping] and max_iterations are free, and the run goes on with them."""
     folder = halted
     own = tomllib.loads(resolved(scene(0.25, 3)))
-    for section, key, value in (("block", "nu", 0.29), ("analysis", "plane", "stress"), ("load", "steps", 4)):
+    for section, key, value in (("block", "nu", 0.29), ("analysis", "plane", "stress"), ("load", "core_radius", 0.2)):
         other = parse_scene(own | {section: own[section] | {key: value}})
         with pytest.raises(InputError, match=rf"was solved with {section}\.{key} = .*, the scene says") as error:
             plan_restart(folder, other)
@@ -262,21 +238,18 @@ def test_only_step_control_may_change(crashed, halted):
     other = parse_scene(own | {"stepping": own["stepping"] | {"initial": 0.5}, "analysis": analysis})
     go_on(other, folder)
     assert load_scene(folder / "scene.toml").analysis.max_iterations == 12
-    with pytest.raises(InputError, match=r"is not finished \(2 of 3 steps\)"):
-        plan_extension(crashed, scene(0.25, 6, load={"displacement": 4.0}))
 
 
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
-        (lambda run: (run / "fields.h5").unlink(), r"fields\.h5: is missing"),
-        (lambda run: os.truncate(run / "fields.h5", 1000), r"fields\.h5: is damaged"),
-        (lambda run: (run / "fields" / "0001.h5").unlink(), r"fields\.h5: is damaged"),
-        (lambda run: (run / "contact.h5").unlink(), r"contact\.h5: is missing"),
+        (lambda run: (run / "fields.h5").unlink(), r"fields\.h5: is missing or damaged"),
+        (lambda run: os.truncate(run / "fields.h5", 1000), r"fields\.h5: is missing or damaged"),
+        (lambda run: (run / "fields" / "0001.h5").unlink(), r"fields\.h5: is missing or damaged"),
+        (lambda run: (run / "contact.h5").unlink(), r"contact\.h5: is missing or damaged"),
         (lambda run: (run / "run.json").unlink(), r"run\.json: is missing"),
-        (lambda run: (run / "run.json").write_text("{"), r"run\.json: does not hold the 1 step"),
+        (lambda run: (run / "run.json").write_text("{"), r"run\.json: is missing or lacks some of the 1 step"),
         (lambda run: os.truncate(run / "checkpoint.h5", 5000), r"checkpoint\.h5: is damaged"),
-        (lambda run: (run / "scene.toml").unlink(), r"scene\.toml"),
     ],
 )
 def test_a_run_with_files_missing_is_refused(halted, damage, said):
@@ -313,19 +286,15 @@ def test_lost_tables_are_written_again(halted, tmp_path):
 
 
 def test_what_never_began_starts_from_the_beginning(tmp_path):
-    """No folder, an empty one, one without an accepted step: said, and solved."""
+    """No folder, or one without an accepted step: said, and solved; it cannot be extended."""
     problem = scene(0.25, 2)
-    for folder in (tmp_path / "none", tmp_path / "empty"):
-        plan = plan_restart(folder, problem)
-        assert plan.start is None
-        assert "holds no run yet: starting from the beginning" in plan.said
-        (tmp_path / "empty").mkdir(exist_ok=True)
-    (tmp_path / "begun").mkdir()
-    (tmp_path / "begun" / "scene.toml").write_text(resolved(problem))
-    plan = plan_restart(tmp_path / "begun")
+    plan = plan_restart(tmp_path / "none", problem)
     assert plan.start is None
     assert "holds no accepted step: starting from the beginning" in plan.said
-    go_on(problem, tmp_path / "begun")
+    (tmp_path / "scene.toml").write_text(resolved(problem))
+    with pytest.raises(InputError, match="cannot be continued"):
+        plan_restart(tmp_path, problem, extend=True)
+    go_on(None, tmp_path)
 
 
 def test_two_processes_do_not_write_to_one_folder(tmp_path):
