@@ -114,7 +114,7 @@ def run(
     ``said`` follows each run.
 
     Returns a row of entries for each, whose ratios are to the first of its set, run by run, the median; and a sentence
-    for everything loaded that is not used. Raises `InputError`, and `RuntimeError` if one fails.
+    for every failure and for everything loaded that is not used. Raises `InputError`.
     """
 
     def told(process: Process, repeat: int, sentence: str) -> None:
@@ -127,9 +127,11 @@ def run(
     faults: list[str] = []
     firsts: dict[str, Timing] = {}
     for variant, timing in zip(chosen, time_all(processes, repeats, told), strict=True):
-        if timing.failure:
-            raise RuntimeError(f"{variant.case}, {variant.name}: {timing.failure}")
-        first, loaded = firsts.setdefault(variant.case, timing), timing.middle.result
+        first = firsts.setdefault(variant.case, timing)
+        if failure := timing.failure or first.failure:
+            faults.append(f"{variant.case}, {variant.name}: {failure}")
+            continue
+        loaded = timing.middle.result
         files = [file for file in variant.folder(folder).rglob("*") if file.is_file()]
         entries: dict[str, object] = {
             "case": variant.case,
@@ -149,10 +151,12 @@ def run(
 
 def ratio(one: Timing, other: Timing, what: str) -> float:
     """``what`` ("seconds" or "cpu") of the runs of ``one`` over those of ``other``: the median of the pairs."""
-    return median(getattr(a, what) / getattr(b, what) for a, b in zip(one.runs, other.runs, strict=True))
+    return median(getattr(a, what) / getattr(b, what) for a, b in zip(one.runs, other.runs, strict=False))
 
 
 def write(rows: Sequence[dict[str, object]], folder: Path) -> tuple[str, list[Path]]:
-    """Write variants.csv and variants.md into ``folder``; returns the table and the files."""
+    """Write variants.csv and variants.md into ``folder``, if there is any row; returns the table and the files."""
+    if not rows:
+        return "", []
     text = Table.of(rows).markdown()
     return text, write_report(folder, "variants", rows, text)

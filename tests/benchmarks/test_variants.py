@@ -76,8 +76,11 @@ def test_a_sweep_is_solved_on_each_number_of_ranks(tmp_path, monkeypatch):
     assert rows[0]["times as long"] == "1.00"
     assert float(rows[1]["CPU [s]"]) < 2 * float(rows[0]["CPU [s]"])
     assert all(float(row["written [kB]"]) > 10 for row in rows)
-    with pytest.raises(RuntimeError, match=r"^a, b: .*none\.sweep\.toml"):
-        run([Variant("a", "b", sweep="none.sweep.toml")], tmp_path / "runs", 1)
+    rows, faults = run([Variant("a", "b", sweep="none.sweep.toml"), replace(chosen[1], case="a")], tmp_path / "runs", 1)
+    assert rows == []
+    assert [fault.partition(":")[0] for fault in faults] == ["a, b", "a, 1 rank"]
+    assert "none.sweep.toml" in faults[0]
+    assert write(rows, tmp_path) == ("", [])
 
 
 def test_ratios_are_those_of_the_pair_in_the_middle():
