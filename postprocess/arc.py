@@ -1,4 +1,4 @@
-"""The contact on the arcs of a run, as contact.h5 holds it, and the plateau of its pressure."""
+"""The contact on the arcs of a run, as contact.h5 holds it."""
 
 from __future__ import annotations
 
@@ -45,29 +45,3 @@ def undeformed(arc: ArcProfile, side: str, scene: Scene) -> Array:
     g = scene.joint
     centre = -g.pin_depth if side == "pin" else 0.0
     return np.stack([arc.radius * np.sin(arc.angle), centre - arc.radius * np.cos(arc.angle)], axis=-1)
-
-
-def median_pressure(arc: ArcProfile) -> float:
-    """The pressure exceeded on half of the contact: median of the facets' means, by their width across the load.
-
-    Of a pressure that is cut off over more than half of that width it is the plateau itself, wherever the edge lies;
-    of the parabola ``p0 (1 - x^2/l^2)`` it is ``3/4 p0``. 0 without contact.
-    """
-    mean = arc.facet_means()[1]
-    across = (arc.weight * np.cos(arc.angle)).sum(axis=1)
-    pressed = mean > 0
-    if not pressed.any():
-        return 0.0
-    order = np.argsort(mean[pressed])
-    p, share = mean[pressed][order], across[pressed][order]
-    middle = np.cumsum(share) - share / 2
-    return float(np.interp(share.sum() / 2, middle, p))
-
-
-def plateau_pressure(run: RunCurve) -> tuple[Array, Array]:
-    """Median pressure and its ratio to the largest of a facet (1: flat; parabola: 3/4), each ``(n steps,)``, mean of
-    the sides. Raises `InputError` if contact.h5 cannot be read."""
-    steps = [list(read_arcs(run, step).values()) for step in range(1, len(run.delta) + 1)]
-    median = np.array([np.mean([median_pressure(arc) for arc in arcs]) for arcs in steps])
-    peak = np.array([np.mean([arc.facet_means()[1].max() for arc in arcs]) for arcs in steps])
-    return median, median / np.where(peak > 0, peak, 1.0)

@@ -30,7 +30,7 @@ RUN, OTHER = "{coarse}", "{elastic}"
         (["export", "nowhere", "--csv", "new"], "nowhere: is not a run folder: scene.toml is missing."),
         (["export", RUN, "--csv", f"{RUN}/run.json"], f"{RUN}/run.json: cannot be made: File exists."),
         (["fit", RUN, "--json", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be written: it belongs to "),
-        (["fit", RUN, "--json", "x", "--python", "./x"], "--json, --python, --picture: must be different files."),
+        (["fit", RUN, "--json", "x", "--python", "./x"], "x: is named for two files; choose different ones."),
         (["fit", RUN, "--json", "/dev/full"], "/dev/full: cannot be written: No space left on device."),
         (["reproduce", "fig2", "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be used as run folder: File"),
         (["export-deck", SCENE, "-o", RUN], f"{RUN}: cannot be written: it is a folder."),

@@ -16,7 +16,8 @@ from archord.benchmarks.paper.first_yield import first_yield
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, PLANES, Runs
 from archord.materials.material import Plane
 from archord.postprocess.arc import read_arcs
-from archord.postprocess.laws.calibration import calibrate
+from archord.postprocess.convergence import group
+from archord.postprocess.laws.curve_fit import fit_curve
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.report.table import Table
@@ -69,8 +70,7 @@ def chord_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
 def peak_pressure(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C2."""
     run = runs.curve("elastic", plane)
-    fit = calibrate([run, runs.curve("elastic", plane, "coarse")], (0.1, 2.0)).joint.p0.k
-    assert fit is not None
+    fit = fit_curve(group([run, runs.curve("elastic", plane, "coarse")]), (0.1, 2.0), "p0").k
     ratio = columns(tables["fig3"], plane=plane)["p0 R/(E* delta)"]
     off = np.abs(0.85 / ratio - 1)
     late = float(run.delta[np.flatnonzero(off > GOOD).max(initial=-1) + 1] / run.dR)

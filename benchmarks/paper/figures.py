@@ -18,7 +18,7 @@ from archord.postprocess.arc import read_arcs
 from archord.postprocess.chord import arc_angle, read_chord_pressure
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.fields import SUBTRIANGLES, read_fields
-from archord.postprocess.laws.elastic_laws import hertz_pressure, persson_load, persson_pressure
+from archord.postprocess.laws.elastic_laws import hertz, persson_load, persson_pressure
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.report.figure import new_figure, save
@@ -123,7 +123,7 @@ def fig3(runs: Runs) -> list[Part]:
     parts = []
     for run in (runs.curve("elastic", plane) for plane in PLANES):
         joint, unit = LawJoint.from_scene(run.scene), run.E_star * run.dR
-        johnson = hertz_pressure(joint, law_force("johnson", run) * unit) / unit
+        johnson = hertz(joint, law_force("johnson", run) * unit).peak_pressure / unit
         ours = run.p0 * run.R / unit
         winkler = find_law("paper").at_displacement(joint, run.delta).peak_pressure / unit
         laws = {"Winkler, k = 0.85": winkler, "Johnson": johnson, "p0 R/(E* delta)": ours * run.dR / run.delta}

@@ -22,7 +22,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -31,40 +30,31 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.laws.joint import Array, LawJoint
-from archord.postprocess.laws.law import Outside, warn
 
-Kind = tuple[str, str]  # plane; which bodies yield, "none", "both" or "block"
 TABLE = Path(__file__).parent / "calibrated_law.json"
 ROWS = Path(__file__).parent / "calibrated_rows.csv"
-JSON_BEGINS = '{\n "form": {\n  "name": '  # by which a file of `CalibratedModel.to_json` is known
 MIDDLE = 0.4  # of s: where x = 0
 SOFT = 0.5  # largest p m: beyond, the pin is soft and hardly compressible, and the pressure no parabola over the chord
 SOFT_WORDS = "(1 - alpha)/2 times the pin's equivalent Poisson's ratio"
 UNFIT = {"pin": "only the pin yields", "unlike": "the bodies have unlike yield stresses"}
-_RATIO = "E'(pin)/E'(block)"
 _LAST_DIGITS = 1e-3  # of the bounds as they are stored, and of moduli that a scene has rounded
+
+
+def equivalent_nu(strain: Any, nu: Any) -> Any:
+    """Poisson's ratio that a body in plane stress would need to deform like this one, in plane ``strain`` or not."""
+    return np.where(strain, nu / (1 - nu), nu)
 
 
 @dataclass(frozen=True)
 class Points:
-    """The numbers that decide joints, arrays ``(n,)``: Dundurs' ``alpha``, ``m`` and ``n`` of pin and block, ``s`` and
-    ``clearance`` dR/R. ``m`` of a rigid pin has no influence."""
+    """The numbers that decide joints, arrays ``(n,)`` or, of one joint, numbers: Dundurs' ``alpha``, ``m`` and ``n`` of
+    pin and block, ``s`` and ``clearance`` dR/R. ``m`` of a rigid pin has no influence."""
 
     alpha: Array
     m: Array
     n: Array
     s: Array
     clearance: Array
-
-    @classmethod
-    def of(cls, joints: Mapping[str, Any]) -> Points:
-        """From plane, alpha, pin_nu (nan: the block's), nu, s and clearance of ``joints``, numbers or arrays."""
-        names = ("plane", "alpha", "pin_nu", "nu", "s", "clearance")
-        plane, alpha, pin, nu, s, clearance = np.broadcast_arrays(*(np.atleast_1d(joints[name]) for name in names))
-        ratios = np.stack([np.where(np.isnan(pin), nu, pin), nu])
-        # Poisson's ratios that bodies in plane stress would need to deform like these in their plane
-        m, n = np.where(plane == "strain", ratios / (1 - ratios), ratios)
-        return cls(alpha, m, n, s, clearance)
 
     def terms(self, names: list[str]) -> Array:
         """The products called ``names`` ``(n, terms)``."""
@@ -82,13 +72,13 @@ class Points:
 
 @dataclass(frozen=True)
 class CalibratedModel:
-    """The model as the ``data`` of its JSON file.
+    """The model as the ``data`` of its JSON file; a kind of joint is its plane and which bodies yield, "strain none",
+    "stress both" or "strain block".
 
     ``form`` has the terms of 1/k_e ("elastic"), of A ("late"), and of C in plane "strain" and "stress"; ``elastic`` the
-    coefficients of 1/k_e; ``plastic``, by plane and yielding, ``rate`` b, those of A ("late") and C ("threshold"), and
-    from how many cases they are; ``bounds``, likewise, the smallest and largest of what was fitted (None: infinite);
-    ``load_range`` is delta/dR of the steps fitted; ``errors`` say how good the model is, ``provenance`` where it is
-    from.
+    coefficients of 1/k_e; ``plastic``, by kind, ``rate`` b, those of A ("late") and C ("threshold"), and from how many
+    cases they are; ``bounds``, by kind, the range of the joints (None: infinite); ``load_range`` is delta/dR of the
+    steps fitted; ``errors`` say how good the model is, ``provenance`` where it is from.
     """
 
     data: dict[str, Any]
@@ -97,37 +87,18 @@ class CalibratedModel:
         """k without yielding ``(n,)``."""
         return 1 / (points.terms(self.data["form"]["elastic"]) @ np.array(self.data["elastic"]))
 
-    def coefficients(self, kind: Kind, points: Points) -> tuple[Array, Array]:
+    def coefficients(self, kind: str, points: Points) -> tuple[Array, Array]:
         """k and c ``(n,)``; c is infinite where s is. Raises ValueError for a kind that was not fitted."""
-        k = self.elastic_k(points)
-        if kind[1] == "none":
+        k, (plane, yielding) = self.elastic_k(points), kind.split()
+        if yielding == "none":
             return k, np.full(k.shape, np.inf)
-        found, form = self.plastic(kind), self.data["form"]
+        if kind not in self.data["plastic"]:
+            raise ValueError(f"calibrated: no joint in plane {plane} of which {yielding} yields was fitted.")
+        found, form = self.data["plastic"][kind], self.data["form"]
         late = np.exp(-found["rate"] * points.s / k)
         k = k * np.exp(late * (points.terms(form["late"]) @ np.array(found["late"])))
-        c = np.exp(points.terms(form[kind[0]]) @ np.array(found["threshold"]))
+        c = np.exp(points.terms(form[plane]) @ np.array(found["threshold"]))
         return k, np.where(np.isfinite(points.s), c, np.inf)
-
-    def plastic(self, kind: Kind) -> dict[str, Any]:
-        """The coefficients of a kind. Raises ValueError if no such joints were fitted."""
-        for part in self.data["plastic"]:
-            if (part["plane"], part["yielding"]) == kind:
-                return part
-        raise ValueError(f"calibrated: no joint in plane {kind[0]} of which {kind[1]} yields was fitted.")
-
-    def bounds(self, kind: Kind) -> dict[str, tuple[float, float]]:
-        """The range of a kind, empty if it was not fitted.
-
-        One design covers all kinds, so Poisson's ratios, clearance and the softest pin are from all cases together, the
-        smallest s from those in the plane; the stiffest pin is the kind's own.
-        """
-        every = self.data["bounds"]
-        own = next((b for b in every if (b["plane"], b["yielding"]) == kind), None)
-        if own is None:
-            return {}
-        same = [b for b in every if b["plane"] == kind[0] and b["yielding"] != "none"] or [own]
-        found = {name: _widest(name, every) for name in ("nu", "pin_nu", "clearance", "alpha")}
-        return found | {"s": _widest("s", same), "alpha": (found["alpha"][0], own["alpha"][1])}
 
     def to_json(self) -> str:
         """The model as JSON."""
@@ -139,19 +110,13 @@ class CalibratedModel:
         """The model in ``text``, written by `to_json`. Raises ValueError."""
         try:
             model = cls(json.loads(text))
-            for kind in [("strain", "none"), *((part["plane"], part["yielding"]) for part in model.data["plastic"])]:
+            for kind in model.data["bounds"]:
                 model.coefficients(kind, Points(*np.full((5, 1), 0.3)))
-                model.bounds(kind)
             if not {"load_range", "errors", "provenance"} <= model.data.keys():
                 raise KeyError
         except (ValueError, KeyError, TypeError, AttributeError):
             raise ValueError("law: is not a calibrated law, as archord fit SWEEP --law writes it.") from None
         return model
-
-
-def _widest(name: str, bounds: list[dict[str, Any]]) -> tuple[float, float]:
-    pairs = [[math.inf if value is None else value for value in b[name]] for b in bounds]
-    return min(low for low, _ in pairs), max(high for _, high in pairs)
 
 
 @cache
@@ -171,79 +136,39 @@ class Calibrated:
     errors: dict[str, Any]
 
 
-def calibrated(
-    plane: str,
-    nu: float,
-    modulus_ratio: float = 1.0,
-    s: float = math.inf,
-    yielding: str = "both",
-    pin_nu: float | None = None,
-    clearance: float = 0.005,
-    outside: Outside = "nan",
-) -> Calibrated:
-    """k and c of a joint for ``chord_laws.plastic_force``.
-
-    ``plane`` is "strain" or "stress", ``nu`` Poisson's ratio of the block and ``pin_nu`` of the pin (None: the same),
-    ``modulus_ratio`` E of the pin over E of the block (infinite: a rigid pin), ``s = sigY R/(E* dR)`` (infinite:
-    elastic), ``yielding`` "both" or "block", ``clearance`` dR/R. Outside the range of the cases fitted k and c are
-    nan, with a `LawRangeWarning`; ``outside`` "raise" and "extrapolate" as for every `Law`. Raises ValueError for
-    values that make no joint.
-    """
-    for name, value in (("modulus_ratio", modulus_ratio), ("s", s)):
-        if not value > 0:
-            raise ValueError(f"{name} = {value:g} must be a positive number.")
-    alpha = dundurs_alpha(plane, modulus_ratio, nu if pin_nu is None else pin_nu, nu)
-    joint = LawJoint(1.0, clearance, 1.0, None if math.isinf(s) else clearance * s, dundurs_alpha=alpha,
-                     plane=plane, nu=nu, pin_nu=pin_nu, yielding=yielding)  # fmt: skip
-    found = joint_calibrated(joint)
-    if not found.outside:
-        return found
-    warn(f"calibrated: {found.outside}", outside)
-    return found if outside == "extrapolate" else replace(found, k=math.nan, c=math.nan)
-
-
-def dundurs_alpha(plane: str, ratio: float, pin_nu: float, nu: float) -> float:
-    """Dundurs' alpha, positive for the stiffer pin, where E of the pin is ``ratio`` times E of the block; 1: rigid."""
-    if math.isinf(ratio):
-        return 1.0
-    moduli = ratio * ((1 - nu**2) / (1 - pin_nu**2) if plane == "strain" else 1.0)
-    return (moduli - 1) / (moduli + 1)
-
-
-def joint_calibrated(joint: LawJoint, model: CalibratedModel | None = None) -> Calibrated:
+def calibrated(joint: LawJoint, model: CalibratedModel | None = None) -> Calibrated:
     """k and c of ``joint``, which must tell plane and nu, by ``model`` [that of archord]; outside the range those of
     the formulas, with the reason.
 
     Of a joint that no formula is for, "both" stands for bodies with unlike yield stresses, and for the pin alone.
     """
     model = model or shipped_model()
-    assert joint.plane is not None
     assert joint.nu is not None
-    s = math.inf
-    if joint.yield_stress is not None:
-        s = joint.yield_stress * joint.radius / (joint.E_star * joint.clearance)
-    kind = joint.plane, "none" if math.isinf(s) else "block" if joint.yielding == "block" else "both"
+    elastic = joint.yield_stress is None
+    kind = f"{joint.plane} {'none' if elastic else 'block' if joint.yielding == 'block' else 'both'}"
     pin_nu = joint.nu if joint.pin_nu is None else joint.pin_nu
-    points = Points.of({"plane": joint.plane, "alpha": joint.dundurs_alpha, "pin_nu": pin_nu, "nu": joint.nu, "s": s,
-                        "clearance": joint.clearance / joint.radius})  # fmt: skip
-    k, c = model.coefficients(kind, points)
-    reason = UNFIT.get(joint.yielding, "") if joint.yield_stress is not None else ""
-    errors = model.data["errors"].get("cross-validated", {}).get(" ".join(kind), {})
-    return Calibrated(float(k[0]), float(c[0]), reason or _stray(points, pin_nu, joint.nu, model.bounds(kind)), errors)
+    m, n = equivalent_nu(joint.plane == "strain", np.array([pin_nu, joint.nu]))
+    alpha, onset = np.array(joint.dundurs_alpha), np.array(joint.onset)
+    k, c = model.coefficients(kind, Points(alpha, m, n, onset, np.array(joint.clearance / joint.radius)))
+    outside = "" if elastic else UNFIT.get(joint.yielding, "")
+    errors = model.data["errors"].get("cross-validated", {}).get(kind, {})
+    bounds = model.data["bounds"].get(kind)
+    return Calibrated(float(k), float(c), outside or _stray(joint, pin_nu, float(m), bounds), errors)
 
 
-def _stray(points: Points, pin_nu: float, nu: float, bounds: dict[str, tuple[float, float]]) -> str:
+def _stray(joint: LawJoint, pin_nu: float, m: float, bounds: dict[str, Any] | None) -> str:
     """What of a joint lies outside the range of the cases fitted; later yielding than theirs does not matter."""
     if not bounds:
         return "no joint of this plane and kind of yielding was fitted"
-    alpha, m, _, s, clearance = (float(value[0]) for value in vars(points).values())
-    checks = [("nu of the block", nu, bounds["nu"])]
+    alpha = joint.dundurs_alpha
+    checks = [("nu of the block", joint.nu, bounds["nu"])]
     if alpha < 1:
         checks += [("nu of the pin", pin_nu, bounds["pin_nu"]), (SOFT_WORDS, (1 - alpha) / 2 * m, (0.0, SOFT))]
-    softest, stiffest = (stiffness_ratio(value) for value in bounds["alpha"])
-    checks += [(_RATIO, stiffness_ratio(alpha), (softest, stiffest)), ("dR/R", clearance, bounds["clearance"])]
-    if math.isfinite(s):
-        checks.append(("sigY R/(E* dR)", s, (bounds["s"][0], math.inf)))
+    stiffness = [_stiffness_ratio(end) for end in bounds["alpha"]]
+    checks.append(("E'(pin)/E'(block)", _stiffness_ratio(alpha), stiffness))
+    checks.append(("dR/R", joint.clearance / joint.radius, bounds["clearance"]))
+    if joint.yield_stress is not None:
+        checks.append(("sigY R/(E* dR)", joint.onset, (bounds["s"][0], math.inf)))
     for name, value, (low, high) in checks:
         slack = _LAST_DIGITS * max(abs(low), abs(high) if math.isfinite(high) else 0.0)
         if not low - slack <= value <= high + slack:
@@ -252,12 +177,12 @@ def _stray(points: Points, pin_nu: float, nu: float, bounds: dict[str, tuple[flo
     return ""
 
 
-def stiffness_ratio(alpha: float) -> float:
+def _stiffness_ratio(alpha: float) -> float:
     """E' of the pin over that of the block, with E' = E/(1 - nu^2) or E by plane."""
     return math.inf if alpha >= 1 else (1 + alpha) / (1 - alpha)
 
 
 def with_coefficients(joint: LawJoint) -> LawJoint:
     """``joint`` with its k and c by the model of archord."""
-    found = joint_calibrated(joint)
+    found = calibrated(joint)
     return replace(joint, k=found.k, c=found.c if math.isfinite(found.c) else 1.0)

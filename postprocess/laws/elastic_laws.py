@@ -24,22 +24,19 @@ import numpy as np
 from scipy.special import lambertw
 
 from archord.postprocess.laws.joint import Array, LawJoint
-from archord.postprocess.laws.law import LawState, monotone_root
+from archord.postprocess.laws.law import ROUND_OFF, LawState, rising_root
+
+PRINTED_WIDTH = 1.6  # Radzimovsky's d over (R* P/E*)^(1/2): Hu et al., eq. 18
+ROARK_WIDTH = 1.6 * math.sqrt(2)  # Roark's 1.60 goes with K_D = D1 D2/(D1 - D2) = 2 R*
+IMPLIED_WIDTH = 4 * math.exp(-1 / 6) / math.sqrt(2.41)  # by the limit of 2.41 E* dR (Hu et al., below eq. 9)
 
 
-def hertz_half_width(joint: LawJoint, P: Array) -> Array:
-    """Half-width of the line contact, ``a = 2 sqrt(P R*/(pi E*))`` (Johnson 1985, eq. 4.43)."""
-    return 2 * np.sqrt(P * joint.relative_radius / (math.pi * joint.E_star))
-
-
-def hertz_pressure(joint: LawJoint, P: Array) -> Array:
-    """Peak pressure of the line contact, ``p0 = sqrt(P E*/(pi R*))`` (Johnson 1985, eq. 4.45)."""
-    return np.sqrt(P * joint.E_star / (math.pi * joint.relative_radius))
-
-
-def hertz_angle(joint: LawJoint, P: Array) -> Array:
-    """Contact semi-angle [rad], ``a/R1``."""
-    return hertz_half_width(joint, P) / joint.radius
+def hertz(joint: LawJoint, P: Array) -> LawState:
+    """Line contact of half-width ``a = 2 sqrt(P R*/(pi E*))``: peak pressure ``p0 = sqrt(P E*/(pi R*))`` and semi-angle
+    ``a/R1`` (Johnson 1985, eqs 4.43 and 4.45)."""
+    root = np.sqrt(P / (math.pi * joint.E_star * joint.relative_radius))
+    nothing = np.full(np.shape(P), np.nan)
+    return LawState(nothing, P, nothing, joint.E_star * root, 2 * joint.relative_radius * root / joint.radius)
 
 
 def hertz_load_limit(joint: LawJoint) -> float:
@@ -47,26 +44,17 @@ def hertz_load_limit(joint: LawJoint) -> float:
     return math.pi * joint.E_star * (joint.radius / 4) ** 2 / joint.relative_radius
 
 
-def _spring(joint: LawJoint) -> float:
-    """``(4/3) E* sqrt(R*)/L`` of a ball in a socket, the force divided by the length of the joint to be comparable."""
-    assert joint.length is not None
-    return 4 / 3 * joint.E_star * math.sqrt(joint.relative_radius) / joint.length
-
-
 def lankarani_nikravesh(joint: LawJoint, delta: Array) -> LawState:
     """Static part of Lankarani and Nikravesh: ``P = (4/3) E* sqrt(R*) delta^(3/2) / L``.
 
-    Hertz's ball in a socket (Lankarani and Nikravesh 1990, 1994, without damping), as multibody codes use it for pins;
-    its peak pressure is ``p0 = (2/pi) E* sqrt(delta/R*)`` (Johnson 1985, eq. 4.24).
+    Hertz's ball in a socket (Lankarani and Nikravesh 1990, 1994, without damping), as multibody codes use it for pins,
+    the force divided by the length of the joint; its peak pressure is ``p0 = (2/pi) E* sqrt(delta/R*)`` (Johnson 1985,
+    eq. 4.24).
     """
-    root = np.sqrt(delta)
-    p0 = 2 / math.pi * joint.E_star * root / math.sqrt(joint.relative_radius)
-    return LawState(delta, _spring(joint) * delta * root, 1.5 * _spring(joint) * root, p0)
-
-
-def lankarani_nikravesh_displacement(joint: LawJoint, P: Array) -> Array:
-    """Inverse of `lankarani_nikravesh`."""
-    return (P / _spring(joint)) ** (2 / 3)
+    assert joint.length is not None
+    root, size = np.sqrt(delta), math.sqrt(joint.relative_radius)
+    spring = 4 / 3 * joint.E_star * size / joint.length
+    return LawState(delta, spring * delta * root, 1.5 * spring * root, 2 / math.pi * joint.E_star * root / size)
 
 
 def lankarani_nikravesh_limit(joint: LawJoint) -> float:
@@ -83,95 +71,53 @@ class Logarithm:
     q: float
 
     @property
-    def load_limit(self) -> float:
-        """Largest load, at which the stiffness has become infinite."""
-        return self.A * math.exp(self.q - 1)
-
-    @property
     def delta_limit(self) -> float:
-        """Displacement at `load_limit`."""
-        return self.load_limit / (math.pi * self.E_star)
+        """Displacement at the load limit."""
+        return self.A * math.exp(self.q - 1) / (math.pi * self.E_star)
 
-    def displacement(self, P: Array) -> Array:
-        """``delta(P)``, zero for no load."""
-        return P / (math.pi * self.E_star) * (np.log(self.A / np.where(P > 0, P, self.A)) + self.q)
+    def displacement(self, P: float) -> float:
+        """``delta(P)`` of a positive load."""
+        return P / (math.pi * self.E_star) * (math.log(self.A / P) + self.q)
 
-    def force(self, delta: Array) -> Array:
-        """``P(delta)`` on the rising branch: ``P = delta pi E* / y`` with ``y = -W_-1(-delta/(e delta_limit))``."""
-        return delta * math.pi * self.E_star / self._y(delta)
-
-    def stiffness(self, delta: Array) -> Array:
-        """``dP/d(delta) = pi E* / (y - 1)``; zero for no load."""
-        with np.errstate(divide="ignore"):
-            return math.pi * self.E_star / (self._y(delta) - 1)
-
-    def _y(self, delta: Array) -> Array:
-        """The bracket ``ln(A/P) + q``, at least 1 on the rising branch; infinite for no displacement."""
-        argument = -delta / (math.e * self.delta_limit)
+    def state(self, delta: Array) -> LawState:
+        """The rising branch: ``P = pi E* delta / y``, ``dP/d(delta) = pi E* / (y - 1)``, where the bracket in the law,
+        ``y = -W_-1(-delta/(e delta_limit))``, is 1 at the limit and infinite for no displacement; nan beyond."""
+        spring, argument = math.pi * self.E_star, -delta / (math.e * self.delta_limit)
         # at the very limit round-off would give a complex W, or none
         turning = argument <= -(1 - 1e-15) / math.e
         y = np.maximum(-lambertw(np.where(turning, -0.1, argument), -1).real, 1.0)
-        return np.where(turning, 1.0, np.where(delta > 0, y, np.inf))
+        y = np.where(turning, 1.0, np.where(delta > 0, y, np.inf))
+        y = np.where(delta > self.delta_limit * (1 + ROUND_OFF), np.nan, y)
+        with np.errstate(divide="ignore"):
+            return LawState(delta, spring * delta / y, spring / (y - 1))
 
 
 def johnson(joint: LawJoint) -> Logarithm:
-    """Johnson: ``delta = P/(pi E*) [ ln(4 pi E* dR/P) - 1 ]`` (Johnson 1985; Hu et al., eq. 16).
-
-    The same as ``P/(pi E*) [ ln(4 R1/a) + ln(4 R2/a) - 1 ]`` with Hertz's half-width a. Limit 4 pi/e^2 = 1.7007 E* dR.
-    """
-    return Logarithm(joint.E_star, 4 * math.pi * joint.E_star * joint.clearance, -1.0)
-
-
-PRINTED_WIDTH = 1.6  # Hu et al., eq. 18
-ROARK_WIDTH = 1.6 * math.sqrt(2)  # Roark's 1.60 goes with K_D = D1 D2/(D1 - D2) = 2 R*
-HERTZ_WIDTH = 4 / math.sqrt(math.pi)  # full width of Hertz's contact
-PAPER_LIMIT = 2.41  # of E* dR (Hu et al., below eq. 9)
-IMPLIED_WIDTH = 4 * math.exp(-1 / 6) / math.sqrt(PAPER_LIMIT)
-
-READINGS = {
-    "as printed (Hu et al., eq. 18): 1.6 (R* P/E*)^(1/2)": PRINTED_WIDTH,
-    "Roark: 1.60 (K_D P/E*)^(1/2) with diameters, K_D = D1 D2/(D1 - D2) = 2 R*": ROARK_WIDTH,
-    "Roark for like bodies, nu = 0.3: 2.15 (K_D P/E)^(1/2)": 2.15 * math.sqrt(2 / 1.82),
-    "full width of Hertz's contact, 4 (R* P/(pi E*))^(1/2)": HERTZ_WIDTH,
-    "half-width of Hertz's contact, 2 (R* P/(pi E*))^(1/2)": HERTZ_WIDTH / 2,
-    "2.15 with R* for K_D: 2.15 (R* P/E)^(1/2)": 2.15 / math.sqrt(1.82),
-    "2.15 with R* for K_D and E* for E": 2.15,
-    "1.60 with diameters, E/2 for E*, nu = 0.3": ROARK_WIDTH * math.sqrt(0.91),
-    "what a limit of 2.41 E* dR implies": IMPLIED_WIDTH,
-}  # coefficient c of d = c (R* P/E*)^(1/2) in several readings
+    """``delta = P/(pi E*) [ ln(4 pi E* dR/P) - 1 ]``: ``[ ln(4 R1/a) + ln(4 R2/a) - 1 ]`` with Hertz's half-width a."""
+    return Logarithm(joint.E_star, 4 * math.pi * joint.unit, -1.0)
 
 
 def radzimovsky(joint: LawJoint, width: float = PRINTED_WIDTH) -> Logarithm:
-    """Radzimovsky: ``delta = P/(pi E*) [ 2/3 + ln(4 R1/d) + ln(4 R2/d) ]``, ``d = width (R* P/E*)^(1/2)``.
-
-    Radzimovsky (1953) by way of Hu et al., eqs 17 to 19, and Roark. R1 and R2 cancel: ``A = 16 E* dR/width^2``, limit
-    ``16 e^(-1/3)/width^2 E* dR``.
-    """
-    return Logarithm(joint.E_star, 16 * joint.E_star * joint.clearance / width**2, 2 / 3)
+    """``delta = P/(pi E*) [ 2/3 + ln(4 R1/d) + ln(4 R2/d) ]``, ``d = width (R* P/E*)^(1/2)``; R1 and R2 cancel."""
+    return Logarithm(joint.E_star, 16 * joint.unit / width**2, 2 / 3)
 
 
 def esdu(joint: LawJoint) -> Logarithm:
-    """ESDU 78035: ``delta = F (s1 + s2)/L [ ln(4 L (R2 - R1)/(F (s1 + s2))) + 1 ]``, ``s = (1 - nu^2)/(pi E)``.
-
-    With ``s1 + s2 = 1/(pi E*)`` and F = P L the length cancels: ``P/(pi E*) [ ln(4 pi E* dR/P) + 1 ]``.
-    """
-    return Logarithm(joint.E_star, 4 * math.pi * joint.E_star * joint.clearance, 1.0)
+    """``delta = F (s1 + s2)/L [ ln(4 L dR/(F (s1 + s2))) + 1 ]``, where ``s1 + s2 = 1/(pi E*)`` and F = P L."""
+    return Logarithm(joint.E_star, 4 * math.pi * joint.unit, 1.0)
 
 
 def dubowsky_freudenstein(joint: LawJoint) -> Logarithm:
-    """Dubowsky and Freudenstein: ``delta = F (s1 + s2)/L [ ln(L^3 (R2 - R1)/(F R1 R2 (s1 + s2))) + 1 ]``.
-
-    Dubowsky and Freudenstein (1971), ``s = (1 - nu^2)/(pi E)``, joint of length L. It is Lundberg's compression of two
-    half-spaces that touch along a strip of length L and Hertz's pressure across it.
-    """
+    """``delta = F (s1 + s2)/L [ ln(L^3 dR/(F R1 R2 (s1 + s2))) + 1 ]`` of a joint of length L: Lundberg's compression
+    of two half-spaces that touch along a strip of length L and Hertz's pressure across it."""
     assert joint.length is not None
     return Logarithm(joint.E_star, math.pi * joint.E_star * joint.length**2 / joint.relative_radius, 1.0)
 
 
-def slender_load(joint: LawJoint) -> float:
-    """Load at which Hertz's contact is as wide as the joint is long: beyond, it is no strip."""
-    assert joint.length is not None
-    return math.pi * joint.E_star * joint.length**2 / (16 * joint.relative_radius)
+def dubowsky_freudenstein_limit(joint: LawJoint) -> float:
+    """Displacement at which Hertz's contact is as wide as the joint is long, ``P = A/16``: beyond, it is no strip."""
+    law = dubowsky_freudenstein(joint)
+    return law.displacement(law.A / 16)
 
 
 def persson_pressure(joint: LawJoint, P: Array, eps: Array, phi: Array) -> Array:
@@ -196,26 +142,13 @@ def persson_load(joint: LawJoint, eps: Array) -> Array:
     b2 = np.tan(eps / 2) ** 2
     left = 2 - (1 + joint.dundurs_alpha) * (np.log1p(b2) + 2 * b2**2)
     with np.errstate(divide="ignore"):
-        load = 2 * np.pi * b2 * (1 + b2) / np.where(left > 0, left, 0.0)
-    return joint.E_star * joint.clearance * load
+        return joint.unit * 2 * np.pi * b2 * (1 + b2) / np.where(left > 0, left, 0.0)
 
 
-def persson_angle(joint: LawJoint, P: Array) -> Array:
-    """Contact semi-angle [rad] under ``P``: the root of `persson_load`, zero for no load."""
-    alpha = 1 + joint.dundurs_alpha
-    clearance = joint.E_star * joint.clearance / np.where(P > 0, P, 1.0)
-
-    def left(b2: Array) -> Array:
-        return 2 * np.pi * b2 * (1 + b2) * clearance + alpha * (np.log1p(b2) + 2 * b2**2)
-
-    def slope(b2: Array) -> Array:
-        return 2 * np.pi * (1 + 2 * b2) * clearance + alpha * (1 / (1 + b2) + 4 * b2)
-
-    b2 = monotone_root(left, slope, np.full(np.shape(P), 2.0), 1.0)
-    return np.where(P > 0, 2 * np.arctan(np.sqrt(b2)), 0.0)
-
-
-def persson_peak(joint: LawJoint, P: Array) -> Array:
-    """Pressure on the contact axis under ``P``."""
-    eps = np.where(P > 0, persson_angle(joint, P), 1.0)
-    return np.where(P > 0, persson_pressure(joint, P, eps, np.zeros_like(eps)), 0.0)
+def persson(joint: LawJoint, P: Array) -> LawState:
+    """Peak pressure and contact semi-angle [rad] under ``P``: the root of `persson_load`, zero for no load."""
+    half = rising_root(lambda b: persson_load(joint, 2 * np.arctan(b)), P, 1.0)
+    eps = 2 * np.arctan(half)
+    p0 = persson_pressure(joint, P, np.where(P > 0, eps, 1.0), np.zeros_like(eps))
+    nothing = np.full_like(eps, np.nan)
+    return LawState(nothing, P, nothing, p0, eps)

@@ -1,4 +1,4 @@
-"""What the laws know of a joint, and how they say that they are asked outside their range."""
+"""What the laws know of a joint."""
 
 from __future__ import annotations
 
@@ -10,21 +10,12 @@ import numpy.typing as npt
 
 from archord.materials.elasticity import contact_modulus
 from archord.materials.material import Plane
-from archord.scene.geometry import Model
 from archord.scene.scene import Scene
 
 Array = npt.NDArray[np.floating]
 YIELDING = ("both", "block", "pin", "unlike")
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are
 _SOFTER, _SOFTEST = 1.4, 2.5  # fall of P in a block of W, times (W/R)^2: of like elastic bodies, and of any
-
-
-class LawRangeWarning(UserWarning):
-    """A law was asked outside its range; the message tells the range."""
-
-
-class LawRangeError(ValueError):
-    """As `LawRangeWarning`, where the caller asked for an error."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +28,8 @@ class LawJoint:
     (E1' - E2')/(E1' + E2') is positive where the pin is the stiffer body, ``dundurs_beta`` goes with it; both are zero
     for like bodies. Only the calibrated law asks for the rest: ``plane`` ("strain" or "stress"), ``nu`` of the block,
     ``pin_nu`` of the pin (None: the block's, or rigid), and which bodies have the yield stress, ``yielding``: "both",
-    "block", "pin", or "unlike" where each has its own. Laws of P(delta) are for a pin in a wide block, and say so where
-    ``model`` is "ring" or ``block_size`` (None: wide) is small. Raises ValueError for values that make no joint.
+    "block", "pin", or "unlike" where each has its own. Laws of P(delta) are for a pin in a wide block, and say so of a
+    ``ring``, or where ``block_size`` (None: wide) is small. Raises ValueError for values that make no joint.
     """
 
     radius: float
@@ -54,7 +45,7 @@ class LawJoint:
     nu: float | None = None
     pin_nu: float | None = None
     yielding: str = "both"
-    model: Model = "block"
+    ring: bool = False
     block_size: float | None = None
 
     def __post_init__(self) -> None:
@@ -64,54 +55,50 @@ class LawJoint:
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value:g} must be a positive number.")
         for name, most in (("dundurs_alpha", 1), ("dundurs_beta", 0.5)):
-            value = getattr(self, name)
-            if not -most <= value <= most:
-                raise ValueError(f"{name} = {value:g} must be between {-most:g} and {most:g}.")
-        if self.plane not in (None, "strain", "stress"):
-            raise ValueError(f'plane = {self.plane!r} must be "strain" or "stress".')
-        if self.yielding not in YIELDING:
-            raise ValueError(f"yielding = {self.yielding!r} must be one of {', '.join(YIELDING)}.")
+            if not abs(getattr(self, name)) <= most:
+                raise ValueError(f"{name} = {getattr(self, name):g} must be between {-most:g} and {most:g}.")
         for name in ("nu", "pin_nu"):
             value = getattr(self, name)
             if value is not None and not -1 < value < 0.5:
                 raise ValueError(f"{name} = {value:g} must be between -1 and 0.5.")
+        for name, known in (("plane", (None, "strain", "stress")), ("yielding", YIELDING)):
+            if getattr(self, name) not in known:
+                raise ValueError(f"{name} = {getattr(self, name)!r} must be one of {', '.join(filter(None, known))}.")
 
     @classmethod
-    def from_scene(cls, scene: Scene, length: float | None = None, k: float = 0.85) -> LawJoint:
+    def from_scene(cls, scene: Scene, k: float = 0.85) -> LawJoint:
         """The joint of ``scene``; of two yield stresses the lower one, hardening is left out."""
         plane, pin, block = scene.analysis.plane, scene.pin.solid, scene.block
         alpha, first, yields, second = 1.0, 0.0, [None, block.yield_stress], _transverse(block.nu, plane)
         if pin is not None:
             ratio = contact_modulus(pin.E, pin.nu, plane) / contact_modulus(block.E, block.nu, plane)
             alpha, first, yields[0] = (ratio - 1) / (ratio + 1), _transverse(pin.nu, plane), pin.yield_stress
-        # beta in the compliances 1/E1' = (1 - alpha)/(2 E*), 1/E2' = (1 + alpha)/(2 E*)
-        beta = ((1 + alpha) * second - (1 - alpha) * first) / 2
         return cls(
             scene.joint.radius,
             scene.joint.dR,
             scene.E_star,
             yield_stress=min((stress for stress in yields if stress is not None), default=None),
             k=k,
-            length=length,
             dundurs_alpha=alpha,
-            dundurs_beta=beta,
+            # in the compliances 1/E1' = (1 - alpha)/(2 E*), 1/E2' = (1 + alpha)/(2 E*)
+            dundurs_beta=((1 + alpha) * second - (1 - alpha) * first) / 2,
             plane=plane,
             nu=block.nu,
             pin_nu=None if pin is None else pin.nu,
             yielding=_yielding(*yields),
-            model=scene.joint.model,
+            ring=scene.joint.is_ring,
             block_size=scene.joint.W,
         )
 
     @property
-    def hole_radius(self) -> float:
-        """R2 = R1 + dR."""
-        return self.radius + self.clearance
-
-    @property
     def relative_radius(self) -> float:
         """Relative radius of curvature ``R* = R1 R2 / dR``."""
-        return self.radius * self.hole_radius / self.clearance
+        return self.radius * (self.radius + self.clearance) / self.clearance
+
+    @property
+    def unit(self) -> float:
+        """Unit of the load, ``E* dR``."""
+        return self.E_star * self.clearance
 
     @property
     def softer(self) -> tuple[float, float]:
@@ -120,20 +107,23 @@ class LawJoint:
         Widths of 2.5 to 50 R were solved, up to delta = 2 dR: the difference goes with ``(R/W)^2``, times 1.2 to 1.4
         for like elastic bodies, to 2 for a rigid pin, to 2.4 beyond yield.
         """
-        if self.block_size is None:
-            return 0.0, 0.0
-        narrow = (self.radius / self.block_size) ** 2
+        narrow = 0.0 if self.block_size is None else (self.radius / self.block_size) ** 2
         return _SOFTER * narrow, _SOFTEST * narrow
 
     @property
-    def first_yield(self) -> float:
-        """Critical displacement ``delta0 = c sigY R/(k E*)`` (Hu et al.: c = 1); infinite without a yield stress."""
-        return self.radius * self.threshold / (self.k * self.E_star)
+    def onset(self) -> float:
+        """``s = sigY R/(E* dR)``; infinite without a yield stress."""
+        return math.inf if self.yield_stress is None else self.yield_stress * self.radius / self.unit
 
     @property
     def threshold(self) -> float:
         """Largest pressure of the foundation, ``c sigY``; infinite without a yield stress."""
         return math.inf if self.yield_stress is None else self.c * self.yield_stress
+
+    @property
+    def first_yield(self) -> float:
+        """Critical displacement ``delta0 = c sigY R/(k E*)`` (Hu et al.: c = 1); infinite without a yield stress."""
+        return self.radius * self.threshold / (self.k * self.E_star)
 
 
 def _yielding(pin: float | None, block: float | None) -> str:

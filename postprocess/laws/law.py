@@ -5,25 +5,20 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
-from functools import partial
-from typing import Literal
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from archord.postprocess.laws.joint import LARGE, Array, LawJoint, LawRangeError, LawRangeWarning
+from archord.postprocess.laws.joint import LARGE, Array, LawJoint
 
-Outside = Literal["nan", "raise", "extrapolate"]
-_OfJoint = Callable[[LawJoint], float]
 _FELT = 1e-3  # share of P by which a small block must change it to be worth a word
-_ROUND_OFF = 1e-9  # a grid up to the limit may overshoot it
+ROUND_OFF = 1e-9  # a grid up to the limit may overshoot it
 _FAR = 1e150  # no displacement, and its square is still a number
-_ENOUGH = 1000  # halvings leave no digit of any bracket after 64; the rest is for doubling and halving to tiny roots
 
 
-def _nothing() -> Array:
-    return np.array(np.nan)
+class LawRangeWarning(UserWarning):
+    """A law was asked outside its range; the message tells the range."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +27,9 @@ class LawState:
 
     delta: Array
     load: Array
-    stiffness: Array = field(default_factory=_nothing)
-    peak_pressure: Array = field(default_factory=_nothing)
-    angle: Array = field(default_factory=_nothing)
+    stiffness: Array
+    peak_pressure: Array | float = math.nan
+    angle: Array | float = math.nan
 
 
 @dataclass(frozen=True)
@@ -42,11 +37,10 @@ class Law:
     """A law ``P(delta)`` of a pin joint, or one that gives pressure and angle of a load only.
 
     Displacements are positive in compression and measured from first touch, forces are per unit length of the joint,
-    angles are semi-angles in radians. Methods take arrays of any shape and return arrays of that shape. ``outside``
-    says what happens to points outside the range: ``"nan"`` and a `LawRangeWarning`, ``"raise"`` a `LawRangeError`,
-    ``"extrapolate"`` the formula with a `LawRangeWarning`, nan where the formula itself has ended. Of a joint in a
-    small block laws with displacements warn (``"raise"``: a `LawRangeError`). All raise ValueError if the law needs a
-    parameter that the joint lacks, does not give the quantity, or gives displacements and the joint is a ring.
+    angles are semi-angles in radians. Methods take arrays of any shape and return arrays of that shape. Points outside
+    the range give nan, or with ``extrapolate`` the formula, which is nan where it has ended itself, and a
+    `LawRangeWarning`. Of a joint in a small block laws with displacements warn. All raise ValueError if the law needs a
+    parameter that the joint lacks, or gives displacements and the joint is a ring.
     """
 
     name: str
@@ -56,12 +50,9 @@ class Law:
     source: str
     remarks: str
     state: Callable[[LawJoint, Array], LawState]  # of displacements; of loads where it gives no displacement
-    limit: _OfJoint  # largest displacement of the range; largest load of a law without displacements
-    end: _OfJoint = lambda joint: math.inf  # likewise, where the formula ends
+    limit: Callable[[LawJoint], float]  # largest displacement of the range; largest load of a law without displacements
     unfit: Callable[[LawJoint], str] = lambda joint: ""  # why the law does not hold for the whole joint
-    pressure_limit: _OfJoint = lambda joint: math.inf  # largest load for which pressure and angle hold
     needs: tuple[str, ...] = ()
-    inverse: Callable[[LawJoint, Array], Array] | None = None  # displacement of a load; by root finding if absent
     gives: tuple[str, ...] = ("displacement", "pressure", "contact angle")
 
     @property
@@ -69,61 +60,37 @@ class Law:
         """Whether the law relates force and displacement."""
         return "displacement" in self.gives
 
-    def force(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside = "nan") -> Array:
+    def force(self, joint: LawJoint, delta: npt.ArrayLike, extrapolate: bool = False) -> Array:
         """``P(delta)``."""
-        return self._at_displacement(joint, delta, outside).load
+        return self.at_displacement(joint, delta, extrapolate).load
 
-    def displacement(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside = "nan") -> Array:
-        """``delta(P)``, the inverse of `force`."""
-        self._require("displacement")
-        return self._at_load(joint, load, outside).delta
-
-    def stiffness(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside = "nan") -> Array:
+    def stiffness(self, joint: LawJoint, delta: npt.ArrayLike, extrapolate: bool = False) -> Array:
         """``dP/d(delta)``; infinite at a load limit."""
-        return self._at_displacement(joint, delta, outside).stiffness
+        return self.at_displacement(joint, delta, extrapolate).stiffness
 
-    def peak_pressure(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside = "nan") -> Array:
-        """``p0(P)``."""
-        self._require("pressure")
-        return self.at_load(joint, load, outside).peak_pressure
+    def displacement(self, joint: LawJoint, load: npt.ArrayLike, extrapolate: bool = False) -> Array:
+        """``delta(P)``, the inverse of `force`; nan for a law without displacements."""
+        return self.at_load(joint, load, extrapolate).delta
 
-    def angle(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside = "nan") -> Array:
-        """Contact semi-angle ``eps(P)``."""
-        self._require("contact angle")
-        return self.at_load(joint, load, outside).angle
-
-    def at_displacement(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside = "nan") -> LawState:
+    def at_displacement(self, joint: LawJoint, delta: npt.ArrayLike, extrapolate: bool = False) -> LawState:
         """All quantities at displacements ``delta``."""
-        return self._with_pressure(joint, self._at_displacement(joint, delta, outside), outside)
-
-    def at_load(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside = "nan") -> LawState:
-        """All quantities at loads ``load``; displacement and stiffness are nan for a law without."""
-        return self._with_pressure(joint, self._at_load(joint, load, outside), outside)
-
-    def _require(self, quantity: str) -> None:
-        if quantity not in self.gives:
-            but = ", only pressure and angle of a load" if quantity == "displacement" else ""
-            raise ValueError(f"{self.name}: this law gives no {quantity}{but}.")
-
-    def _at_displacement(self, joint: LawJoint, delta: npt.ArrayLike, outside: Outside) -> LawState:
-        self._require("displacement")
-        self._check(joint, outside)
-        given = np.asarray(delta, dtype=float)
-        return self._known(joint, self._inside(joint, given, self.limit(joint), self.end(joint), "delta", outside))
-
-    def _at_load(self, joint: LawJoint, load: npt.ArrayLike, outside: Outside) -> LawState:
-        self._check(joint, outside)
-        P, limit, end = np.asarray(load, dtype=float), self.limit(joint), self.end(joint)
+        self._check(joint)
         if not self.gives_displacement:
-            return self._known(joint, self._inside(joint, P, limit, end, "P", outside))
-        state = partial(self.state, joint)
-        limit, end = (x if math.isinf(x) else float(state(np.array(x)).load) for x in (limit, end))
-        P = self._inside(joint, P, limit, end, "P", outside)
-        if self.inverse is not None:
-            delta = self.inverse(joint, np.where(P >= 0, P, 0.0))
-        else:
-            delta = monotone_root(lambda x: state(x).load, lambda x: state(x).stiffness, P, joint.clearance)
-        return replace(self._known(joint, np.where(P >= 0, delta, np.nan)), load=P)
+            raise ValueError(f"{self.name}: this law gives no displacement, only pressure and angle of a load.")
+        return self._known(joint, self._inside(joint, delta, self.limit(joint), "delta", extrapolate))
+
+    def at_load(self, joint: LawJoint, load: npt.ArrayLike, extrapolate: bool = False) -> LawState:
+        """All quantities at loads ``load``; displacement and stiffness are nan for a law without."""
+        self._check(joint)
+        limit = self.limit(joint)
+        if not self.gives_displacement:
+            return self._known(joint, self._inside(joint, load, limit, "P", extrapolate))
+
+        def force(delta: Array) -> Array:
+            return self.state(joint, delta).load
+
+        P = self._inside(joint, load, float(force(np.array(limit))), "P", extrapolate)
+        return replace(self._known(joint, rising_root(force, P, limit)), load=P)
 
     def _known(self, joint: LawJoint, x: Array) -> LawState:
         """The state at checked points ``x``: nan in, nan out."""
@@ -131,35 +98,21 @@ class Law:
         state = self.state(joint, np.where(valid, x, 0.0))
         return LawState(*(np.where(valid, getattr(state, each.name), np.nan) for each in fields(LawState)))
 
-    def _with_pressure(self, joint: LawJoint, state: LawState, outside: Outside) -> LawState:
-        """``state``, with pressure and angle taken out beyond their own range."""
-        limit, unit = self.pressure_limit(joint), joint.E_star * joint.clearance
-        beyond = state.load > limit * (1 + _ROUND_OFF)
-        if not beyond.any():
-            return state
-        said = (
-            f"{self.name}: p0 and eps are Hertz's, for P up to {limit / unit:.4g} E* dR, where the half-width of the "
-            f"contact is R/2; asked for {_span(state.load[beyond] / unit)} E* dR"
-        )
-        warn(said, outside)
-        if outside == "extrapolate":
-            return state
-        p0, eps = (np.where(beyond, np.nan, x) for x in (state.peak_pressure, state.angle))
-        return replace(state, peak_pressure=p0, angle=eps)
-
-    def _inside(self, joint: LawJoint, x: Array, limit: float, end: float, what: str, outside: Outside) -> Array:
-        """``x`` with nan where the law has nothing to say; warns, or raises, about points outside the range."""
-        named, unit = ("dR", joint.clearance) if what == "delta" else ("E* dR", joint.E_star * joint.clearance)
-        beyond = (x < 0) | (x > limit * (1 + _ROUND_OFF))
+    def _inside(self, joint: LawJoint, x: npt.ArrayLike, limit: float, what: str, extrapolate: bool) -> Array:
+        """``x`` with nan where the law has nothing to say; warns about points outside the range."""
+        named, unit = ("dR", joint.clearance) if what == "delta" else ("E* dR", joint.unit)
+        x = np.asarray(x, dtype=float)
+        beyond = (x < 0) | (x > limit * (1 + ROUND_OFF))
         reason = self.unfit(joint)
         if not (beyond.any() or reason):
             return x
-        stray = reason or f"{what} = {_span(x[beyond] / unit)} {named} is outside 0 to {limit / unit:.4g} {named}"
-        warn(f"{self.name}: {stray} (range: {self.range})", outside)
-        within_formula = (x >= 0) & (x <= end * (1 + _ROUND_OFF))
-        return np.where(within_formula if outside == "extrapolate" else ~beyond & (not reason), x, np.nan)
+        low, high = (f"{end:.4g}" for end in (x[beyond].min(initial=np.inf) / unit, x[beyond].max(initial=0) / unit))
+        span = low if low == high else f"{low} to {high}"
+        stray = reason or f"{what} = {span} {named} is outside 0 to {limit / unit:.4g} {named}"
+        warnings.warn(LawRangeWarning(f"{self.name}: {stray} (range: {self.range})"), stacklevel=4)
+        return np.where(x >= 0 if extrapolate else ~beyond & (not reason), x, np.nan)
 
-    def _check(self, joint: LawJoint, outside: Outside) -> None:
+    def _check(self, joint: LawJoint) -> None:
         """Refuse a joint that lacks what the law needs; of laws with displacements also a ring, whose P(delta) is
         another one, and warn of a small block, which is softer than the law's."""
         for name in self.needs:
@@ -167,61 +120,34 @@ class Law:
                 raise ValueError(f"{self.name}: this law needs {name}.")
         if not self.gives_displacement:
             return
-        if joint.model == "ring":
+        if joint.ring:
             raise ValueError(
                 f'{self.name}: is a law for a pin in a block; of joint.model = "ring" its P would be about twice too '
                 "high. Of a ring only hertz and persson hold, which give no displacement."
             )
         about, most = joint.softer
         if joint.block_size is not None and about > _FELT:
-            width = joint.block_size / joint.radius
             said = (
-                f"{self.name}: is a law for a block of {LARGE:g} R; in this one of {width:.4g} R the joint is softer, "
-                f"and its P about {about:.1%} smaller than the law's (up to {most:.1%} with a rigid pin, or beyond "
-                "yield)"
+                f"{self.name}: is a law for a block of {LARGE:g} R; in this one of "
+                f"{joint.block_size / joint.radius:.4g} R the joint is softer, and its P about {about:.1%} smaller "
+                f"than the law's (up to {most:.1%} with a rigid pin, or beyond yield)"
             )
-            warn(said, outside)
+            warnings.warn(LawRangeWarning(said), stacklevel=4)
 
 
-def warn(said: str, outside: Outside) -> None:
-    """Warn with `LawRangeWarning`, or raise `LawRangeError` where ``outside`` is "raise"."""
-    if outside == "raise":
-        raise LawRangeError(f"{said}.")
-    warnings.warn(LawRangeWarning(said), stacklevel=5)
-
-
-def _span(x: Array) -> str:
-    low, high = x.min(), x.max()
-    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
-
-
-def monotone_root(f: Callable[[Array], Array], slope: Callable[[Array], Array], target: Array, start: float) -> Array:
+def rising_root(f: Callable[[Array], Array], target: Array, start: float) -> Array:
     """Solve ``f(x) = target`` for ``x >= 0`` with ``f`` rising from ``f(0) <= target``; nan where f stays below it.
 
-    Newton's method in a bracket, with the middle of the bracket where a step would leave it. ``start`` is a first guess
-    of the size of x. Targets that are not positive or not finite give 0 and nan. Shapes ``(...)`` in and out.
+    Halves brackets until no number is left between their ends; ``start`` is a first guess of the size of x, and f may
+    be nan above some x. Targets that are not positive or nan give 0 and nan. Shapes ``(...)`` in and out.
     """
     target = np.asarray(target, dtype=float)
-    wanted = np.isfinite(target) & (target > 0)
-    goal = np.where(wanted, target, 1.0)
-    low, high = np.zeros_like(goal), np.full_like(goal, start)
-    for _ in range(_ENOUGH):
-        short = (f(high) < goal) & (high < _FAR)
-        if not short.any():
-            break
+    low, high = np.zeros_like(target), np.full_like(target, start)
+    while (short := (f(high) < target) & (high < _FAR)).any():
         low, high = np.where(short, high, low), np.where(short, 2 * high, high)
-    reached = f(high) >= goal
-    goal = np.where(reached, goal, f(high))
-    x = high
-    for _ in range(_ENOUGH):
-        excess = f(x) - goal
-        low, high = np.where(excess <= 0, x, low), np.where(excess >= 0, x, high)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = x - excess / slope(x)
-        # NaN compares false, so a vanishing slope falls to the middle as well
-        step = np.where((step > low) & (step < high), step, 0.5 * (low + high))
-        done = (np.abs(step - x) <= 4e-16 * np.abs(step)) | (excess == 0)
-        x = np.where(excess == 0, x, step)
-        if done.all():
-            break
-    return np.where(wanted & reached, x, np.where(target <= 0, 0.0, np.nan))
+    middle = (low + high) / 2
+    while ((low < middle) & (middle < high)).any():
+        short = f(middle) < target
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+        middle = (low + high) / 2
+    return np.where(target <= 0, 0.0, np.where(f(high) >= target, high, np.nan))

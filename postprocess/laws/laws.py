@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from archord.postprocess.laws import calibrated
 from archord.postprocess.laws import chord_laws as chord
 from archord.postprocess.laws import elastic_laws as elastic
+from archord.postprocess.laws.calibrated import calibrated, with_coefficients
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.postprocess.laws.law import Law, LawState
 
-_Function = Callable[[LawJoint, Array], Array]
 _THIN = 0.1  # dR/R up to which R1 = R2 = R is an approximation
 _ALIKE = 0.01  # Dundurs' beta that counts as zero
 _DEEPEST = 2.0  # displacement over clearance up to which Hu et al. compare their law with finite elements
@@ -40,89 +39,52 @@ def _unlike(joint: LawJoint) -> str:
     return _thick(joint)
 
 
-def _chord(force: _Function, stiffness: _Function, peak: _Function, **more: Any) -> dict[str, Any]:
-    """A law with the contact angle of rigid circles that overlap."""
+def _logarithmic(make: Callable[..., elastic.Logarithm], *width: float, hertz: bool = True) -> dict[str, Any]:
+    """Half-spaces up to the law's load limit, with the pressure and contact angle of ``hertz`` in his range."""
 
     def state(joint: LawJoint, delta: Array) -> LawState:
-        values = (function(joint, delta) for function in (force, stiffness, peak, chord.chord_angle))
-        return LawState(delta, *values)
+        found = make(joint, *width).state(delta)
+        if not hertz:
+            return found
+        small = np.where(elastic.hertz_load_limit(joint) >= found.load, found.load, np.nan)
+        pressed = elastic.hertz(joint, small)
+        return replace(found, peak_pressure=pressed.peak_pressure, angle=pressed.angle)
 
-    return {"state": state, "limit": _deepest, "unfit": _thick, **more}
-
-
-def _liu(joint: LawJoint, delta: Array) -> LawState:
-    alike = replace(joint, k=chord.LIU_K)
-    P, slope = chord.paper_force(alike, delta), chord.paper_stiffness(alike, delta)
-    return LawState(delta, P, slope, joint.E_star * delta / (2 * joint.radius), chord.chord_angle(joint, delta))
-
-
-def _calibrated(joint: LawJoint, delta: Array) -> LawState:
-    fitted = calibrated.with_coefficients(joint)
-    P, slope, p0 = (f(fitted, delta) for f in (chord.plastic_force, chord.plastic_stiffness, chord.plastic_peak))
-    return LawState(delta, P, slope, p0, chord.chord_angle(joint, delta))
+    gives = {} if hertz else {"gives": ("displacement",)}
+    return {"state": state, "limit": lambda joint: make(joint, *width).delta_limit, **gives}
 
 
-def _logarithmic(make: Callable[[LawJoint], elastic.Logarithm], hertz: bool = True, **more: Any) -> dict[str, Any]:
-    """Half-spaces up to the law's load limit, with the pressure and contact angle of ``hertz``, or without."""
-
-    def state(joint: LawJoint, delta: Array) -> LawState:
-        law = make(joint)
-        P = law.force(delta)
-        pressed = (elastic.hertz_pressure(joint, P), elastic.hertz_angle(joint, P)) if hertz else ()
-        return LawState(delta, P, law.stiffness(delta), *pressed)
-
-    return {
-        "state": state,
-        "limit": lambda joint: make(joint).delta_limit,
-        "end": lambda joint: make(joint).delta_limit,
-        "inverse": lambda joint, P: make(joint).displacement(P),
-        **({"pressure_limit": elastic.hertz_load_limit} if hertz else {"gives": ("displacement",)}),
-        **more,
-    }
-
-
-def _slender(joint: LawJoint) -> float:
-    law = elastic.dubowsky_freudenstein(joint)
-    return float(law.displacement(np.asarray(min(elastic.slender_load(joint), law.load_limit))))
-
-
-def _of_load(peak: _Function, angle: _Function, **more: Any) -> dict[str, Any]:
-    """A law that gives pressure and contact angle of a load."""
-
-    def state(joint: LawJoint, P: Array) -> LawState:
-        return LawState(np.array(np.nan), P, peak_pressure=peak(joint, P), angle=angle(joint, P))
-
-    return {"state": state, "gives": ("pressure", "contact angle"), **more}
-
-
+_CHORD: dict[str, Any] = {"limit": _deepest, "unfit": _thick}
+_OF_LOAD = {"gives": ("pressure", "contact angle")}
 _FUNCTIONS: dict[str, dict[str, Any]] = {
     "calibrated": {
-        "state": _calibrated,
+        "state": lambda joint, delta: chord.plastic_winkler(with_coefficients(joint), delta),
         "limit": _deepest,
-        "unfit": lambda joint: calibrated.joint_calibrated(joint).outside,
+        "unfit": lambda joint: calibrated(joint).outside,
         "needs": ("plane", "nu"),
     },
-    "paper": _chord(chord.paper_force, chord.paper_stiffness, chord.winkler_pressure),
-    "paper-plastic": _chord(chord.plastic_force, chord.plastic_stiffness, chord.plastic_peak, needs=("yield_stress",)),
-    "winkler": _chord(chord.winkler_force, chord.winkler_stiffness, chord.winkler_pressure),
-    "liu": {"state": _liu, "limit": _deepest, "unfit": _thick},
+    "paper": {"state": chord.parabola, **_CHORD},
+    "paper-plastic": {"state": chord.plastic_winkler, "needs": ("yield_stress",), **_CHORD},
+    "winkler": {"state": chord.winkler, **_CHORD},
+    "liu": {"state": chord.liu, **_CHORD},
     "johnson": _logarithmic(elastic.johnson),
     "radzimovsky": _logarithmic(elastic.radzimovsky),
-    "radzimovsky-width": _logarithmic(lambda joint: elastic.radzimovsky(joint, elastic.ROARK_WIDTH)),
-    "radzimovsky-2.41": _logarithmic(lambda joint: elastic.radzimovsky(joint, elastic.IMPLIED_WIDTH)),
+    "radzimovsky-width": _logarithmic(elastic.radzimovsky, elastic.ROARK_WIDTH),
+    "radzimovsky-2.41": _logarithmic(elastic.radzimovsky, elastic.IMPLIED_WIDTH),
     "esdu-78035": _logarithmic(elastic.esdu, hertz=False),
-    "dubowsky-freudenstein": _logarithmic(
-        elastic.dubowsky_freudenstein, hertz=False, limit=_slender, needs=("length",)
-    ),
+    "dubowsky-freudenstein": {
+        **_logarithmic(elastic.dubowsky_freudenstein, hertz=False),
+        "limit": elastic.dubowsky_freudenstein_limit,
+        "needs": ("length",),
+    },
     "lankarani-nikravesh": {
         "state": elastic.lankarani_nikravesh,
         "limit": elastic.lankarani_nikravesh_limit,
-        "inverse": elastic.lankarani_nikravesh_displacement,
         "needs": ("length",),
         "gives": ("displacement", "pressure"),
     },
-    "hertz": _of_load(elastic.hertz_pressure, elastic.hertz_angle, limit=elastic.hertz_load_limit),
-    "persson": _of_load(elastic.persson_peak, elastic.persson_angle, limit=lambda joint: math.inf, unfit=_unlike),
+    "hertz": {"state": elastic.hertz, "limit": elastic.hertz_load_limit, **_OF_LOAD},
+    "persson": {"state": elastic.persson, "limit": lambda joint: math.inf, "unfit": _unlike, **_OF_LOAD},
 }
 _WORDS = tomllib.loads((Path(__file__).parent / "laws.toml").read_text(encoding="utf-8"))
 

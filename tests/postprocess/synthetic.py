@@ -6,7 +6,7 @@ import numpy as np
 
 from archord.benchmarks.case import E, paper_joint
 from archord.postprocess.curve import RunCurve
-from archord.postprocess.laws.chord_laws import plastic_force, plastic_peak
+from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.joint import LawJoint
 from archord.presets.arc import ArcProfile
 
@@ -30,8 +30,8 @@ def curve(k, c=None, *, dR=0.005, sigY=None, R=1.0, modulus=1.0, noise=0.0, seed
     E_star, gap = scene.E_star, dR * R
     delta = LOADS * gap
     law = LawJoint(R, gap, E_star, sigY * modulus if c and sigY else None, k=k, c=c or 1.0)
-    P, p0, peeq = plastic_force(law, delta), plastic_peak(law, delta), np.maximum(delta - law.first_yield, 0.0)
+    state, peeq = plastic_winkler(law, delta), np.maximum(delta - law.first_yield, 0.0)
     random = np.random.default_rng(seed)
-    P = P + noise * E_star * gap * random.standard_normal(len(P))
-    p0 = p0 + noise * E_star * gap / R * random.standard_normal(len(P))
+    P = state.load + noise * E_star * gap * random.standard_normal(len(delta))
+    p0 = state.peak_pressure + noise * E_star * gap / R * random.standard_normal(len(delta))
     return RunCurve(name, scene, delta, P, p0, np.ones(len(P)), peeq)

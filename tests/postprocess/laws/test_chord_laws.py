@@ -7,16 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from archord.postprocess.laws.chord_laws import (
-    chord_angle,
-    paper_force,
-    plastic_force,
-    plastic_peak,
-    plastic_stiffness,
-    semi_chord,
-    winkler_force,
-    winkler_pressure,
-)
+from archord.postprocess.laws.chord_laws import parabola, plastic_winkler
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
 
@@ -39,7 +30,7 @@ def test_elastic_law_is_the_force_of_the_parabola(delta):
     p0 = 0.85 * JOINT.E_star * delta / JOINT.radius
     expected = chord_integral(lambda t: p0 * (1 - t**2), delta)
     assert LAWS["paper"].force(JOINT, delta) == pytest.approx(expected, rel=1e-10)
-    assert LAWS["paper"].peak_pressure(JOINT, expected) == pytest.approx(p0, rel=1e-9)
+    assert LAWS["paper"].at_load(JOINT, expected).peak_pressure == pytest.approx(p0, rel=1e-9)
 
 
 @pytest.mark.parametrize(("k", "c"), [(0.85, 1.0), (0.7, 1.6), (1.2, 0.5)])
@@ -55,31 +46,31 @@ def test_plastic_law_is_the_force_of_the_cut_parabola(delta, k, c):
         return 2 * l * quad(lambda t: min(p0 * (1 - t**2), plateau), a, b, epsabs=0, epsrel=1e-13)[0]
 
     expected = integral(edge, 1) + (integral(0, edge) if edge else 0)
-    assert plastic_force(joint, np.array(delta)) == pytest.approx(expected, rel=1e-11)
-    assert semi_chord(joint, np.array(delta)) == pytest.approx(l, rel=1e-11)
+    assert plastic_winkler(joint, np.array(delta)).load == pytest.approx(expected, rel=1e-11)
     if delta <= 2 * JOINT.clearance:
         assert LAWS["paper-plastic"].force(joint, delta) == pytest.approx(expected, rel=1e-11)
-        assert LAWS["paper-plastic"].peak_pressure(joint, expected) == pytest.approx(min(p0, plateau), rel=1e-9)
+        assert LAWS["paper-plastic"].at_load(joint, expected).peak_pressure == pytest.approx(min(p0, plateau), rel=1e-9)
 
 
 @pytest.mark.parametrize("c", [1.0, 1.6])
 def test_up_to_the_onset_the_plastic_law_is_the_elastic_one(c):
     """To round-off, and at delta0 Winkler's pressure is the plateau; without a yield stress, everywhere."""
     joint = replace(JOINT, c=c)
-    lower = np.linspace(0, joint.first_yield, 7)
-    np.testing.assert_allclose(plastic_force(joint, lower), paper_force(joint, lower), rtol=1e-14)
-    assert winkler_pressure(joint, lower[-1]) == pytest.approx(c * 300.0, rel=1e-14)
-    elastic, deep = replace(joint, yield_stress=None), 10 * joint.first_yield
-    assert plastic_force(elastic, deep) == paper_force(joint, deep) > plastic_force(joint, deep)
-    assert plastic_peak(elastic, deep) == winkler_pressure(joint, deep)
+    lower, deep = np.linspace(0, joint.first_yield, 7), 10 * joint.first_yield
+    plastic, elastic = plastic_winkler(joint, lower), parabola(joint, lower)
+    np.testing.assert_allclose(plastic.load, elastic.load, rtol=1e-14)
+    eq9 = 8 / 3 * joint.k * joint.E_star * lower * np.sqrt(lower / (2 * (joint.clearance + lower)))
+    np.testing.assert_allclose(elastic.load, eq9, rtol=1e-14)
+    assert elastic.peak_pressure[-1] == pytest.approx(c * 300.0, rel=1e-14)
+    assert parabola(joint, deep).load > plastic_winkler(joint, deep).load
 
 
 def test_at_first_touch_there_is_nothing():
     """No force, pressure or stiffness at delta = 0, a little beyond; no floating point trouble on the way."""
     with np.errstate(all="raise"):
-        for law in (plastic_force, plastic_stiffness, plastic_peak):
-            nothing, little = law(JOINT, np.array([0.0, 1e-30]))
-            assert nothing == 0 < little
+        state = plastic_winkler(JOINT, np.array([0.0, 1e-30]))
+    for nothing, little in (state.load, state.stiffness, state.peak_pressure):
+        assert nothing == 0 < little
 
 
 def test_plastic_law_joins_the_elastic_one_smoothly():
@@ -101,10 +92,11 @@ def test_far_beyond_yield_the_chord_is_under_the_yield_stress():
     soft = LawJoint(radius=1.0, clearance=1e-3, E_star=1.0, yield_stress=1e-12, k=0.8, c=1.3)
     delta = np.array([0.1, 1.0]) * 1e-3
     u = soft.first_yield / delta
-    ratio = plastic_force(soft, delta) / (2 * 1.3e-12 * semi_chord(soft, delta))
+    state, chord = plastic_winkler(soft, delta), 2 * np.sqrt(delta / (2 * (1e-3 + delta)))
+    ratio = state.load / (2 * 1.3e-12 * chord)
     np.testing.assert_allclose(ratio, 1 - u / 4, rtol=0, atol=2e-14)  # series of eq. 11 for small delta0/delta
-    slope = 1.3e-12 * semi_chord(soft, delta) / delta * 1e-3 / (1e-3 + delta)  # of 2 c sigY l
-    np.testing.assert_allclose(plastic_stiffness(soft, delta) / slope, 1, rtol=2 * u.max())
+    slope = 1.3e-12 * chord / delta * 1e-3 / (1e-3 + delta)  # of 2 c sigY l
+    np.testing.assert_allclose(state.stiffness / slope, 1, rtol=2 * u.max())
 
 
 @pytest.mark.parametrize("delta", DEPTHS)
@@ -123,7 +115,7 @@ def test_winkler_keeps_its_digits_at_first_touch():
     """P -> k E* (4/3) delta sqrt(2 delta/dR): the leading term of the integral."""
     delta = JOINT.clearance * 1e-12
     leading = 0.85 * JOINT.E_star * 4 / 3 * delta * np.sqrt(2e-12)
-    assert winkler_force(JOINT, np.array(delta)) == pytest.approx(leading, rel=1e-9)
+    assert LAWS["winkler"].force(JOINT, delta) == pytest.approx(leading, rel=1e-9)
 
 
 @pytest.mark.parametrize("delta", DEPTHS)
@@ -137,9 +129,8 @@ def test_liu_is_the_force_of_the_ellipse(delta):
 
 @pytest.mark.parametrize("name", ["paper", "paper-plastic", "winkler", "liu"])
 def test_angle_is_that_of_overlapping_circles(name):
-    P = LAWS[name].force(JOINT, DEPTHS)
-    assert LAWS[name].angle(JOINT, P) == pytest.approx(contact_angle(DEPTHS), rel=1e-9)
-    assert chord_angle(JOINT, np.array(0.0)) == 0
+    assert LAWS[name].at_displacement(JOINT, DEPTHS).angle == pytest.approx(contact_angle(DEPTHS), rel=1e-9)
+    assert LAWS[name].at_displacement(JOINT, 0.0).angle == 0
 
 
 @pytest.mark.parametrize("name", ["paper", "paper-plastic", "winkler", "liu"])

@@ -1,7 +1,5 @@
 """``archord fit SWEEP`` as a user runs it."""
 
-import csv
-import json
 import math
 from pathlib import Path
 
@@ -11,7 +9,7 @@ import pytest
 from archord.cli import run
 from archord.postprocess.laws.calibrated import ROWS, TABLE, CalibratedModel
 from archord.postprocess.laws.calibration import calibrate
-from archord.postprocess.laws.study import read_cases
+from archord.postprocess.laws.study_cases import as_csv, read_cases
 from archord.postprocess.run import Run
 from archord.studies.cases import read_sweep
 
@@ -47,7 +45,7 @@ def test_a_small_sweep_gets_its_table(solved, capsys):
     stored, notes = read_cases(solved / "fit.csv")
     assert list(stored.run) == [cases[0].run, cases[1].run]
     for case, row in zip(cases[:2], stored.itertuples(), strict=True):
-        k = calibrate([Run(solved / "cases" / case.run).curve]).joint.P.k
+        k = calibrate([Run(solved / "cases" / case.run).curve]).joint.k
         assert row.k == pytest.approx(k.value, rel=1e-6)
         assert row.k_error == pytest.approx(k.standard_error, rel=1e-6)
         assert f" {row.k:.4f} " in printed
@@ -82,39 +80,19 @@ def test_small_blocks_are_named(solved, tmp_path, capsys):
     assert said in capsys.readouterr().out
 
 
-def test_files_of_others_and_inputs_stay(tmp_path, capsys):
-    """Stored rows are not written over themselves; what fit wrote is overwritten, another file needs --force."""
-    rows, link = tmp_path / "rows.csv", tmp_path / "link.json"
+def test_files_of_others_and_inputs_stay(solved, tmp_path, capsys):
+    """The law is not written over what it is fitted to, and over another file only with --force; fit.csv is the
+    command's own."""
+    rows, law = tmp_path / "rows.csv", tmp_path / "law.json"
     rows.write_text(ROWS.read_text())
-    link.symlink_to(rows)
-    for words in (["--csv", rows], ["--json", link], ["--law", rows]):
-        assert run(["fit", str(rows), *map(str, words), "--force"]) == 2
-        assert f"{words[1]}: cannot be written: it is an input of the command." in capsys.readouterr().err
+    assert run(["fit", str(rows), "--law", str(rows), "--force"]) == 2
+    assert f"{rows}: cannot be written: it is an input of the command." in capsys.readouterr().err
     assert rows.read_text() == ROWS.read_text()
-    files = [tmp_path / name for name in ("law.json", "again.csv", "all.json")]
-    words = ["fit", str(rows), "--law", str(files[0]), "--csv", str(files[1]), "--json", str(files[2])]
-    for _ in range(2):
-        assert run(words) == 0
-    for file in files:
-        text = file.read_text()
-        file.write_text("mine\n", encoding="utf-8")
-        assert run(words) == 2
-        assert file.read_text() == "mine\n"
-        file.write_text(text)
-
-
-def test_a_sweep_is_no_file_to_write_its_fit_to(solved, capsys):
-    """Nor is a table of that name which somebody else left there."""
-    text = (solved / "sweep.toml").read_text()
-    assert run(["fit", str(solved), "--json", str(solved / "sweep.toml"), "--force"]) == 2
-    assert "sweep.toml: cannot be written: it is an input" in capsys.readouterr().err
-    assert (solved / "sweep.toml").read_text() == text
-    kept = (solved / "fit.csv").read_text()
-    (solved / "fit.csv").write_text("mine\n", encoding="utf-8")
-    assert run(["fit", str(solved)]) == 2
-    assert (solved / "fit.csv").read_text() == "mine\n"
-    assert run(["fit", str(solved), "--force"]) == 0
-    assert (solved / "fit.csv").read_text() == kept
+    law.write_text("mine\n", encoding="utf-8")
+    assert run(["fit", str(rows), "--law", str(law)]) == 2
+    assert law.read_text() == "mine\n"
+    assert run(["fit", str(rows), "--law", str(law), "--force"]) == 0
+    assert run(["fit", str(solved)]) == 0
 
 
 def test_too_few_cases_write_no_law(solved, tmp_path, capsys):
@@ -124,37 +102,29 @@ def test_too_few_cases_write_no_law(solved, tmp_path, capsys):
 
 
 def test_stored_rows_give_the_law_that_is_shipped(tmp_path, capsys):
-    """By the documented command; table, coefficients and errors are printed, the files hold what is printed."""
-    law, copy, data, picture = (tmp_path / name for name in ("law.json", "fit.csv", "all.json", "fit.png"))
-    words = ["--law", law, "--csv", copy, "--json", data, "--picture", picture]
-    assert run(["fit", str(ROWS), *map(str, words)]) == 0
+    """By the documented command; errors are printed, the file holds what is printed; rows give back their file."""
+    law = tmp_path / "law.json"
+    assert run(["fit", str(ROWS), "--law", str(law)]) == 0
     printed = capsys.readouterr().out
     model, shipped = (CalibratedModel.from_json(file.read_text()).data for file in (law, TABLE))
     assert model["form"] == shipped["form"]
     np.testing.assert_allclose(model["elastic"], shipped["elastic"], rtol=1e-4)
     assert model["provenance"] == shipped["provenance"]
-    assert copy.read_text() == ROWS.read_text()
     row = next(line for line in printed.splitlines() if line.startswith("| held out | both | all |"))
     assert f"{model['errors']['held out']['both all']['P']['rms']:.1%}" in row
-    everything = json.loads(data.read_text())
-    with copy.open() as stream:
-        rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
-    assert len(everything["cases"]) == len(rows)
-    assert everything["model"]["elastic"] == model["elastic"]
-    assert picture.read_bytes()[1:4] == b"PNG"
+    assert as_csv(*read_cases(ROWS)) == ROWS.read_text()
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (["{out}", "{out}"], "a sweep is fitted alone"),
-        (["{out}", "--hold-k", "0.8"], "--hold-k, --residuals and --python are for runs"),
-        (["{out}", "--picture", "x.png"], "x.png: no law to draw: 2 elastic cases are too few"),
-        (["{run}", "--csv", "x.csv"], "--csv and --law are for a sweep"),
+        (["{out}", "--picture", "x.png"], "a sweep is fitted alone; --json, --python and --picture are for runs."),
+        (["{run}", "--law", "x.json"], "--law is for a sweep, and this is none."),
         (["nothing.csv"], "nothing.csv: cannot be read"),
-        (["{out}", "--csv", "no/where.csv"], "no is not a folder"),
+        (["{rows}", "--law", "no/where.json"], "no is not a folder"),
     ],
 )
 def test_bad_requests_are_one_sentence(solved, refused, words, said):
-    places = {"out": solved, "run": solved / "cases" / read_sweep(solved / "sweep.toml").distinct[0].run}
+    places = {"out": solved, "run": solved / "cases" / read_sweep(solved / "sweep.toml").distinct[0].run, "rows": ROWS}
     assert said in refused(["fit", *(word.format(**places) for word in words)])
