@@ -19,37 +19,18 @@ _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")
 _EXPONENT = re.compile(r"(?<=\d)(?=[+-]\d{3}$)")  # Fortran leaves out the E before three digits
 _NEAR_THE_AXIS = 0.2  # radians
 
-
-@dataclass(frozen=True)
-class PrintedBlock:
-    """One table of a ``.dat`` file: ``quantity`` on the set ``name`` at ``time``, its ``rows`` ``(n, columns)``."""
-
-    quantity: str
-    name: str
-    time: float
-    rows: Array
+Printed = list[tuple[str, str, float, Array]]  # tables of a ``.dat`` file: quantity, set, time, rows ``(n, columns)``
 
 
 @dataclass(frozen=True)
 class SecondOpinion:
-    """CalculiX's results for the whole joint at the last step, as in `archord.presets.measures.Measures`.
-
-    ``pressure`` ``(n,)`` is that of the nodes on the pin's arc at the growing angles ``angle`` ``(n,)`` from the
-    contact axis, ``peeq_integral`` zero in elastic scenes.
-    """
+    """CalculiX's results for the whole joint at the last step, as in `archord.presets.measures.Measures`; iterations
+    of all steps."""
 
     P: float
-    angle: Array
-    pressure: Array
+    p0: float
     peeq_integral: float
     iterations: int
-
-    @property
-    def p0(self) -> float:
-        """Pressure on the contact axis: an even parabola through the nodes near it; nan if fewer than three are
-        pressed."""
-        near = (self.pressure > 0) & (self.angle <= max(_NEAR_THE_AXIS, 2.001 * math.pi / 2 / (len(self.angle) - 1)))
-        return float(np.polyfit(self.angle[near] ** 2, self.pressure[near], 1)[-1]) if near.sum() >= 3 else math.nan
 
 
 def process(scene: Scene, mesh: PlaneMesh, folder: Path) -> Process:
@@ -71,19 +52,24 @@ def read_opinion(scene: Scene, mesh: PlaneMesh, folder: Path) -> SecondOpinion:
         raise Failure("; ".join([f"CalculiX ended after step {len(forces)} of {len(scene.targets)}", *errors]))
     arc = np.unique(mesh.edge_nodes(Facets.PIN_ARC))
     angle = np.arctan2(mesh.x[arc, 0], -mesh.x[arc, 1] - scene.joint.dR)
-    order = np.argsort(angle)
-    pressure = read_contact_pressure((folder / "joint.frd").read_text(), len(mesh.x))
+    pressure = read_contact_pressure((folder / "joint.frd").read_text(), len(mesh.x))[arc]
     increments = [line.split() for line in (folder / "joint.sta").read_text().splitlines()]
     return SecondOpinion(
-        P=float(forces[-1]) / thickness(scene),
-        angle=angle[order],
-        pressure=pressure[arc[order]],
-        peeq_integral=peeq_integral(printed, mesh),
-        iterations=sum(int(row[3]) for row in increments if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()),
+        float(forces[-1]) / thickness(scene),
+        axis_pressure(angle, pressure),
+        peeq_integral(printed, mesh),
+        sum(int(row[3]) for row in increments if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()),
     )
 
 
-def read_printed(text: str) -> list[PrintedBlock]:
+def axis_pressure(angle: Array, pressure: Array) -> float:
+    """Pressure on the contact axis: an even parabola through the nodal values ``(n,)`` within 0.2 rad of it; nan if
+    fewer than three of them are pressed."""
+    near = (pressure > 0) & (angle <= _NEAR_THE_AXIS)
+    return float(np.polyfit(angle[near] ** 2, pressure[near], 1)[-1]) if near.sum() >= 3 else math.nan
+
+
+def read_printed(text: str) -> Printed:
     """All tables of the ``.dat`` file ``text``, in its order."""
     found: list[tuple[re.Match, list[list[float]]]] = []
     for line in text.splitlines():
@@ -92,31 +78,28 @@ def read_printed(text: str) -> list[PrintedBlock]:
             found.append((header, []))
         elif found and line.strip() and not line.lstrip()[0].isalpha():
             found[-1][1].append([float(_EXPONENT.sub("E", word)) for word in line.split()])
-    return [PrintedBlock(h[1], h[2], float(h[3]), np.array(rows, dtype=float)) for h, rows in found]
+    return [(h[1], h[2], float(h[3]), np.array(rows, dtype=float)) for h, rows in found]
 
 
-def step_forces(printed: list[PrintedBlock], name: str) -> Array:
-    """Downward force ``(steps,)`` of the whole joint on the node set ``name`` at the end of each step.
+def step_forces(printed: Printed, nodes: str) -> Array:
+    """Downward force ``(steps,)`` of the whole joint on the set ``nodes`` at the end of each step.
 
     Steps last one unit of time. CalculiX prints increments too, and sometimes the end of a step twice: the last counts.
     """
     forces: dict[int, float] = {}
-    for block in printed:
-        step = round(block.time)
-        if block.quantity == "total force" and block.name == name and abs(block.time - step) < 1e-4:
-            forces[step] = -2 * float(block.rows[0, 1])
+    for quantity, name, time, rows in printed:
+        if (quantity, name) == ("total force", nodes) and abs(time - round(time)) < 1e-4:
+            forces[round(time)] = -2 * float(rows[0, 1])
     return np.array([forces[k] for k in sorted(forces)])
 
 
-def peeq_integral(printed: list[PrintedBlock], mesh: PlaneMesh) -> float:
+def peeq_integral(printed: Printed, mesh: PlaneMesh) -> float:
     """The integral of PEEQ over the whole joint at the last time printed.
 
     Means of the elements times their areas: the points of a triangle have equal weights where its edges are straight.
     """
-    latest: dict[str, Array] = {b.name: b.rows for b in printed if b.quantity == "equivalent plastic strain"}
-    if not latest:
-        return 0.0
-    rows = np.concatenate(list(latest.values()))
+    latest = {name: rows for quantity, name, _, rows in printed if quantity == "equivalent plastic strain"}
+    rows = np.concatenate([np.zeros((0, 3)), *latest.values()])
     element = rows[:, 0].astype(int) - 1
     count = np.bincount(element, minlength=len(mesh.elements))
     total = np.bincount(element, rows[:, 2], minlength=len(mesh.elements))
@@ -142,12 +125,7 @@ def read_contact_pressure(text: str, n_nodes: int) -> Array:
     Columns 4 to 13 of a record are the node, from 14 on twelve to a component (COPEN, CSLIP1, CSLIP2, CPRESS, ...).
     """
     pressure = np.zeros(n_nodes)
-    reading = False
-    for line in text.splitlines():
-        if line.startswith(" -4"):
-            reading = line.split()[1] == "CONTACT"
-        elif line.startswith(" -3"):
-            reading = False
-        elif reading and line.startswith(" -1"):
+    for line in text.rpartition(" -4  CONTACT")[2].partition("\n -3")[0].splitlines():
+        if line.startswith(" -1"):
             pressure[int(line[3:13]) - 1] = float(line[49:61])
     return pressure
