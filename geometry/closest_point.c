@@ -10,9 +10,11 @@ typedef struct {
     double y[2], t[2], k[2]; /* position, first and second derivative */
 } Frame;
 
-/* Values, slopes and second derivatives of the p + 1 shape functions with the given monomial coefficients at xi. */
-static void shapes(int p, const double *coefficients, double xi, double *N, double *dN, double *ddN)
+/* The frame at xi of the facet with nodes X, and the values N and slopes dN of its p + 1 shape functions, which are given
+   by their monomial coefficients. */
+static Frame frame(int p, const double *coefficients, const double *X, double xi, double *N, double *dN)
 {
+    Frame f = {{0, 0}, {0, 0}, {0, 0}};
     for (int a = 0; a <= p; a++) {
         const double *c = coefficients + a * (p + 1);
         double v = c[p], d = 0, dd = 0;
@@ -21,21 +23,13 @@ static void shapes(int p, const double *coefficients, double xi, double *N, doub
             d = d * xi + v;
             v = v * xi + c[i];
         }
-        N[a] = v, dN[a] = d, ddN[a] = dd;
-    }
-}
-
-static Frame frame(int p, const double *coefficients, const double *X, double xi, double *N, double *dN)
-{
-    double ddN[MOST];
-    Frame f = {{0, 0}, {0, 0}, {0, 0}};
-    shapes(p, coefficients, xi, N, dN, ddN);
-    for (int a = 0; a <= p; a++)
+        N[a] = v, dN[a] = d;
         for (int i = 0; i < 2; i++) {
-            f.y[i] += N[a] * X[2 * a + i];
-            f.t[i] += dN[a] * X[2 * a + i];
-            f.k[i] += ddN[a] * X[2 * a + i];
+            f.y[i] += v * X[2 * a + i];
+            f.t[i] += d * X[2 * a + i];
+            f.k[i] += dd * X[2 * a + i];
         }
+    }
     return f;
 }
 

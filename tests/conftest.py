@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 def pytest_addoption(parser):
     parser.addoption("--kills", type=int, default=12, help="how often test_kill.py kills runs (12)")
+    parser.addoption("--cases", type=int, default=12, help="how many scenes tests/fuzz solves (12)")
 
 
 def pytest_collection_modifyitems(items):

@@ -2,8 +2,8 @@
 
 Whatever is in a scene file, the command ends with 0 (solved), 2 (refused) or 3 (could not go on), without traceback or
 warning of a library, writes nothing when it refuses, and only finite numbers when it does not. Each case runs in a
-process of its own, with limits on memory, files and time; a case that a signal stops in order after the time limit
-counts as slow, not as failed.
+process of its own, with limits on memory, files and time; one that a signal stops in order after the time limit is
+slow, which is no fault. ``pytest tests/fuzz --cases 1000`` solves that many.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ class FuzzCase(NamedTuple):
     faults: list[str]
 
 
-def scene_of(seed: int, number: int) -> tuple[str, bytes]:
-    """Kind of mutation and content of case ``number`` under ``seed``; the same wherever it is asked for."""
-    rng = Random(f"{seed}/{number}")
+def scene_of(number: int) -> tuple[str, bytes]:
+    """Kind of mutation and content of case ``number``; the same wherever it is asked for."""
+    rng = Random(number)
     return mutate(rng, rng.choice(list(base_scenes().values())))
 
 
-def run_case(seed: int, number: int, folder: Path) -> FuzzCase:
+def run_case(number: int, folder: Path) -> FuzzCase:
     """Solve case ``number`` in ``folder``, which is made for it."""
-    kind, content = scene_of(seed, number)
+    kind, content = scene_of(number)
     folder.mkdir(parents=True)
     (folder / "scene.toml").write_bytes(content)
     arguments = ["solve", "scene.toml", "-o", "run"]

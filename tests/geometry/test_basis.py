@@ -3,30 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis, lagrange_triangle, strain, strain_matrix
 from archord.geometry.quarter_joint import quarter_joint
 
 
-@pytest.fixture(scope="module")
-def mesh():
-    return quarter_joint(MPI.COMM_SELF, 1.0, 0.005, 5.0, 0.3, 0.5).mesh
-
-
-@pytest.fixture(scope="module")
-def basis(mesh):
-    """Of all cells, at the points of the quadrature."""
-    return basis_at(mesh, bulk_quadrature(2)[0])
-
-
-def basis_at(mesh, X):
-    return cell_basis(mesh, 2, np.arange(len(nodes(mesh)), dtype=np.int32), X)
-
-
-def nodes(mesh):
-    return mesh.geometry.x[mesh.geometry.dofmap, :2]
+def mesh_and_basis(X):
+    """Nodes ``(n, a, 2)`` of a joint's cells, and the basis at points of all of them."""
+    mesh = quarter_joint(MPI.COMM_SELF, 1.0, 0.005, 5.0, 0.3, 0.5).mesh
+    nodes = mesh.geometry.x[mesh.geometry.dofmap, :2]
+    return nodes, cell_basis(mesh, 2, np.arange(len(nodes), dtype=np.int32), X)
 
 
 def cell_by_cell(u):
@@ -35,32 +22,33 @@ def cell_by_cell(u):
     return np.arange(n * a, dtype=np.int32).reshape(n, a), np.ascontiguousarray(u).reshape(-1, 2)
 
 
-def test_gradients_of_linear_fields_are_exact_on_curved_cells(mesh, basis):
+def test_gradients_of_linear_fields_are_exact_on_curved_cells():
     """The isoparametric basis reproduces a displacement linear in x and y; rigid motions do not strain."""
+    nodes, basis = mesh_and_basis(bulk_quadrature(2)[0])
     for A, tolerance in (np.array([[0.1, -0.4], [0.3, 0.2]]), 1e-13), (np.array([[0.0, -1.0], [1.0, 0.0]]), 1e-12):
-        u = nodes(mesh) @ A.T + [1.0, 2.0]
+        u = nodes @ A.T + [1.0, 2.0]
         gradient = np.einsum("nqaj,nai->nqij", basis.gradient, u)
         np.testing.assert_allclose(gradient, np.broadcast_to(A, gradient.shape), atol=tolerance)
         found = strain(basis.gradient, *cell_by_cell(u))
-        np.testing.assert_allclose(
-            found, np.broadcast_to([A[0, 0], A[1, 1], A[0, 1] + A[1, 0]], found.shape), atol=1e-12
-        )
-    np.testing.assert_allclose(np.einsum("qa,nai->nqi", basis.shape, nodes(mesh)), basis.point, atol=1e-14)
+        expected = np.broadcast_to([A[0, 0], A[1, 1], A[0, 1] + A[1, 0]], found.shape)
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+    np.testing.assert_allclose(np.einsum("qa,nai->nqi", basis.shape, nodes), basis.point, atol=1e-14)
 
 
-def test_gradients_are_the_derivatives_of_the_shape_functions(mesh):
+def test_gradients_are_the_derivatives_of_the_shape_functions():
     """Central differences along both axes, through the curved map, on cells of either orientation."""
     X, h = np.array([[0.2, 0.3], [0.6, 0.1]]), 1e-5
-    basis = basis_at(mesh, X)
+    _, basis = mesh_and_basis(X)
     chain = np.einsum("nqai,nqij->nqaj", basis.gradient, basis.jacobian)
     for j in range(2):
         up, down = (lagrange_triangle(2).tabulate(0, X + s * h * np.eye(2)[j])[0, :, :, 0] for s in (1, -1))
         np.testing.assert_allclose(chain[..., j], np.broadcast_to((up - down) / (2 * h), chain.shape[:3]), atol=1e-9)
 
 
-def test_strain_matrix_times_displacement_is_the_strain(mesh, basis):
+def test_strain_matrix_times_displacement_is_the_strain():
     """Both ways to the strain agree for any nodal displacement."""
-    u = np.random.default_rng(0).normal(size=(len(nodes(mesh)), 6, 2))
+    nodes, basis = mesh_and_basis(bulk_quadrature(2)[0])
+    u = np.random.default_rng(0).normal(size=nodes.shape)
     expected = np.einsum("nqia,na->nqi", strain_matrix(basis.gradient), u.reshape(len(u), 12))
     found = strain(basis.gradient, *cell_by_cell(u))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())

@@ -67,12 +67,8 @@ def scatter(c: Curve, distance: float, displacement=0.0, n: int = 500, seed: int
 
 def brute_force(c: Curve, x, displacement=0.0, per_facet: int = 200):
     """Distance of ``x`` from the nearest of many points of the curve."""
-    samples, _ = on_curve(
-        c,
-        np.repeat(np.arange(c.n_facets), per_facet + 1),
-        np.tile(np.linspace(0, 1, per_facet + 1), c.n_facets),
-        displacement,
-    )
+    facet, xi = np.repeat(np.arange(c.n_facets), per_facet + 1), np.linspace(0, 1, per_facet + 1)
+    samples, _ = on_curve(c, facet, np.tile(xi, c.n_facets), displacement)
     return np.array([np.sqrt(((samples - p) ** 2).sum(axis=1).min()) for p in x])
 
 
@@ -151,9 +147,8 @@ def test_the_start_does_not_matter(f, shift):
     q = closest(c, x, outward, start)
     np.testing.assert_allclose(q.point, p.point, rtol=0, atol=1e-13)
     np.testing.assert_array_equal(q.found, p.found)
-    np.testing.assert_allclose(
-        c.arc_length(q.xi)[q.facet, np.arange(len(x))], c.arc_length(p.xi)[p.facet, np.arange(len(x))], atol=1e-12
-    )
+    s, t = (c.arc_length(found.xi)[found.facet, np.arange(len(x))] for found in (q, p))
+    np.testing.assert_allclose(s, t, atol=1e-12)
 
 
 def roof():
@@ -193,65 +188,53 @@ def test_points_beyond_a_free_end_or_facing_away_have_no_partner(f):
     assert closest(c, y - 0.02 * forward + 0.01 * normal, -normal).found.all()
 
 
-def linearisation(p, x, dx, du, n_nodes):
-    """Directional derivatives of gap, normal and closest point that the fields of a projection stand for."""
+def linearisation(p, x, dx, du):
+    """Directional derivatives of gap, normal and closest point that the fields of a projection stand for; ``du``
+    ``(nodes, 2)``, or ``(2,)`` of a rigid circle."""
     speed = np.linalg.norm(p.tangent, axis=1)
-    d = x - p.point
+    d, du = x - p.point, np.atleast_2d(du)
     gap = (d * p.normal).sum(1)
-    dy_fixed = np.einsum("ma,mai->mi", p.shape, du[p.nodes]) if n_nodes else np.broadcast_to(du, x.shape)
-    dt = np.einsum("ma,mai->mi", p.slope, du[p.nodes]) if n_nodes else np.zeros_like(x)
+    dy_fixed, dt = (np.einsum("ma,mai->mi", N, du[p.nodes]) for N in (p.shape, p.slope))
     dxi = ((dx - dy_fixed) * p.tangent).sum(1) + (d * dt).sum(1)
     dxi *= p.slides / (speed**2 - gap * p.bend)
     turn = ((dt * p.normal).sum(1) + p.bend * dxi) / speed
     dn = -turn[:, None] * p.tangent / speed[:, None]
     dy = dy_fixed + dxi[:, None] * p.tangent
-    dgap = ((dx - dy) * p.normal).sum(1) + (d * dn).sum(1)
-    return dgap, dn, dy
+    return ((dx - dy) * p.normal).sum(1) + (d * dn).sum(1), dn, dy
 
 
-def assert_derivative(project, x, dx, u, du, n_nodes, h=1e-6):
-    """`linearisation` against central differences of the projection."""
+def assert_derivative(project, x, u, h=1e-6):
+    """`linearisation` against central differences of the projection, in a random direction."""
+    rng = np.random.default_rng(4)
+    dx, du = rng.normal(size=x.shape), 0.1 * rng.normal(size=u.shape)
     p, plus, minus = project(x, u), project(x + h * dx, u + h * du), project(x - h * dx, u - h * du)
     same = (plus.facet == p.facet) & (minus.facet == p.facet) & (plus.slides == p.slides) & (minus.slides == p.slides)
     assert same.mean() > 0.98
-    dgap, dn, dy = linearisation(p, x, dx, du, n_nodes)
+    dgap, dn, dy = linearisation(p, x, dx, du)
     gap = [((x + s * h * dx - q.point) * q.normal).sum(1) for s, q in ((1, plus), (-1, minus))]
-    np.testing.assert_allclose(dgap[same], ((gap[0] - gap[1]) / (2 * h))[same], atol=1e-7)
-    np.testing.assert_allclose(dn[same], ((plus.normal - minus.normal) / (2 * h))[same], atol=1e-6)
-    np.testing.assert_allclose(dy[same], ((plus.point - minus.point) / (2 * h))[same], atol=1e-6)
+    changes = (dgap, *gap, 1e-7), (dn, plus.normal, minus.normal, 1e-6), (dy, plus.point, minus.point, 1e-6)
+    for found, up, down, tolerance in changes:
+        np.testing.assert_allclose(found[same], ((up - down) / (2 * h))[same], atol=tolerance)
 
 
 @every_curve
 def test_linearisation_of_the_closest_point(f):
     """Gap, normal and closest point move as tangent, bend and slope say, for moving points on a moving curve."""
-    rng = np.random.default_rng(4)
     c = interpolate(f, 12)
     u = 0.02 * np.sin(2 * c.X[:, ::-1] + 1)
     x, outward = scatter(c, 0.2, u)
-    assert_derivative(
-        lambda x, u: c.closest_point(x, outward, u),
-        x,
-        rng.normal(size=x.shape),
-        u,
-        0.1 * rng.normal(size=u.shape),
-        len(u),
-    )
+    assert_derivative(lambda x, u: c.closest_point(x, outward, u), x, u)
 
 
 def test_linearisation_at_a_corner():
     """A vertex stands still on its facets, its normal turns with the nodes."""
-    rng = np.random.default_rng(4)
     c = roof()
-    angle = rng.uniform(np.radians(50), np.radians(130), 50)
+    angle = np.random.default_rng(4).uniform(np.radians(50), np.radians(130), 50)
     x = 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     outward, u = np.tile([0.0, -1.0], (50, 1)), np.zeros_like(c.X)
     p = c.closest_point(x, outward, u)
     assert not p.slides.any()
-
-    def project(x, u):
-        return c.closest_point(x, outward, u, p.facet)
-
-    assert_derivative(project, x, rng.normal(size=x.shape), u, 0.1 * rng.normal(size=u.shape), len(u))
+    assert_derivative(lambda x, u: c.closest_point(x, outward, u, p.facet), x, u)
 
 
 def test_rigid_circle():
@@ -266,20 +249,14 @@ def test_rigid_circle():
     assert not circle.closest_point(x, ray, motion).found.any()
     distance = np.linalg.norm(x - circle.centre - motion, axis=1) - 2.0
     np.testing.assert_allclose(((x - p.point) * p.normal).sum(1), distance, rtol=0, atol=1e-14)
-    assert_derivative(
-        lambda x, u: circle.closest_point(x, -ray, u), x, rng.normal(size=x.shape), motion, rng.normal(size=2), 0
-    )
-
-
-def nearest_is_the_fifth(self, x, displacement):
-    return np.full(len(x), 5)
+    assert_derivative(lambda x, u: circle.closest_point(x, -ray, u), x, motion)
 
 
 @pytest.mark.parametrize(
     ("broken", "name", "value", "said"),
     [
         (curve_module, "_NEWTON_STEPS", 1, "found no closest point"),
-        (Curve, "nearest_facet", nearest_is_the_fifth, "beyond the facets searched"),
+        (Curve, "nearest_facet", lambda self, x, u: np.full(len(x), 5), "beyond the facets searched"),
     ],
 )
 def test_a_lost_point_is_an_error(monkeypatch, broken, name, value, said):
