@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def show(folder: Path, output: Path | None, pictures: bool) -> int:
     """Print a run's joint, state, history, peaks, cost and warnings, or a sweep's cases; and draw them."""
     from archord.output.folder import is_sweep
-    from archord.postprocess.pictures import draw_run, draw_sweep
+    from archord.postprocess.pictures import draw_run, draw_runs
     from archord.postprocess.run import Run
     from archord.postprocess.sweep import Sweep
     from archord.postprocess.tables import run_text, sweep_text
@@ -29,7 +29,9 @@ def show(folder: Path, output: Path | None, pictures: bool) -> int:
     target = output or folder / "picture.png"
     if is_sweep(folder):
         sweep = Sweep(folder)
-        text, drawn = sweep_text(sweep), draw_sweep(sweep, target) if pictures and sweep.runs else None
+        text, drawn = sweep_text(sweep), None
+        if pictures and sweep.runs:
+            drawn = draw_runs(list(sweep.runs.values()), [f"case {case}" for case in sweep.runs], target)
     else:
         run = Run(folder)
         text, drawn = run_text(run), draw_run(run, target) if pictures and run.steps else None

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from archord.output.disk import replace_file
 from archord.presets.joint import Joint
-from archord.presets.joint_report import APART, mesh_facts, model_facts, rough_arcs
+from archord.presets.joint_report import APART, facts, rough_arcs
 from archord.presets.measures import Measures, energy_balance
 from archord.report.version import VERSION
 from archord.solver.stepping import Step
@@ -63,8 +63,7 @@ class Report:
             },
             "ranks": comm.size,
             "peak_memory": [],
-            "mesh": mesh_facts(joint),
-            "model": model_facts(joint),
+            **facts(joint),
             "tolerances": {"newton": joint.problem.tolerance, "gamma_factor": joint.scene.analysis.gamma_factor},
             "restarts": restarts,
             # the step after those done is noted once more

@@ -51,7 +51,7 @@ def compare_runs(runs: list[Run]) -> Comparison:
     """Compare ``runs`` with the first. Raises `InputError` for fewer than two, one without steps, or no common load."""
     if len(runs) < 2:
         raise InputError("compare: needs two runs or more.")
-    curves, labels = comparable(runs)
+    curves, labels, _ = comparable(runs)
     delta = curves[0].delta
     margin = _SAME * np.abs(delta).max()
     step_by_step = all(len(c.delta) == len(delta) and np.allclose(c.delta, delta, rtol=0, atol=margin) for c in curves)
@@ -80,32 +80,22 @@ def _at(delta: Array, curve: RunCurve, between: np.ndarray) -> RunCurve:
     return found
 
 
-def comparable(runs: Sequence[Run]) -> tuple[list[RunCurve], dict[str, str]]:
-    """The curves of ``runs`` and the labels of their quantities: as they are where units, R, dR and E* of all are the
-    same, else over powers of E*, R and the clearance."""
-    curves = [run.curve for run in runs]
-    units = runs[0].scene.units
-    if same_size([run.scene for run in runs]):
-        named = {"delta": units.length, "P": units.force, "p0": units.stress, "eps": "rad"}
-        return curves, {name: f"{name} [{unit}]" for name, unit in named.items()}
+def comparable(runs: Sequence[Run]) -> tuple[list[RunCurve], dict[str, str], list[float]]:
+    """The curves of ``runs``, the labels of their quantities, and what pressures are divided by: as they are where the
+    units, R, dR and E* of all are the same, else over powers of E*, R and the clearance."""
+    curves, units = [run.curve for run in runs], [run.scene.units for run in runs]
+    sizes = np.array([[curve.R, curve.dR, curve.E_star] for curve in curves])
+    if all(unit == units[0] for unit in units) and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0):
+        named = {"delta": units[0].length, "P": units[0].force, "p0": units[0].stress, "eps": "rad"}
+        return curves, {name: f"{name} [{unit}]" for name, unit in named.items()}, [1.0] * len(runs)
     gap = gap_name(min(curve.dR for curve in curves))
     labels = {"delta": f"delta/{gap}", "P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})", "eps": "eps [rad]"}
-    return [
-        replace(c, delta=c.delta / abs(c.dR), P=c.P / (c.E_star * abs(c.dR)), p0=c.p0 / pressure_scale(c))
-        for c in curves
-    ], labels
-
-
-def pressure_scale(curve: RunCurve) -> float:
-    """``E* |dR|/R``, by which pressures are divided in dimensionless form."""
-    return curve.E_star * abs(curve.dR) / curve.R
-
-
-def same_size(scenes: Sequence[Scene]) -> bool:
-    """Whether all ``scenes`` have the same units, R, dR and E*."""
-    units = {(scene.units.length, scene.units.stress) for scene in scenes}
-    sizes = np.array([[scene.joint.radius, scene.joint.dR, scene.E_star] for scene in scenes])
-    return len(units) == 1 and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0)
+    scales = [c.E_star * abs(c.dR) / c.R for c in curves]
+    scaled = [
+        replace(c, delta=c.delta / abs(c.dR), P=c.P / (p * c.R), p0=c.p0 / p)
+        for c, p in zip(curves, scales, strict=True)
+    ]
+    return scaled, labels, scales
 
 
 def differing_keys(scenes: Sequence[Scene]) -> dict[str, list[str]]:

@@ -1,8 +1,7 @@
 """Orders of convergence and errors of discretisation, from results on several meshes or in steps of several lengths.
 
-All assume ``f(h) = f(0) + C h^p`` (Richardson 1911) and differ in what is known of the order p. `Refined` extrapolates
-the curves of runs, with the order of three meshes; `mesh_error` and `step_error` bound the error of a curve, for a
-solver that refines until it is small.
+All assume ``f(h) = f(0) + C h^p`` (Richardson 1911). `Refined` extrapolates the curves of runs, with the order p of
+three meshes; `mesh_error` and `step_error` bound the error of a curve, for a solver that refines until it is small.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """The fields of a run at a step, as fields.h5 holds them, and the deformed joint drawn so that its clearance is seen.
 
-Displacements alone cannot be magnified: bodies that touch would overlap, as the gap between their circles would stay
-what it is. So the clearance is magnified with them. Every point counts as displaced from its place in a joint without
-clearance, in which both arcs are the circle of radius R around the origin: the pin centred there, the block drawn in by
-dR along its radii. Magnified by m, a gap is m times as wide, and what touches touches, but for ``(m s)^2/(2 R)`` where
-one body has slid by s along the other; that is why m is kept moderate.
+Displacements alone cannot be magnified: bodies that touch would overlap. So the clearance is magnified with them. Every
+point counts as displaced from its place in a joint without clearance, in which both arcs are the circle of radius R
+around the origin. Magnified by m, a gap is m times as wide, and what touches touches, but for ``(m s)^2/(2 R)`` where
+one body has slid by s along the other.
 """
 
 from __future__ import annotations

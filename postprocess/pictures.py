@@ -1,4 +1,4 @@
-"""Pictures as files: of a run, of runs over each other, and of a sweep."""
+"""Pictures as files: of a run, and of runs over each other."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import numpy as np
 from archord.materials.material import Array
 from archord.output.user_file import writing
 from archord.postprocess import panels
-from archord.postprocess.comparison import comparable, pressure_scale, same_size
+from archord.postprocess.comparison import comparable
 from archord.postprocess.run import Run
-from archord.postprocess.sweep import Sweep
 from archord.report.figure import new_figure, save
 from archord.scene.errors import InputError
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FEW = 10  # runs that get a colour of their own and a name in the legend
-_MOST = 200  # runs of a sweep that are drawn
 
 
 def save_figure(figure: Figure, target: Path) -> Path:
@@ -60,8 +58,7 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
     many = len(runs) > _FEW
     figure = new_figure(15, 4.6)
     force, pressure, angle = figure.subplots(1, 3)
-    curves, labels = comparable(runs)
-    same = same_size([run.scene for run in runs])
+    curves, labels, scales = comparable(runs)
     last = min(float(curve.first_loading().delta[-1]) for curve in curves)
     for k, (run, curve, name) in enumerate(zip(runs, curves, names, strict=True)):
         colour = colormaps["viridis"](k / (len(runs) - 1)) if many else f"C{k}"
@@ -69,7 +66,7 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
         force.plot([0, *curve.delta], [0, *curve.P], **style)
         angle.plot(curve.delta, np.degrees(curve.eps), **style)
         phi, p = _pressure_at(run, curve.first_loading().delta, last)
-        pressure.plot(np.degrees(phi), p if same else p / pressure_scale(run.curve), **style)
+        pressure.plot(np.degrees(phi), p / scales[k], **style)
     force.set(xlabel=labels["delta"], ylabel=labels["P"], title="force of the joint")
     pressure.set(xlabel="angle from the contact axis [°]", ylabel=labels["p0"].replace("p0", "p"), xlim=(0, None))
     pressure.set(ylim=(0, None), title=f"contact pressure at {labels['delta']} = {last:.4g}")
@@ -87,18 +84,3 @@ def _pressure_at(run: Run, delta: Array, wanted: float) -> tuple[Array, Array]:
     place = float(np.interp(wanted, delta, np.arange(len(delta))))
     below, above = (run.arc(int(k) + 1).facet_means() for k in (np.floor(place), np.ceil(place)))
     return below[0], below[1] + (place % 1) * (above[1] - below[1])
-
-
-def draw_sweep(sweep: Sweep, target: Path) -> Path:
-    """Draw the runs of ``sweep``, 200 at most, over each other as ``target``; returns the file.
-
-    Raises `InputError` if no case has an accepted step, or the file cannot be written.
-    """
-    cases = list(sweep.runs)
-    if not cases:
-        raise InputError(f"{sweep.folder}: no case has an accepted step to draw.")
-    chosen = [cases[k] for k in sorted({round(k) for k in np.linspace(0, len(cases) - 1, min(len(cases), _MOST))})]
-    varied = sweep.cases.set_index("case")[sweep.moving].astype(object)
-    rows = varied.where(varied.notna(), "-").to_dict("index")
-    names = [", ".join(f"{key} = {value}" for key, value in rows[case].items()) for case in chosen]
-    return draw_runs([sweep.runs[case] for case in chosen], names, target)

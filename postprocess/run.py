@@ -25,7 +25,6 @@ from archord.scene.scene import Scene
 if TYPE_CHECKING:
     import pandas as pd
 
-
 _KNOWN = {"status", "message", "warnings", "versions", "seconds", "totals", "steps"}  # keys of a run.json
 _NEEDED = (*CURVES, "step", "delta/dR", "P/(E* R)", "p0/E*", "iterations", "cutbacks", "seconds")
 _WHOLE = ("step", "iterations", "cutbacks")  # columns of whole numbers

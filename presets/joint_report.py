@@ -22,30 +22,17 @@ UNSEEN = (
 )
 
 
-def mesh_facts(joint: Joint) -> dict[str, Any]:
-    """Sizes of the mesh."""
-    lengths = {name: s.facet_lengths() for name, s in joint.sides.items()}
-    return {
+def facts(joint: Joint) -> dict[str, dict[str, Any]]:
+    """Sizes of the mesh, and what was made of the scene."""
+    lengths = {name: side.facet_lengths() for name, side in joint.sides.items()}
+    mesh = {
         "cells": joint.n_cells,
         "dofs": joint.n_dofs,
         "contact_facets": {name: len(length) for name, length in lengths.items()},
         "element_size_on_arc": {name: [float(length.min()), float(length.max())] for name, length in lengths.items()},
-        "growth": joint.scene.joint.growth,
-        "block_size": joint.scene.joint.W,
     }
-
-
-def model_facts(joint: Joint) -> dict[str, Any]:
-    """What was made of the scene."""
-    scene = joint.scene
-    return {
-        "E_star": scene.E_star,
-        "clearance": scene.joint.dR,
-        "target": scene.targets[-1],
-        "plastic": joint.bulk.plastic,
-        "pin": "rigid" if scene.pin.rigid else "deformable",
-        "contact_shares": [pair.share for pair in joint.contact.pairs],
-    }
+    model = {"E_star": joint.scene.E_star, "contact_shares": [pair.share for pair in joint.contact.pairs]}
+    return {"mesh": mesh, "model": model}
 
 
 def rough_arcs(joint: Joint) -> list[str]:
@@ -71,9 +58,8 @@ def step_warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, re
         said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
     touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
     if m.contact_area and touching < _FEW_FACETS:
-        said.append(
-            f"only {touching} facet{'s' if touching != 1 else ''} in contact; a smaller element_size would resolve it"
-        )
+        facets = "facet" if touching == 1 else "facets"
+        said.append(f"only {touching} {facets} in contact; a smaller element_size would resolve it")
     if core_peeq > 0:
         said.append(
             f"the pin yields where the force is applied, with PEEQ up to {core_peeq:.1e} in its core, and delta, the "
