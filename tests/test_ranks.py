@@ -32,20 +32,6 @@ def test_two_ranks_say_and_write_what_one_does(runs, tmp_path, arguments, writte
     assert found[0] == found[1]
 
 
-@pytest.fixture
-def launched(monkeypatch):
-    """Sets the environment of a launcher, alone."""
-    for name in list(os.environ):
-        if name.startswith(ranks._LAUNCHER):
-            monkeypatch.delenv(name)
-
-    def set_(**variables: str) -> None:
-        for name, value in variables.items():
-            monkeypatch.setenv(name, value)
-
-    return set_
-
-
 @pytest.mark.parametrize(
     ("variables", "rank", "others"),
     [
@@ -58,17 +44,17 @@ def launched(monkeypatch):
         ({"SLURM_PROCID": "0", "SLURM_NTASKS": "4"}, 0, False),  # the script of a batch job, which is one process
     ],
 )
-def test_launchers_are_known_by_their_variables(launched, variables, rank, others):
-    launched(**variables)
+def test_launchers_are_known_by_their_variables(monkeypatch, variables, rank, others):
+    monkeypatch.setattr(os, "environ", variables)
     assert (ranks.launcher_rank(), ranks.launched_with_others()) == (rank, others)
 
 
 @pytest.mark.parametrize("rank", ["0", "1"])
-def test_a_command_of_one_rank_forgets_the_launcher(launched, rank):
+def test_a_command_of_one_rank_forgets_the_launcher(monkeypatch, rank):
     """Rank 0 works as if started by hand, the other not at all."""
-    launched(OMPI_COMM_WORLD_RANK=rank, OMPI_COMM_WORLD_SIZE="2", PMIX_RANK=rank)
+    launched = {"OMPI_COMM_WORLD_RANK": rank, "OMPI_COMM_WORLD_SIZE": "2", "PMIX_RANK": rank}
+    monkeypatch.setattr(os, "environ", launched)
     seen = []
-    assert ranks.run_on_ranks("fit", lambda: seen.append(ranks.launched_with_others()) or 5) == (
-        5 if rank == "0" else 0
-    )
+    code = ranks.run_on_ranks("fit", lambda: seen.append(ranks.launched_with_others()) or 5)
+    assert code == (5 if rank == "0" else 0)
     assert seen == ([False] if rank == "0" else [])

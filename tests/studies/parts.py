@@ -6,7 +6,6 @@ from pathlib import Path
 from archord.cli import run
 from archord.presets import joint
 
-SCENES = Path(__file__).parents[2] / "scenes"
 BASE = """
 [base]
 units = { length = "R", stress = "E*" }

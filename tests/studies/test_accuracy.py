@@ -62,24 +62,19 @@ def test_an_elastic_joint_is_as_accurate_as_asked(elastic):
     assert [level.mesh_error is None for level in found.levels] == [True] + [False] * (len(sizes) - 1)
 
 
-def test_the_run_says_how_accurate_it_is(elastic):
-    """run.json has what was asked, what came out, and every mesh; the last one is the run's."""
+def test_the_run_says_how_accurate_it_is_and_can_be_solved_again(elastic, tmp_path):
+    """run.json has what was asked, what came out, and every mesh, scene.toml the last one and no accuracy."""
     report = json.loads((elastic.folder / "run.json").read_text())
     block, last = report["accuracy"], report["accuracy"]["levels"][-1]
-    assert report["status"] == "done"
-    assert block["asked"] == 1e-3
+    assert (report["status"], block["asked"]) == ("done", 1e-3)
     assert report["error_estimates"]["mesh"] == block["mesh_error"] == block["estimated"]
     assert last["dofs"] == report["mesh"]["dofs"]
     assert last["last"] == report["steps"][-1]["P"]
     assert last["iterations"] == report["totals"]["newton_iterations"]
     assert sum(level["seconds"] for level in block["levels"]) <= block["seconds"]
-
-
-def test_the_scene_that_is_left_gives_the_same_numbers(elastic, tmp_path):
-    """It holds the mesh, and no accuracy."""
     scene = load_scene(elastic.folder / "scene.toml")
     assert scene.analysis.accuracy is None
-    assert scene.joint.h == pytest.approx(elastic.accuracy.levels[-1].element_size)
+    assert scene.joint.h == pytest.approx(last["element_size"])
     solve_scene(scene, tmp_path, MPI.COMM_SELF)
     same_run(elastic.folder, tmp_path, 1e-10)
 

@@ -58,18 +58,16 @@ def test_every_stratum_of_a_range_holds_one_sample(number, seed, low, factor):
     """On a linear and on a logarithmic scale; the same seed gives the same samples, another one others."""
     ends = {"from": low, "to": low * factor}
     ranges = {"joint.radius": ends, "joint.clearance": {**ends, "scale": "log"}}
-    rows = samples(LatinHypercube.model_validate({"number": number, "seed": seed, "ranges": ranges}))
-    linear = np.array([row["joint.radius"] for row in rows])
-    log = np.array([row["joint.clearance"] for row in rows])
+
+    def drawn(seed: int) -> list:
+        return samples(LatinHypercube.model_validate({"number": number, "seed": seed, "ranges": ranges}))
+
+    rows = drawn(seed)
+    linear, log = (np.array([row[key] for row in rows]) for key in ranges)
     for share in ((linear - low) / (low * (factor - 1)), np.log(log / low) / math.log(factor)):
-        position = share * number
         # rounded to nine digits, a sample may lie on the edge of its stratum
-        assert (np.abs(np.sort(position) - np.arange(number) - 0.5) <= 0.5 + 1e-5).all()
-    again, other = (
-        samples(LatinHypercube.model_validate({"number": number, "seed": some, "ranges": ranges}))
-        for some in (seed, seed + 1)
-    )
-    assert rows == again != other
+        assert (np.abs(np.sort(share * number) - np.arange(number) - 0.5) <= 0.5 + 1e-5).all()
+    assert rows == drawn(seed) != drawn(seed + 1)
 
 
 def test_overrides_mean_what_set_means(tmp_path):
@@ -91,18 +89,15 @@ def test_overrides_mean_what_set_means(tmp_path):
     ]
     found = read_sweep(written(tmp_path, text)).cases
     assert [resolved(case.scene) for case in found] == [resolved(load_scene(ELASTIC, some)) for some in options]
-    plastic = read_sweep(
-        written(tmp_path, '[grid]\nblock.yield_stress = ["none", 300.0]', str(SCENES / "steel_pin.toml"))
-    )
+    text = '[grid]\nblock.yield_stress = ["none", 300.0]'
+    plastic = read_sweep(written(tmp_path, text, str(SCENES / "steel_pin.toml")))
     assert [case.scene.block.yield_stress for case in plastic.cases] == [None, 300.0]
     assert all(case.scene.pin.yield_stress for case in plastic.cases)
 
 
 def test_identical_scenes_are_one_run(tmp_path):
     """However they are written; a scene's name depends on nothing but its content."""
-    text = (
-        "[grid]\njoint.clearance = [0.005, 5e-3, 0.006]\n[[list]]\nblock.hardening = 0\n[[list]]\nblock.hardening = 0.0"
-    )
+    text = "list = [{ block.hardening = 0 }, { block.hardening = 0.0 }]\n[grid]\njoint.clearance = [0.005, 5e-3, 0.006]"
     sweep = read_sweep(written(tmp_path, text))
     assert (len(sweep.cases), len(sweep.distinct)) == (6, 2)
     assert [case.number for case in sweep.distinct] == [1, 3]
@@ -145,12 +140,9 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
     ("text", "said"),
     [
         ("gird = 3", "gird = 3: is not a known key."),
-        ("grid = [1]", "grid = [1]: input should be a valid dictionary."),
         ("[grid]\njoint.clearance = 1", "grid.joint.clearance = 1: input should be a valid list."),
         ("[grid]\nclearance = [1]", "[grid] clearance: must read section.key, like joint.clearance."),
         ("grid.units.length = ['m']", "[grid] units.length: cannot vary; all cases of a table have the same units."),
-        ("zip = {}", "zip: dictionary should have at least 1 item after validation, not 0."),
-        ("list = 3", "list = 3: input should be a valid list."),
         ("[zip]\npin.E = [1, 2]\npin.nu = [0]", "zip: must hold lists of one length, but pin.E has 2, pin.nu has 1."),
         (
             "[grid]\njoint.clearance = [0.1]\n[[list]]\njoint.relative_clearance = 0.1",
@@ -241,6 +233,5 @@ def test_the_parts_of_an_array_are_the_whole(tmp_path):
     assert sorted(case.number for part in parts for case in part) == [case.number for case in cases]
     cost = [sum(expected_seconds(case.scene) for case in part) for part in parts]
     assert max(cost) < 1.2 * min(cost)
-    for wrong in ("0/3", "4/3", "1", "a/b", "1/0"):
-        with pytest.raises(InputError, match=f"--array {wrong}: must be I/N"):
-            part_of(cases, wrong)
+    with pytest.raises(InputError, match="--array 0/3: must be I/N"):
+        part_of(cases, "0/3")

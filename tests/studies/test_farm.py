@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from archord.benchmarks.case import Case as BenchmarkCase
-from archord.output.history import read_history
 from archord.output.ranks import agreed
 from archord.studies.cases import Case, read_sweep
 from archord.studies.farm import solve_case, solve_cases
@@ -16,7 +14,6 @@ from archord.studies.sweep import open_cases
 from archord.studies.tables import CASES, of_case, report_of, result_of
 from tests.studies.parts import SOFT, break_mesh, written
 
-CLOCK = {"seconds", "force_balance"}
 SIX = "[grid]\npin.E = [0.5, 0.6, 0.7, 0.8, 1.0, 1.82]\n"
 
 
@@ -33,19 +30,15 @@ def cases_of(comm, folder: Path, text: str) -> tuple[Path, list[Case]]:
 
 @pytest.mark.mpi
 def test_each_case_is_solved_once_by_somebody(comm, tmp_path):
-    """Results come to rank 0 alone; a history is that of a solve by itself on one rank."""
+    """On one rank; results come to rank 0 alone."""
     folder, cases = cases_of(comm, tmp_path, SOFT)
     results = []
     assert solve_cases(comm, cases, folder, results.append) == 0
-    if comm.rank:
-        assert results == []
-        return
-    assert sorted(result.run for result in results) == sorted(case.run for case in cases)
-    assert {result.status for result in results} == {"done"}
-    assert {report_of(of_case(case, folder))["ranks"] for case in cases} == {1}
-    BenchmarkCase("alone", cases[0].scene).solve(folder)
-    a, b = (read_history(place / "history.csv") for place in (folder / "alone", of_case(cases[0], folder)))
-    assert {name: a[name] for name in a if name not in CLOCK} == {name: b[name] for name in b if name not in CLOCK}
+    assert bool(results) == (comm.rank == 0)
+    if comm.rank == 0:
+        assert sorted(result.run for result in results) == sorted(case.run for case in cases)
+        assert {result.status for result in results} == {"done"}
+        assert {report_of(of_case(case, folder))["ranks"] for case in cases} == {1}
 
 
 @pytest.mark.mpi
