@@ -1,8 +1,8 @@
-"""Newton's method for equilibrium: a linear strategy for each step, a line search, and tests for when to stop."""
+"""Newton's method for equilibrium: PETSc's SNES, with a linear strategy, and tests of its own for when to stop."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,11 +18,6 @@ from archord.solver.timer import BEFORE_SOLVING
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 CIRCLING = 4  # the same where the active set stands still
 _FAST = 1e-3  # ratio of residuals by which Newton's method converges at once
-_DECREASE = 1e-4  # part of the decrease by the slope alone that the line search is content with
-_SHORTENED = 9  # times that it shortens a step, to between a tenth and half of what it was
-_LEAST = 1e-12  # of a step, below which nothing is a number
-_STANDSTILL = 1e-8  # step over solution below which nothing but round-off keeps the residual from falling
-_CONVERGED = "converged"
 _ADDED_UP = ("iterations", "residuals", "active_set_changes", "factorisations", "evaluations")  # of several solves
 
 
@@ -60,19 +55,52 @@ class NewtonSolver:
         self.equilibrium, self.tolerance, self.max_iterations = equilibrium, tolerance, max_iterations
         self._goal = tolerance
         self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
-        self._x, self._tried, self._f, self._f_tried, self._step = (equilibrium.control.vector() for _ in range(5))
-        self._ksp = PETSc.KSP()
+        self._x = equilibrium.control.vector()
+        self._raised: BaseException | None = None
         with equilibrium.timer(BEFORE_SOLVING):
-            self._attach()
+            self._solvers = {searches: self._solver("bt" if searches else "basic") for searches in (True, False)}
+            self._start_linear()
+
+    def _solver(self, line_search: str) -> PETSc.SNES:
+        snes = PETSc.SNES().create(self.equilibrium.comm)
+        snes.setOptionsPrefix("archord_")
+        options = PETSc.Options("archord_")
+        options["snes_linesearch_type"], options["snes_linesearch_max_it"] = line_search, 8
+        snes.setType("newtonls")
+        snes.setFunction(self._guarded(self._residual), self._x.duplicate())
+        snes.setConvergenceTest(self._test)
+        snes.setFromOptions()
+        return snes
+
+    def _start_linear(self) -> None:
+        """Start with a new linear solver: after a singular matrix PETSc's interface to MUMPS may skip the factorisation
+        of the next one, and fail."""
+        self._ksp = PETSc.KSP().create(self.equilibrium.comm)
+        self._ksp.setPreSolve(lambda ksp, b, x: ksp.getPC().setReusePreconditioner(self._reuse))
+        for snes in self._solvers.values():
+            snes.setKSP(self._ksp)
+        self._attach()
 
     def _attach(self) -> None:
-        """Start with a new linear solver, for the tangent as it is chosen."""
-        self._ksp.destroy()
-        self._ksp = PETSc.KSP().create(self.equilibrium.comm)
+        """Solve with the tangent as it is chosen."""
         self._linear = self.equilibrium.linear
+        for snes in self._solvers.values():
+            snes.setJacobian(self._guarded(self._jacobian), self._linear.matrix)
         self._linear.attach(self._ksp)
         if self._lagged is not None:
             self._lagged.attach(self._ksp)
+
+    def _guarded(self, callback: Callable) -> Callable:
+        """Keep what ``callback`` raises, which PETSc would turn into an error number."""
+
+        def call(*arguments) -> None:
+            try:
+                callback(*arguments)
+            except BaseException as error:
+                self._raised = error
+                raise
+
+        return call
 
     def solve(self, guess: Array | None, *, line_search: bool = True, goal: float = 0.0) -> Newton:
         """Newton's method at the equilibrium's load, to a residual of ``goal``, the own tolerance without.
@@ -81,92 +109,48 @@ class NewtonSolver:
         search their partners. Without one the solve goes on from the last iterate and the partners of its points. Steps
         are full ones without ``line_search``.
         """
-        at = self.equilibrium
+        at, snes = self.equilibrium, self._solvers[line_search]
         self._goal = goal or self.tolerance
-        self._result = Newton(False, "", 0, [])
-        self._no_partner = ""
-        self._renewed = True  # the last factorisation is of another matrix
+        self._result = result = Newton(False, "", 0, [])
+        self._failure, self._raised = "", None
+        self._renewed, self._reuse = True, False  # the last factorisation is of another matrix
         at.control.singular = False
         if guess is not None:
             at.pack(guess, self._x)
             at.contact.search()
+        snes.setTolerances(max_it=self.max_iterations)
         with at.timer("solve"):
-            self._result.reason = self._iterate(line_search)
-        if self._result.reason == _CONVERGED:
-            self._result.converged = True
-        else:
-            points = at.plastic_points()
-            increment = max((float(p.increment.max(initial=0.0)) for p in points), default=0.0)
-            self._result.plastic_increment = at.comm.allreduce(increment, op=MPI.MAX)
-            self._result.worst = at.worst_place()
-        return self._result
+            try:
+                snes.solve(None, self._x)
+            except PETSc.Error:
+                if self._raised is not None:
+                    raise self._raised from None
+                raise
+        code, result.iterations = snes.getConvergedReason(), snes.getIterationNumber()
+        if self._ksp.getConvergedReason() < 0:
+            at.control.replace(at.tangent.A)
+            self._start_linear()
+        result.converged = code > 0
+        result.reason = "converged" if result.converged else self._failure or _REASONS.get(code, f"SNES reason {code}")
+        if not result.converged:
+            increment = max((float(p.increment.max(initial=0.0)) for p in at.plastic_points()), default=0.0)
+            result.plastic_increment = at.comm.allreduce(increment, op=MPI.MAX)
+            result.worst = at.worst_place()
+        return result
 
-    def _iterate(self, line_search: bool) -> str:
-        """Iterate from the present unknowns; returns why it ended."""
-        norm = self._residual(self._x, self._f)
-        while not (ended := self._verdict(norm)):
-            self._update_tangent()
-            self._ksp.solve(self._f, self._step)
-            size = self._step.norm()
-            if self._ksp.getConvergedReason() < 0 or not np.isfinite(size):
-                # after a singular matrix PETSc's interface to MUMPS may skip the next factorisation, and fail
-                self.equilibrium.control.replace(self.equilibrium.tangent.A)
-                self._attach()
-                return "the linear system could not be factorised"
-            standstill = size < _STANDSTILL * self._x.norm()
-            reached = self._search(norm, standstill) if line_search else self._try(1.0)
-            if reached is None:
-                return _CONVERGED if standstill else self._no_partner or "the line search found no smaller residual"
-            norm = reached
-            self._x, self._tried, self._f, self._f_tried = self._tried, self._x, self._f_tried, self._f
-            self._result.iterations += 1
-        return ended
-
-    def _residual(self, x: PETSc.Vec, f: PETSc.Vec) -> float:
-        """Norm of the residual ``f`` at the unknowns ``x``, not a number where a contact point finds no partner."""
+    def _residual(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+        """The residual ``f`` at the unknowns ``x``, not a number where a contact point finds no partner."""
         self._result.evaluations += 1
         try:
             self._renewed |= self.equilibrium.residual_of(x, f)
         except ProjectionError as error:
-            self._no_partner = str(error)
-            return np.nan
+            self._failure = str(error)
+            f.set(np.nan)
+            return
         if self.equilibrium.linear is not self._linear:
             self._attach()
-        return f.norm()
 
-    def _try(self, length: float) -> float:
-        """Norm of the residual after the part ``length`` of the step."""
-        self._tried.waxpy(-length, self._step, self._x)
-        return self._residual(self._tried, self._f_tried)
-
-    def _search(self, before: float, standstill: bool) -> float | None:
-        """Norm of the residual after a step of a length that makes it fall from ``before``; None where none does.
-
-        Halves of the square of the norm are fitted by a parabola, then by cubics, from the slope at the beginning
-        (Dennis and Schnabel 1983, A6.3.1).
-        """
-        length, value, slope = 1.0, before**2 / 2, -(before**2)
-        reached = self._try(length)
-        while not np.isfinite(reached) and length > _LEAST:
-            length /= 2
-            reached = self._try(length)
-        longer, bend_before = np.inf, 0.0  # a parabola first
-        for count in range(_SHORTENED + 1):
-            left = reached**2 / 2
-            if left <= value + _DECREASE * length * slope or count == _SHORTENED:
-                break
-            if standstill or not np.isfinite(reached):
-                return None
-            bend = (left - value - length * slope) / length**2
-            a = (bend - bend_before) / (length - longer)
-            b = bend - a * length
-            longer, bend_before = length, bend
-            best = (np.sqrt(max(b * b - 3 * a * slope, 0.0)) - b) / (3 * a) if a else -slope / (2 * b)
-            length = min(max(best, 0.1 * length), 0.5 * length)
-            reached = self._try(length)
-        return reached
-
-    def _update_tangent(self) -> None:
+    def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Assemble the tangent where the last factorisation does not serve once more, and factorise it where a lagged
         one does not."""
         at, result = self.equilibrium, self._result
@@ -174,7 +158,7 @@ class NewtonSolver:
             return
         lagged, changes = self._lagged, result.active_set_changes[-1]
         factorise = lagged is None or lagged.factorises(self._ksp.getIterationNumber(), changes, renewed=self._renewed)
-        self._ksp.getPC().setReusePreconditioner(not factorise)
+        self._reuse = not factorise
         before = at.tangent.factorisations
         at.update_tangent(factorise=factorise)
         result.factorisations += at.tangent.factorisations - before
@@ -189,21 +173,33 @@ class NewtonSolver:
         before, now = residuals[-2:]
         return now < _FAST * before and now * now / before < 0.1 * self._goal
 
-    def _verdict(self, norm: float) -> str:
-        """Why to end with a residual of this ``norm``, which is noted; nothing if there is no reason to."""
-        at, result = self.equilibrium, self._result
-        if not np.isfinite(norm):
-            return self._no_partner or "the residual is not a number"
+    def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
+        """Note the residual and tell SNES whether to go on."""
+        at, result, norm, reasons = self.equilibrium, self._result, norms[2], PETSc.SNES.ConvergedReason
         reaction = max(at.reaction_norm, at.largest_reaction)
         result.active_set_changes.append(at.changes)
         result.residuals.append(float(norm / reaction if reaction > 0 else norm))
         if at.control.singular:
             pressed = at.load > 0 and at.contact.n_active() > 0
-            return f"{'no stiffness is left' if pressed else 'nothing resists the force'} (singular mode)"
+            self._failure = f"{'no stiffness is left' if pressed else 'nothing resists the force'} (singular mode)"
+            return reasons.DIVERGED_LINEAR_SOLVE
+        if not np.isfinite(norm):
+            return reasons.DIVERGED_FNORM_NAN
         if norm <= max(self._goal * reaction, at.noise):
-            return _CONVERGED
+            return reasons.CONVERGED_FNORM_RELATIVE
         patience = _PATIENCE if any(result.active_set_changes[-CIRCLING:]) else CIRCLING
         recent, earlier = result.residuals[-patience:], result.residuals[:-patience]
         if earlier and min(recent) > 0.5 * min(earlier):
-            return "the residual does not fall any further"
-        return "no convergence within the allowed iterations" if result.iterations >= self.max_iterations else ""
+            self._failure = "the residual does not fall any further"
+            return reasons.DIVERGED_DTOL
+        return reasons.DIVERGED_MAX_IT if iteration >= self.max_iterations else reasons.ITERATING
+
+
+_R = PETSc.SNES.ConvergedReason
+_REASONS = {
+    _R.DIVERGED_MAX_IT: "no convergence within the allowed iterations",
+    _R.DIVERGED_LINE_SEARCH: "the line search found no smaller residual",
+    _R.DIVERGED_LINEAR_SOLVE: "the linear system could not be factorised",
+    _R.DIVERGED_FNORM_NAN: "the residual is not a number",
+    _R.DIVERGED_FUNCTION_DOMAIN: "the residual could not be evaluated",
+}

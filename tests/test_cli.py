@@ -55,7 +55,7 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
     said = "runs/steel_pin: is not empty; choose another folder with -o, or overwrite a run in it with --force.\n"
     assert archord("solve", SCENE, *COARSE, cwd=tmp_path, code=2).stderr == said
     assert (tmp_path / "runs" / "steel_pin" / "history.csv").read_text() == history
-    for options, printed in (({}, ""), ({"PETSC_OPTIONS": "-log_view"}, "KSPSolve")):
+    for options, printed in (({}, ""), ({"PETSC_OPTIONS": "-log_view"}, "SNESSolve")):
         command, environment = [*SOLVE, *COARSE, "--force", "--quiet"], ENVIRONMENT | options
         quiet = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
         assert (quiet.returncode, quiet.stderr) == (0, "")
