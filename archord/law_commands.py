@@ -20,8 +20,6 @@ from archord.scene.errors import InputError
 if TYPE_CHECKING:
     from archord.postprocess.laws.joint import LawJoint
 
-DEFAULT = "calibrated"  # the law that is meant where none is named
-
 
 @contextmanager
 def _sentences() -> Iterator[None]:
@@ -45,7 +43,7 @@ def laws() -> int:
 
 
 @click.command()
-@argument("names", "NAME...", f"laws, as archord laws lists them [{DEFAULT}]", nargs=-1, type=str)
+@argument("names", "NAME...", "laws, as archord laws lists them [calibrated]", nargs=-1, type=str)
 @file("--scene", "take the joint from this scene file", None)
 @overrides()
 @click.option("--radius", type=float, help="radius of the pin")
@@ -53,7 +51,7 @@ def laws() -> int:
 @click.option("--E-star", "E_star", type=float, help="contact modulus E*")
 @click.option("--yield-stress", type=float, help="yield stress")
 @click.option("--length", type=float, help="length of the joint, for the laws that need one")
-@click.option("--k", type=float, default=0.85, help="Winkler's coefficient")
+@click.option("--k", type=float, help="Winkler's coefficient [0.85]")
 @click.option("--c", type=float, help="plateau of the pressure over the yield stress [1]")
 @click.option("--plane", help="strain or stress, for the calibrated law")
 @click.option("--nu", type=float, help="Poisson's ratio of both bodies, for the calibrated law")
@@ -67,7 +65,6 @@ def law(
     names: tuple[str, ...],
     scene: Path | None,
     overrides: tuple[str, ...],
-    k: float,
     by_load: bool,
     to: float,
     points: int,
@@ -78,15 +75,15 @@ def law(
     """Print a table of closed-form laws, or draw them against each other."""
     from archord.output.user_file import check_target
     from archord.postprocess.laws.law import LawRangeWarning
-    from archord.postprocess.laws.law_report import draw_laws, law_table, sample
+    from archord.postprocess.laws.law_report import draw_laws, law_table
     from archord.postprocess.laws.laws import find_law
 
-    chosen = [find_law(name) for name in dict.fromkeys(names or [DEFAULT])]
+    chosen = [find_law(name) for name in dict.fromkeys(names or ["calibrated"])]
     if not 0 < to < math.inf:
         raise InputError(f"--to {to:g}: must be a positive number.")
     if not 1 <= points <= 100000:
         raise InputError(f"--points {points}: must be between 1 and 100000.")
-    joint, units = _joint(scene, overrides, given, k)
+    joint, units = _joint(scene, overrides, given)
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LawRangeWarning)
@@ -94,18 +91,14 @@ def law(
             check_target(plot, [scene] if scene else [], force=True)
             said = [draw_laws(chosen, joint, plot, by_load, to, extrapolate)]
         else:
-            states = [sample(entry, joint, by_load, to, points, extrapolate) for entry in chosen]
-            tables = (law_table(entry, joint, state, units) for entry, state in zip(chosen, states, strict=True))
-            said = [f"{entry.name}: {entry.title}\n{table}" for entry, table in zip(chosen, tables, strict=True)]
+            said = [law_table(entry, joint, by_load, to, points, extrapolate, units) for entry in chosen]
     print(*said, sep="\n\n")
     for message in dict.fromkeys(str(w.message) for w in caught):
         print(f"archord: warning: {message}.", file=sys.stderr)
     return 0
 
 
-def _joint(
-    scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any], k: float
-) -> tuple[LawJoint, dict[str, str]]:
+def _joint(scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any]) -> tuple[LawJoint, dict[str, str]]:
     """The joint of the scene, or of the options, which come before it; and the names of the units."""
     from archord.postprocess.laws.joint import LawJoint
 
@@ -117,13 +110,13 @@ def _joint(
 
         loaded = load_scene(scene, overrides)
         units = {"length": loaded.units.length, "stress": loaded.units.stress, "force": loaded.units.force}
-        return dataclasses.replace(LawJoint.from_scene(loaded, k=k), **values), units
+        return dataclasses.replace(LawJoint.from_scene(loaded), **values), units
     if overrides:
         raise InputError("--set: changes a scene; give one with --scene.")
     missing = [f"--{name.replace('_', '-')}" for name in ("radius", "clearance", "E_star") if name not in values]
     if missing:
         raise InputError(f"{', '.join(missing)}: missing; give radius, clearance and E* of the joint, or a --scene.")
-    return LawJoint(**values, k=k), {}
+    return LawJoint(**values), {}
 
 
 @click.command()
@@ -150,46 +143,32 @@ def fit(
 
     Of a sweep, k and c of every case, and a model of both over all that decides a joint.
     """
-    from archord.output.folder import is_sweep
-
-    deltas, first = load_range or (0.0, math.inf), folders[0]
-    sweep = any(is_sweep(folder) or folder.suffix == ".csv" for folder in folders)
-    if sweep and (len(folders) > 1 or json_file or python or picture):
-        raise InputError(f"{first}: a sweep is fitted alone; --json, --python and --picture are for runs.")
-    if not sweep and law_file:
-        raise InputError(f"{first}: --law is for a sweep, and this is none.")
-    if sweep:
-        print(*_fit_sweep(first, deltas, law_file, force), sep="\n")
-    else:
-        print(*_fit_runs(folders, deltas, json_file, python, picture, force), sep="\n")
-    return 0
-
-
-def _fit_runs(
-    folders: tuple[Path, ...],
-    deltas: tuple[float, float],
-    json_file: Path | None,
-    python: Path | None,
-    picture: Path | None,
-    force: bool,
-) -> list[object]:
-    from archord.output.folder import FILES
+    from archord.output.folder import FILES, is_sweep
     from archord.output.user_file import check_target
     from archord.postprocess.laws import fit_report
     from archord.postprocess.laws.calibration import calibrate
     from archord.postprocess.run import Run
 
+    deltas, first = load_range or (0.0, math.inf), folders[0]
+    if any(is_sweep(folder) or folder.suffix == ".csv" for folder in folders):
+        if len(folders) > 1 or json_file or python or picture:
+            raise InputError(f"{first}: a sweep is fitted alone; --json, --python and --picture are for runs.")
+        return _fit_sweep(first, deltas, law_file, force)
+    if law_file:
+        raise InputError(f"{first}: --law is for a sweep, and this is none.")
     calibration = calibrate([Run(folder).curve.loading() for folder in folders], deltas)
-    law, inputs = calibration.law(), [folder / name for folder in folders for name in FILES]
-    files = []
+    inputs, files = [folder / name for folder in folders for name in FILES], []
     if picture:
         check_target(picture, inputs, force=True)
         files.append(fit_report.draw_fit(calibration, picture))
-    files += _write([(json_file, fit_report.as_json(calibration)), (python, law.to_python())], inputs, force)
-    return [fit_report.summary_table(calibration), "", *fit_report.notes(calibration), *files]
+    files += _write(
+        [(json_file, fit_report.as_json(calibration)), (python, calibration.law().to_python())], inputs, force
+    )
+    print(fit_report.summary_table(calibration), "", *fit_report.notes(calibration), *files, sep="\n")
+    return 0
 
 
-def _fit_sweep(sweep: Path, deltas: tuple[float, float], law: Path | None, force: bool) -> list[object]:
+def _fit_sweep(sweep: Path, deltas: tuple[float, float], law: Path | None, force: bool) -> int:
     from archord.postprocess.laws.study_cases import as_csv
     from archord.studies.sweep_fit import fit_sweep
 
@@ -199,7 +178,8 @@ def _fit_sweep(sweep: Path, deltas: tuple[float, float], law: Path | None, force
     files = _write([(law, found.model.to_json() if found.model else "")], inputs, force)
     if sweep.is_dir():
         files += _write([(sweep / "fit.csv", as_csv(found.cases, found.notes))], inputs, force=True)
-    return [found, *files]
+    print(found, *files, sep="\n")
+    return 0
 
 
 def _write(texts: list[tuple[Path | None, str]], inputs: list[Path], force: bool) -> list[Path]:

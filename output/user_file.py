@@ -27,20 +27,15 @@ def check_output(path: Path) -> None:
         raise InputError(f"{path}: cannot be written: {fault}.")
 
 
-def check_target(path: Path, inputs: Iterable[Path], *, force: bool = False, begins: str | None = None) -> None:
-    """`check_output` for a file that the user names: raise `InputError` also for one of the ``inputs`` of the command.
-
-    Without ``force`` raise it, too, for a file that is there, unless it begins like those that the command writes.
-    """
+def check_target(path: Path, inputs: Iterable[Path], *, force: bool = False) -> None:
+    """`check_output` for a file that the user names: raise `InputError` also for one of the ``inputs`` of the command,
+    and, without ``force``, for a file that is there."""
     check_output(path)
     for given in inputs:
         if path.exists() and given.exists() and path.samefile(given):
             raise InputError(f"{path}: cannot be written: it is an input of the command.")
-    if force or not path.is_file():
-        return
-    with path.open("rb") as file:
-        if begins is None or file.read(len(begins.encode())) != begins.encode():
-            raise InputError(f"{path}: is there already; choose another file, or overwrite it with --force.")
+    if path.is_file() and not force:
+        raise InputError(f"{path}: is there already; choose another file, or overwrite it with --force.")
 
 
 def make_folder(folder: Path) -> None:

@@ -13,16 +13,7 @@ from archord.postprocess.laws.calibrated import CalibratedModel, shipped_model
 from archord.postprocess.laws.calibration import check_compatible
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.study import TooFewError, error_table, shipped_errors, study
-from archord.postprocess.laws.study_cases import (
-    Cases,
-    as_csv,
-    case_table,
-    fit_case,
-    from_csv,
-    read_cases,
-    table_of,
-    usable,
-)
+from archord.postprocess.laws.study_cases import Cases, case_table, fit_case, read_cases, stored, usable
 from archord.postprocess.run import Run
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
@@ -105,7 +96,7 @@ def _solved(folder: Path, load_range: tuple[float, float]) -> tuple[Cases, dict[
     softer = max(LawJoint.from_scene(run.scene).softer[0] for run in runs)
     if softer > _SOFTER:
         notes[_BLOCKS] = f"P up to about {softer:.1%} smaller than in a wide block, and k, which a model does not know"
-    return *from_csv(as_csv(table_of(fitted), notes)), left_out  # the digits of the file, whether it is read or not
+    return *stored(fitted, notes), left_out
 
 
 def _run(case: Case, folder: Path) -> RunCurve:

@@ -64,26 +64,25 @@ def calibrate(runs: list[RunCurve], load_range: tuple[float, float] = (0.0, np.i
 
 def check_compatible(runs: list[RunCurve]) -> None:
     """Raise `InputError` for runs that have no such law, or none in common."""
-    first, wanted = runs[0], LawJoint.from_scene(runs[0].scene)
     for run in runs:
-        own, body = LawJoint.from_scene(run.scene), "pin" if run.scene.pin.hardening > 0 else "block"
-        hardening = getattr(run.scene, body).hardening
-        softer = abs(own.softer[0] - wanted.softer[0])
+        if run.scene.joint.is_ring:
+            raise InputError(f'{run.name}: joint.model = "ring" has no law to fit; only "block" has.')
+        for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
+            if solid.hardening > 0:
+                raise InputError(f"{run.name}: {body}.hardening = {solid.hardening:g} does not fit: the law is for "
+                                 "perfect plasticity, hardening = 0.")  # fmt: skip
+    first = runs[0]
+    for run in runs[1:]:
+        own, wanted = (LawJoint.from_scene(each.scene) for each in (run, first))
         ours, theirs = ((joint.dundurs_alpha, joint.nu or 0.0, joint.pin_nu or 0.0) for joint in (own, wanted))
-        fault = ""
-        if own.ring:
-            fault = 'joint.model = "ring" has no law to fit; only "block" has.'
-        elif hardening > 0:
-            fault = f"{body}.hardening = {hardening:g} does not fit: the law is for perfect plasticity, hardening = 0."
-        elif own.plane != wanted.plane:
-            fault = (f"analysis.plane = {run.plane!r} does not fit: {first.name} is in plane {first.plane}; fit the "
-                     "planes separately.")  # fmt: skip
+        softer, fault = abs(own.softer[0] - wanted.softer[0]), ""
+        if own.plane != wanted.plane:
+            fault = f"analysis.plane = {run.plane!r} does not fit: {first.name} is in plane {first.plane}"
         elif not np.allclose(ours, theirs, rtol=1e-6, atol=1e-9):
-            fault = (f"the Poisson's ratios or the ratio of the moduli are not those of {first.name}; one k is for one "
-                     "pair of materials, fit them separately.")  # fmt: skip
+            fault = f"the Poisson's ratios or the ratio of the moduli are not those of {first.name}"
         elif softer > _LIKE:
-            fault = (f"joint.block_size is {run.scene.joint.W / run.R:.4g} R and that of {first.name} "
-                     f"{first.scene.joint.W / first.R:.4g} R, by which their P differs by about {softer:.1%}; fit them "
-                     "separately.")  # fmt: skip
+            sizes = [f"{each.scene.joint.W / each.R:.4g} R" for each in (run, first)]
+            fault = (f"joint.block_size is {sizes[0]} and that of {first.name} {sizes[1]}, by which their P differs by "
+                     f"about {softer:.1%}")  # fmt: skip
         if fault:
-            raise InputError(f"{run.name}: {fault}")
+            raise InputError(f"{run.name}: {fault}; one law is for one kind of joint: fit them separately.")

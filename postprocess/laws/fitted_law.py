@@ -10,7 +10,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.joint import Array, LawJoint
@@ -74,15 +74,8 @@ class FittedLaw(BaseModel):
     @classmethod
     def from_json(cls, text: str) -> FittedLaw:
         """The law in ``text``, written by ``archord fit --json``. Raises ValueError."""
-        try:
-            data = json.loads(text)
-            return cls.model_validate(data.get("law", data) if isinstance(data, dict) else data)
-        except json.JSONDecodeError as error:
-            raise ValueError(f"law: is not valid JSON: {error}.") from None
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"]))
-            raise ValueError(f"law: {where + ': ' if where else ''}{first['msg']}.") from None
+        data = json.loads(text)
+        return cls.model_validate(data.get("law", data) if isinstance(data, dict) else data)
 
     def to_python(self) -> str:
         """Source of a Python module with ``force(delta)`` and ``stiffness(delta)``, which needs only ``math``."""

@@ -66,7 +66,7 @@ class LawJoint:
                 raise ValueError(f"{name} = {getattr(self, name)!r} must be one of {', '.join(filter(None, known))}.")
 
     @classmethod
-    def from_scene(cls, scene: Scene, k: float = 0.85) -> LawJoint:
+    def from_scene(cls, scene: Scene) -> LawJoint:
         """The joint of ``scene``; of two yield stresses the lower one, hardening is left out."""
         plane, pin, block = scene.analysis.plane, scene.pin.solid, scene.block
         alpha, first, yields, second = 1.0, 0.0, [None, block.yield_stress], _transverse(block.nu, plane)
@@ -78,7 +78,6 @@ class LawJoint:
             scene.joint.dR,
             scene.E_star,
             yield_stress=min((stress for stress in yields if stress is not None), default=None),
-            k=k,
             dundurs_alpha=alpha,
             # in the compliances 1/E1' = (1 - alpha)/(2 E*), 1/E2' = (1 + alpha)/(2 E*)
             dundurs_beta=((1 + alpha) * second - (1 - alpha) * first) / 2,

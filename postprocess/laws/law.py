@@ -85,12 +85,9 @@ class Law:
         limit = self.limit(joint)
         if not self.gives_displacement:
             return self._known(joint, self._inside(joint, load, limit, "P", extrapolate))
-
-        def force(delta: Array) -> Array:
-            return self.state(joint, delta).load
-
-        P = self._inside(joint, load, float(force(np.array(limit))), "P", extrapolate)
-        return replace(self._known(joint, rising_root(force, P, limit)), load=P)
+        P = self._inside(joint, load, float(self.state(joint, np.array(limit)).load), "P", extrapolate)
+        delta = rising_root(lambda x: self.state(joint, x).load, P, limit)
+        return replace(self._known(joint, delta), load=P)
 
     def _known(self, joint: LawJoint, x: Array) -> LawState:
         """The state at checked points ``x``: nan in, nan out."""

@@ -29,9 +29,12 @@ def sample(law: Law, joint: LawJoint, by_load: bool, to: float, points: int, ext
     return replace(law.at_displacement(joint, steps, extrapolate), delta=steps)
 
 
-def law_table(law: Law, joint: LawJoint, state: LawState, units: dict[str, str]) -> Table:
-    """A row for each point of ``state``, in ``units`` of length, force and stress where they are known; without columns
-    that the law says nothing of."""
+def law_table(
+    law: Law, joint: LawJoint, by_load: bool, to: float, points: int, extrapolate: bool, units: dict[str, str]
+) -> str:
+    """The law's title and its `sample`, a row for each point, in ``units`` of length, force and stress where they are
+    known; without columns that the law says nothing of."""
+    state = sample(law, joint, by_load, to, points, extrapolate)
     moving, one = law.gives_displacement, joint.clearance
     columns = [
         ("delta", "length", state.delta, moving),
@@ -45,7 +48,8 @@ def law_table(law: Law, joint: LawJoint, state: LawState, units: dict[str, str])
     ]
     shown = [(f"{name} [{units[of]}]" if of in units else name, values) for name, of, values, given in columns if given]
     rows = np.transpose([values for _, values in shown])
-    return Table(*(name for name, _ in shown), rows=[[f"{value:.6g}" for value in row] for row in rows])
+    table = Table(*(name for name, _ in shown), rows=[[f"{value:.6g}" for value in row] for row in rows])
+    return f"{law.name}: {law.title}\n{table}"
 
 
 def draw_laws(
@@ -60,14 +64,12 @@ def draw_laws(
     axes = figure.subplots(1, 3)
     for law in laws:
         state = sample(law, joint, by_load, to, _POINTS, extrapolate)
-        x, other = state.delta / joint.clearance, state.load / joint.unit
-        if by_load:
-            x, other = other, x
-        for axis, y in zip(axes, (other, state.peak_pressure / joint.E_star, np.degrees(state.angle)), strict=True):
-            axis.plot(x, y, label=law.name)
-    names = ("P / (E* ΔR)", "δ / ΔR") if by_load else ("δ / ΔR", "P / (E* ΔR)")
-    for axis, label in zip(axes, (names[1], "p0 / E*", "contact semi-angle [°]"), strict=True):
-        axis.set(xlabel=names[0], ylabel=label, xlim=(0, to), ylim=(0, None))
+        x, y = (state.delta / joint.clearance, state.load / joint.unit)[:: -1 if by_load else 1]
+        for axis, values in zip(axes, (y, state.peak_pressure / joint.E_star, np.degrees(state.angle)), strict=True):
+            axis.plot(x, values, label=law.name)
+    over, of = ("δ / ΔR", "P / (E* ΔR)")[:: -1 if by_load else 1]
+    for axis, label in zip(axes, (of, "p0 / E*", "contact semi-angle [°]"), strict=True):
+        axis.set(xlabel=over, ylabel=label, xlim=(0, to), ylim=(0, None))
         axis.grid(alpha=0.3)
     axes[0].legend(frameon=False)
     with writing(target):

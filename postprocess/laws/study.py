@@ -37,30 +37,28 @@ def fit_model(cases: Cases, form: Form = FORM, plenty: int = _PLENTY) -> Calibra
     `TooFewError` where the elastic ones are too few.
     """
     elastic = cases[cases.yielding == "none"]
-    _suffice(elastic, plenty * len(form["elastic"]), "elastic cases")
+    needed = plenty * len(form["elastic"])
+    if len(elastic) < needed:
+        raise TooFewError(f"{len(elastic)} elastic cases are too few for a model: it takes {needed}")
     terms, k = points(elastic).terms(form["elastic"]), elastic.k.to_numpy()
     start = np.linalg.lstsq(terms, 1 / k, rcond=None)[0]
     values = _solve(lambda v: -np.log(np.maximum(terms @ v, 1e-9)) - np.log(k), start)
     model = CalibratedModel({"form": form, "elastic": values, "plastic": {}, "bounds": {}})
     for kind in KINDS:
         same = cases[cases.kind == kind]
-        try:
-            if not kind.endswith("none"):
-                model.data["plastic"][kind] = _plastic(same, kind, model, plenty)
-        except TooFewError:
-            continue
-        if len(same):
+        if not kind.endswith("none") and (found := _plastic(same, kind, model, plenty)):
+            model.data["plastic"][kind] = found
+        if len(same) and (kind.endswith("none") or kind in model.data["plastic"]):
             model.data["bounds"][kind] = _bounds(cases, kind)
     rest = {"load_range": _span(np.concatenate(list(cases.load))), "errors": {}, "provenance": {}}
     return CalibratedModel(model.data | rest)
 
 
-def _plastic(cases: Cases, kind: str, model: CalibratedModel, plenty: int) -> dict[str, Any]:
-    plane, yielding = kind.split()
-    late, threshold = model.data["form"]["late"], model.data["form"][plane]
-    yielded, what = cases[cases.clear_c.notna()], f"cases in plane {plane} of which {yielding} yields"
-    _suffice(cases, plenty * (len(late) + 1), what)
-    _suffice(yielded, plenty * len(threshold), what)
+def _plastic(cases: Cases, kind: str, model: CalibratedModel, plenty: int) -> dict[str, Any] | None:
+    late, threshold = (model.data["form"][part] for part in ("late", kind.split()[0]))
+    yielded = cases[cases.clear_c.notna()]
+    if len(cases) < plenty * (len(late) + 1) or len(yielded) < plenty * len(threshold):
+        return None
     k, terms = model.elastic_k(points(cases)), points(cases).terms(late)
     ratio, onset = np.log(cases.k.to_numpy() / k), cases.s.to_numpy() / k
     starts = [np.array([b, *np.linalg.lstsq(np.exp(-b * onset)[:, None] * terms, ratio, rcond=None)[0]])
@@ -74,11 +72,6 @@ def _plastic(cases: Cases, kind: str, model: CalibratedModel, plenty: int) -> di
 def _solve(residuals: Callable[[Array], Array], *starts: Array) -> list[float]:
     found = [least_squares(residuals, start, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12) for start in starts]
     return [_digits(value) for value in min(found, key=lambda solution: solution.cost).x]
-
-
-def _suffice(cases: Cases, needed: int, what: str) -> None:
-    if len(cases) < needed:
-        raise TooFewError(f"{len(cases)} {what} are too few for a model: it takes {needed}")
 
 
 def _bounds(cases: Cases, kind: str) -> dict[str, Any]:

@@ -75,8 +75,8 @@ def fit_case(refined: Refined, load_range: tuple[float, float], name: str) -> di
         "load": force.residuals[0].load,
         "P": force.residuals[0].data,
     }
-    for name, found in force.estimates.items():
-        case |= {name: found.value, f"{name}_error": found.standard_error, f"{name}_mesh": found.discretisation_error}
+    for of, found in force.estimates.items():
+        case |= {of: found.value, f"{of}_error": found.standard_error, f"{of}_mesh": found.discretisation_error}
     return case
 
 
@@ -112,7 +112,7 @@ def as_csv(cases: Cases, notes: dict[str, str]) -> str:
     return said + shown.to_csv(index=False, float_format="%.7g", lineterminator="\n")
 
 
-def from_csv(text: str) -> tuple[Cases, dict[str, str]]:
+def _from_csv(text: str) -> tuple[Cases, dict[str, str]]:
     """What `as_csv` made a ``text`` of. Raises ValueError or KeyError if it made none."""
     types = {COLUMNS[name]: kind for name, kind in _TYPES.items()}
     curves = {COLUMNS[name]: lambda numbers: np.array(numbers.split(), float) for name in _CURVES}
@@ -121,11 +121,16 @@ def from_csv(text: str) -> tuple[Cases, dict[str, str]]:
     return table_of(rows.rename(columns={heading: name for name, heading in COLUMNS.items()})[list(COLUMNS)]), notes
 
 
+def stored(cases: list[dict[str, Any]], notes: dict[str, str]) -> tuple[Cases, dict[str, str]]:
+    """The table of ``cases`` with the digits of its file, so that it is the same whether it is read or not."""
+    return _from_csv(as_csv(table_of(cases), notes))
+
+
 def read_cases(file: Path) -> tuple[Cases, dict[str, str]]:
     """The cases in ``file``, and what it says about where they are from. Raises `InputError` if it cannot be read, or
     holds no case."""
     try:
-        cases, notes = from_csv(file.read_text(encoding="utf-8"))
+        cases, notes = _from_csv(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}.") from None
     except (ValueError, KeyError):

@@ -85,10 +85,10 @@ def test_the_law_is_the_plastic_winkler_law_of_its_joint():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{", "not valid JSON"),
-        ("[1]", "law: Input should be a valid dictionary"),
-        ('{"k": 1}', "law: E_star: Field required"),
-        (json.dumps(ELASTIC.model_dump() | {"k": -0.83}), "law: k: Input should be greater than 0"),
+        ("{", "Expecting property name"),
+        ("[1]", "Input should be a valid dictionary"),
+        ('{"k": 1}', "E_star\n  Field required"),
+        (json.dumps(ELASTIC.model_dump() | {"k": -0.83}), "k\n  Input should be greater than 0"),
         (json.dumps(ELASTIC.model_dump() | {"c": 1.0}), "c and sigY belong together"),
     ],
 )
