@@ -1,4 +1,5 @@
-"""What the solver asks of a material: strain and state in, stress, tangent and state out.
+"""What the solver asks of a material: strain and state in, stress, tangent and state out; and points of it, with their
+history.
 
 Arrays are those of ``n`` points: strains ``(n, 3)`` are ``[eps_xx, eps_yy, gamma_xy]`` (engineering shear), stresses
 ``(n, 4)`` are ``[s_xx, s_yy, s_zz, s_xy]``, tension positive. A state is None (no history) or a dataclass of arrays
@@ -59,3 +60,37 @@ class Material(Protocol):
     def peeq(self, state: State) -> Array | float:
         """Equivalent plastic strain ``(n,)``."""
         return 0.0
+
+
+class Points:
+    """``n`` points of a ``material``: the committed ``state``, and ``trial``, which belongs to the last strain seen.
+
+    A contact law is a material too, of traction, derivative and state, whose strain are gap, slip and trial traction.
+
+    ``yields`` tells whether they can; with ``elastic_only`` set `update` answers as if they could not (any further).
+    """
+
+    def __init__(self, material: Any, n: int) -> None:
+        self.material, self.n = material, n
+        self.state = self.trial = material.state(n)
+        self.yields, self.elastic_only = bool(getattr(material, "yields", False)), False
+
+    def update(self, *strain: Array) -> tuple[Array, Array]:
+        """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the committed state."""
+        material = self.material.elastic() if self.elastic_only else self.material
+        stress, tangent, self.trial = material.update(*strain, self.state)
+        return stress, tangent
+
+    @property
+    def peeq(self) -> Array:
+        """PEEQ ``(n,)`` at the last strain seen."""
+        return np.broadcast_to(self.material.peeq(self.trial), self.n)
+
+    @property
+    def increment(self) -> Array:
+        """Increment of PEEQ ``(n,)`` from the committed state to the last strain seen."""
+        return self.peeq - self.material.peeq(self.state)
+
+    def commit(self) -> None:
+        """Make the state of the last strain seen the committed one."""
+        self.state = self.trial

@@ -18,8 +18,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array, bulk_quadrature, bulk_quadrature_degree, cell_basis, strain
 from archord.materials.elasticity import mean_stress, von_mises
-from archord.materials.material import Material
-from archord.materials.points import Points
+from archord.materials.material import Material, Points
 
 
 def _voigt(u):
@@ -144,10 +143,6 @@ class Bulk:
     def plastic(self) -> bool:
         """Whether any body carries plastic history."""
         return bool(self._plastic)
-
-    def plastic_points(self) -> list[Points]:
-        """The points with history of all plastic bodies."""
-        return [body.points for body in self._plastic.values()]
 
     def histories(self) -> dict[int, tuple[np.ndarray, Points]]:
         """Cells ``(n,)`` of this rank and their ``n q`` points with history, by the plastic body's tag."""

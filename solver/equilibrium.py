@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.fenicsx import create_vector
-from archord.materials.points import Points
+from archord.materials.material import Points
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.law import Frictionless
@@ -207,8 +207,9 @@ class Equilibrium:
     # ------------------------------------------------------------------ state
 
     def plastic_points(self) -> list[Points]:
-        """The points with history of bulk and contact."""
-        return self.bulk.plastic_points() + self.contact.plastic_points()
+        """The points of bulk and contact that can yield."""
+        histories = [*self.bulk.histories().values(), *self.contact.histories().values()]
+        return [points for _, points in histories if points.yields]
 
     def worst_place(self) -> tuple[float, float] | None:
         """Where the residual is largest, over all ranks."""

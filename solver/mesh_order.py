@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.materials.points import Points
+from archord.materials.material import Points
 from archord.solver.system import System
 
 Arrays = dict[str, np.ndarray]

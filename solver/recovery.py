@@ -103,7 +103,7 @@ class Recovery:
         self._solves.append(result)
         changes = result.active_set_changes
         circles = len(changes) > CIRCLING and not any(changes[-CIRCLING:])
-        if result.converged or not contact.pairs_move or not circles:
+        if result.converged or not circles or not any(pair.moves for pair in contact.pairs):
             return result.converged
         contact.hold()
         result = self.newton.solve(None, line_search=line_search, goal=goal)

@@ -19,12 +19,11 @@ from dolfinx import fem
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
-from archord.materials.points import Points
+from archord.materials.material import Points
 from archord.solver.contact.interaction import Interface, on_every_rank
 from archord.solver.contact.pair import Pair
-from archord.solver.contact.sparsity import Reach
-from archord.solver.contact.surface import Surface
-from archord.solver.contact.tangent import ContactTangent, trial_rate
+from archord.solver.contact.surface import RigidSurface, Surface
+from archord.solver.contact.tangent import ContactTangent, Reach, trial_rate
 
 
 class Contact:
@@ -36,14 +35,14 @@ class Contact:
 
     def __init__(self, V: fem.FunctionSpace, interfaces: Sequence[Interface] = ()) -> None:
         self.interfaces, self.comm = list(interfaces), V.mesh.comm
-        self.surfaces = [surface for i in interfaces for surface in i.bodies]
-        self.rigid = [surface for i in interfaces for surface in i.rigid]
+        both = [surface for i in interfaces for surface in i.surfaces]
+        self.surfaces = [surface for surface in both if isinstance(surface, Surface)]
+        self.rigid = [surface for surface in both if isinstance(surface, RigidSurface)]
         self.pairs = [pair for i in interfaces for pair in i.pairs]
         self._n_dofs = V.dofmap.index_map.size_global
         for number, surface in enumerate(self.rigid):
             surface.curve_dofs[:] = self._n_dofs + number
         self.gamma_factor = max((i.interaction.gamma_factor for i in interfaces), default=0.0)
-        self.pairs_move = any(pair.moves for pair in self.pairs)
         self.active_set_changes = 0
         self._reaches = [Reach(pair, i.slide) for i in interfaces for pair in i.pairs]
         self._tangent: ContactTangent | None = None
@@ -60,8 +59,8 @@ class Contact:
 
     def use_gamma_factor(self, factor: float) -> None:
         """Limit the gamma factor of all interactions to ``factor``, for the time being."""
-        for interface in self.interfaces:
-            interface.limit_gamma(factor)
+        for pair in self.pairs:
+            pair.limit_gamma(factor)
 
     def hold(self) -> None:
         """Keep all points on the facets they were last paired with, until `search`: the forces become smooth."""
@@ -135,8 +134,9 @@ class Contact:
         return next(i for i in self.interfaces if name in ("", i.interaction.name)).resultant()
 
     def force_on_factor(self) -> float:
-        """Contact force on what moves rigid surfaces, along their rates, over all ranks."""
-        return float(sum(surface.rate @ i.resultant() for i in self.interfaces for surface in i.rigid))
+        """Contact force on what moves rigid surfaces, the first ones of theirs, along their rates, over all ranks."""
+        first = [(i.surfaces[0], i) for i in self.interfaces]
+        return float(sum(disc.rate @ i.resultant() for disc, i in first if isinstance(disc, RigidSurface)))
 
     def histories(self) -> dict[str, tuple[np.ndarray, Points]]:
         """Numbers ``(n,)`` of facets of this rank and their ``n q`` points, of materials and of laws, by place."""
@@ -145,10 +145,6 @@ class Contact:
             found[f"contact {pair.surface.name}"] = pair.surface.facet, pair.surface.points
             found[f"law {pair.surface.name}"] = pair.surface.facet, pair.points
         return found
-
-    def plastic_points(self) -> list[Points]:
-        """The points of integrated surfaces whose material yields."""
-        return [pair.surface.points for pair in self.pairs if pair.surface.material.yields]
 
     def commit(self) -> None:
         """Accept the history of the contact points at the last evaluation."""

@@ -71,38 +71,30 @@ class Interface:
 
     def __init__(self, interaction: Interaction, surfaces: Sequence[Surface | RigidSurface]) -> None:
         self.interaction, self.surfaces = interaction, list(surfaces)
-        self.bodies = [surface for surface in surfaces if isinstance(surface, Surface)]
-        self.rigid = [surface for surface in surfaces if isinstance(surface, RigidSurface)]
         law = LAWS[interaction.law] if isinstance(interaction.law, str) else interaction.law
         moves = law.slides and interaction.kinematics == "current"
         self.slide = interaction.slide if moves else 0.0
         given = zip(surfaces, interaction.surfaces, strict=True)
-        chosen = [own for own, name in given if own in self.bodies and interaction.integrated in ("", name)]
+        chosen = [own for own, name in given if isinstance(own, Surface) and interaction.integrated in ("", name)]
         if not chosen:
             raise ValueError(f"{interaction.name!r} does not have the surface {interaction.integrated!r}")
         compliance = np.array([1 / own.material.elastic_tangent[0, 0] for own in chosen])
         self.pairs: list[Pair] = []
-        with on_every_rank(self.bodies[0].comm):
+        with on_every_rank(chosen[0].comm):
             for own, share in zip(chosen, compliance / compliance.sum(), strict=True):
                 opposite = surfaces[1] if own is surfaces[0] else surfaces[0]
                 if isinstance(opposite, Surface):
                     own.place_points(*segment_rule(own.curve, opposite.curve))
-                self.pairs.append(Pair(own, opposite, law, float(share), moves=moves))
-        if not moves and not self.rigid and chosen[0] is surfaces[0]:
+                self.pairs.append(Pair(own, opposite, law, float(share), interaction.gamma_factor, moves=moves))
+        if not moves and isinstance(surfaces[1], Surface) and chosen[0] is surfaces[0]:
             self.pairs[0].use_own_normals()
-        self.limit_gamma(interaction.gamma_factor)
-
-    def limit_gamma(self, factor: float) -> None:
-        """Use the own gamma factor, or ``factor`` where that is less."""
-        for pair in self.pairs:
-            pair.use_gamma(min(self.interaction.gamma_factor, factor))
 
     def resultant(self) -> Array:
         """Contact force ``(2,)`` on the second surface, over all ranks."""
         total = np.zeros(2)
         for pair in self.pairs:
             total += pair.forces.sum(0) * (1 if pair.surface is self.surfaces[1] else -1)
-        return self.bodies[0].sum_over_ranks(total)
+        return self.pairs[0].surface.sum_over_ranks(total)
 
 
 @contextmanager

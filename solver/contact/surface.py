@@ -8,7 +8,6 @@ cells it owns. What a facet needs of its own cell stays local.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import basix
 import numpy as np
@@ -17,8 +16,7 @@ from dolfinx.mesh import MeshTags
 
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis, strain, strain_matrix
 from archord.geometry.curve import Curve, RigidCircle
-from archord.materials.material import Material
-from archord.materials.points import Points
+from archord.materials.material import Material, Points
 
 
 class Surface:
@@ -32,12 +30,9 @@ class Surface:
     """
 
     def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material: Material, name: str = "") -> None:
-        mesh = V.mesh
-        self.comm = mesh.comm
-        self.V, self.material, self.name = V, material, name
-        self.degree = V.element.basix_element.degree
-        index_map = V.dofmap.index_map
-        cells, local_facets = _owned_facets(mesh, facets.find(tag))
+        self.V, self.comm, self.material, self.name = V, V.mesh.comm, material, name
+        self.degree, index_map = V.element.basix_element.degree, V.dofmap.index_map
+        cells, local_facets = _owned_facets(V.mesh, facets.find(tag))
         closure = [V.dofmap.dof_layout.entity_closure_dofs(1, k) for k in range(3)]
         # closure order is vertex, vertex, interior; along the facet the interior nodes come between the vertices
         along = [[c[0], *c[2:], c[1]] for c in closure]
@@ -45,34 +40,25 @@ class Surface:
         corners = basix.geometry(basix.CellType.triangle)
         ends = corners[np.array(basix.topology(basix.CellType.triangle)[1])[local_facets]]
         # the second of basix' edges runs clockwise, the others do not, and a mirrored cell turns all of them
-        mirrored = cell_basis(mesh, self.degree, cells, corners.mean(axis=0)[None]).determinant[:, 0] < 0
+        mirrored = cell_basis(V.mesh, self.degree, cells, corners.mean(axis=0)[None]).determinant[:, 0] < 0
         clockwise = (local_facets == 1) != mirrored
         trace[clockwise], ends[clockwise] = trace[clockwise, ::-1], ends[clockwise, ::-1]
 
-        cell_dofs = V.dofmap.list[cells].astype(np.int64)
-        global_dofs = index_map.local_to_global(cell_dofs.ravel().astype(np.int32)).reshape(cell_dofs.shape)
-        x = V.tabulate_dof_coordinates()[:, :2]
-        trace_dofs = np.take_along_axis(cell_dofs, trace, axis=1)
-        trace_global = np.take_along_axis(global_dofs, trace, axis=1)
-        gathered = self.comm.allgather((trace_global, x[trace_dofs]))
-        chain_dofs = np.concatenate([g[0] for g in gathered])
-        chain_x = np.concatenate([g[1] for g in gathered])
+        cell_dofs = V.dofmap.list[cells]
+        global_dofs = index_map.local_to_global(cell_dofs.ravel()).reshape(cell_dofs.shape)
+        on_facet = np.take_along_axis(cell_dofs, trace, axis=1)
+        x = V.tabulate_dof_coordinates()[on_facet, :2]
+        gathered = self.comm.allgather((np.take_along_axis(global_dofs, trace, axis=1), x))
+        chain_dofs, chain_x = (np.concatenate(parts) for parts in zip(*gathered, strict=True))
         order = _chain(chain_dofs[:, 0], chain_dofs[:, -1])
-        chain_dofs, chain_x = chain_dofs[order], chain_x[order]
-        self.curve, self.n_facets = Curve(_join(chain_x), self.degree), len(order)
-        self.curve_dofs = _join(chain_dofs[..., None])[:, 0]
-        position = np.empty(len(order), dtype=np.int64)
-        position[order] = np.arange(len(order))
-        start = sum(len(g[0]) for g in gathered[: self.comm.rank])
-        facet = position[start : start + len(cells)]
-
+        self.curve, self.n_facets = Curve(_join(chain_x[order]), self.degree), len(order)
+        self.curve_dofs = _join(chain_dofs[order, :, None])[:, 0]
+        start = sum(len(dofs) for dofs, _ in gathered[: self.comm.rank])
+        facet = np.argsort(order)[start : start + len(cells)]
         sort = np.argsort(facet)
-        self.facet = facet[sort]
-        self.cells = cells[sort]
-        self.cell_dofs = cell_dofs[sort].astype(np.int32)
-        self.cell_global = global_dofs[sort]
-        self.trace = trace[sort].astype(np.int32)
-        self._ends = ends[sort]
+        self.facet, self.cells = facet[sort], cells[sort]
+        self.cell_dofs, self.cell_global = cell_dofs[sort], global_dofs[sort]
+        self.trace, self._ends = trace[sort].astype(np.int32), ends[sort]
         owned = self.curve_dofs - index_map.local_range[0]
         self._owned = np.flatnonzero((owned >= 0) & (owned < index_map.size_local))
         self._owned_local = owned[self._owned]
@@ -93,7 +79,6 @@ class Surface:
     def place_points(self, xi: Array, w: Array) -> None:
         """Put the contact points at ``xi`` ``(n_facets of the curve, q)`` in (0, 1) with weights ``w``; no history."""
         self.curve_xi = xi
-        self.__dict__.pop("_arc_length", None)
         start, along = self._ends[:, 0], self._ends[:, 1] - self._ends[:, 0]
         X = start[:, None] + xi[self.facet][..., None] * along[:, None]
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
@@ -130,14 +115,9 @@ class Surface:
 
     def arc_position(self, origin: Array) -> Array:
         """Arc length ``(n_facets, q)`` of all points, from the end of the curve nearest to ``origin`` ``(2,)``."""
-        s = self._arc_length
+        s = self.curve.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
         first, last = np.linalg.norm(self.curve.X[[0, -1]] - origin, axis=1)
         return s[-1, -1] - s[:, :-1] if last < first else s[:, :-1]
-
-    @cached_property
-    def _arc_length(self) -> Array:
-        """From the start of the curve to all points, and to the end of each facet ``(n_facets, q + 1)``."""
-        return self.curve.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
 
     def curve_displacement(self, u: Array) -> Array:
         """Displacement ``(n_nodes, 2)`` of the whole curve, from this rank's nodal displacements ``u`` ``(n, 2)``."""
@@ -189,15 +169,13 @@ class RigidSurface:
 
 def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray]:
     """Cells that this rank owns behind boundary ``facets``, and the facets' numbers within them."""
-    mesh.topology.create_connectivity(1, 2)
-    mesh.topology.create_connectivity(2, 1)
-    to_cell = mesh.topology.connectivity(1, 2)
-    to_facet = mesh.topology.connectivity(2, 1).array.reshape(-1, 3)
-    n_owned = mesh.topology.index_map(2).size_local
+    for dimensions in ((1, 2), (2, 1)):
+        mesh.topology.create_connectivity(*dimensions)
+    to_cell, to_facet = mesh.topology.connectivity(1, 2), mesh.topology.connectivity(2, 1)
     cells = np.array([to_cell.links(f)[0] for f in facets], dtype=np.int32).reshape(-1)
-    keep = cells < n_owned
+    keep = cells < mesh.topology.index_map(2).size_local
     cells, facets = cells[keep], np.asarray(facets)[keep]
-    return cells, np.argmax(to_facet[cells] == facets[:, None], axis=1) if len(cells) else cells.astype(np.int64)
+    return cells, np.nonzero(to_facet.array.reshape(-1, 3)[cells] == facets[:, None])[1]
 
 
 def _chain(start: np.ndarray, end: np.ndarray) -> np.ndarray:

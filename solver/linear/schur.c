@@ -2,9 +2,7 @@
  * complement it gives, and solved with in two halves around a solve with that. PETSc's interface has no such halves.
  * Numbers count from 1. Functions return MUMPS's INFOG(1): 0, a warning above, an error below. */
 
-#define _DEFAULT_SOURCE
 #include <stdlib.h>
-#include <sys/mman.h>
 
 #include <dmumps_c.h>
 
@@ -14,7 +12,6 @@
 #define SINGULAR -10
 #define MORE_SPACE 4 /* times the workspace is made larger where it was too small */
 #define SPARE 10     /* per cent of it at first */
-#define HUGE (2 << 20)
 
 static int run(DMUMPS_STRUC_C *id, int job)
 {
@@ -46,34 +43,14 @@ void *schur_create(int32_t comm, int32_t n, int64_t nnz, int32_t *rows, int32_t 
     return id;
 }
 
-/* Room to factorise in, with so many per cent to spare, on huge pages: small ones take long when they are used for the first
- * time. Returns whether there is that much. */
-static int reserve(DMUMPS_STRUC_C *id, int percent)
-{
-    int64_t words = id->info[7] < 0 ? -1000000LL * id->info[7] : id->info[7];
-    words = (words / 100 + 1) * (100 + percent);
-    words = (words / 1000000 + 1) * 1000000; /* MUMPS counts large ones in millions */
-    size_t bytes = (8 * words + HUGE - 1) / HUGE * HUGE;
-    free(id->wk_user);
-    id->wk_user = aligned_alloc(HUGE, bytes);
-    if (!id->wk_user) return 0;
-#ifdef MADV_HUGEPAGE
-    madvise(id->wk_user, bytes, MADV_HUGEPAGE);
-#endif
-    id->lwk_user = -(int)(words / 1000000);
-    return 1;
-}
-
 int32_t schur_factorise(void *at, double *values, double *complement)
 {
     DMUMPS_STRUC_C *id = at;
     int status = -13;
     id->a = values, id->schur = complement;
-    for (int i = 0, percent = SPARE; i <= MORE_SPACE; i++, percent *= 3) {
-        if (!(i == 0 && id->wk_user) && !reserve(id, percent)) return -13;
+    for (int i = 0; i <= MORE_SPACE; i++, id->ICNTL(14) *= 3) {
         status = run(id, 2);
-        if (status != -8 && status != -9 && status != -11 && status != -17) break;
-        id->ICNTL(14) = 2 * percent;
+        if (status != -8 && status != -9) break; /* the workspace was large enough */
     }
     return status >= 0 && id->infog[27] ? SINGULAR : status;
 }
@@ -100,6 +77,5 @@ void schur_destroy(void *at)
     DMUMPS_STRUC_C *id = at;
     if (!id) return;
     run(id, -2);
-    free(id->wk_user);
     free(id);
 }

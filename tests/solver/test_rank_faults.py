@@ -45,7 +45,7 @@ PLACES = {
     "setup": ("solver.bulk", "Bulk", "__init__", 1),
     "residual": ("solver.contact.contact", "Contact", "evaluate", 7),
     "tangent": ("solver.contact.tangent", "ContactTangent", "blocks", 4),
-    "return map": ("materials.points", "Points", "update", 13),
+    "return map": ("materials.material", "Points", "update", 13),
     "output": ("output.fields", "FieldWriter", "write", 2),
 }
 
