@@ -39,18 +39,23 @@ class CoarseStart:
         coarse.equilibrium.interrupt = fine.equilibrium.interrupt
         self.path = coarse.load_path(coarse=coarse_start(coarse))
         self.iterations = 0  # of the last attempt, on all coarser meshes
-        self._order = MeshOrder(coarse)
-        self._maps = _interpolations(fine, self._order)
+        order = self._order = MeshOrder(coarse)
+        x, cells, body = fine.comm.bcast((order.coordinates, order.nodes_of_cell, order.bodies()))
+        places = fine.V.tabulate_dof_coordinates()[:, :2]
+        self._maps: list[tuple[np.ndarray, Interpolation]] = []  # nodes of a body on this rank, and their values
+        for tag in np.unique(body):
+            nodes = fine.nodes_of(tag)
+            onto = Interpolation(x[:, :2], cells[body == tag], fine.problem.degree, places[nodes])
+            self._maps.append((nodes, onto))
         self._reached: float | None = None
 
     def increment(self, load: float) -> Array | None:
         """What a step to ``load`` adds to the state of the fine problem, ``(2 n_local + 1,)``; None if the coarse mesh
         does not tell."""
         with self.fine.timer("coarse start"):
-            result = self.path.attempt(load)
+            result, contact = self.path.attempt(load), self.coarse.contact
             self.iterations = result.iterations + self.path.coarse_iterations
             self._reached = load if result.converged else None
-            contact = self.coarse.contact
             if not result.converged or (contact.pairs and contact.n_active() < _FEWEST_POINTS):
                 return None
             step = self.coarse.equilibrium.state() - self.path.state
@@ -72,14 +77,3 @@ class CoarseStart:
     def take_back(self) -> None:
         """Undo the last attempt."""
         self.path.take_back()
-
-
-def _interpolations(fine: System, order: MeshOrder) -> list[tuple[np.ndarray, Interpolation]]:
-    """Per body the nodes of ``fine`` on this rank, and how they get the values that ``order`` collects."""
-    x, cells, body = fine.comm.bcast((order.coordinates, order.nodes_of_cell, order.bodies()))
-    places, degree = fine.V.tabulate_dof_coordinates()[:, :2], fine.problem.degree
-    maps = []
-    for tag in np.unique(body):
-        nodes = fine.nodes_of(tag)
-        maps.append((nodes, Interpolation(x[:, :2], cells[body == tag], degree, places[nodes])))
-    return maps

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.geometry.fenicsx import create_vector
 from archord.solver.linear.bordered import Bordered
-from archord.solver.linear.facts import Strategy
+from archord.solver.linear.strategy import Strategy
 from archord.solver.tangent import TangentMatrix
 
 

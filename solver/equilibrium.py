@@ -25,7 +25,7 @@ from archord.solver.contact.law import Frictionless
 from archord.solver.control import FactorControl, ForceControl
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.linear.choose import choose
-from archord.solver.linear.facts import Facts, Strategy
+from archord.solver.linear.strategy import Facts, Strategy
 from archord.solver.problem import Load, Problem
 from archord.solver.tangent import TangentMatrix
 from archord.solver.timer import BEFORE_SOLVING, Timer

@@ -8,7 +8,6 @@ that of a contact edge's points along the curve depends on the ranks.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import fields
 
 import numpy as np
 from mpi4py import MPI
@@ -92,8 +91,10 @@ class MeshOrder:
         "history/PLACE/NAME" for every array of their state. Collective."""
         mine = {}
         for place, (points, number) in self._points().items():
-            used = _used(points)
-            mine[place] = {name: values[used] for name, values in ({"point": number} | _arrays(points.state)).items()}
+            now, virgin = vars(points.state), vars(points.material.state(points.n))
+            changed = [(v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in now.items()]
+            used = np.logical_or.reduce(changed)
+            mine[place] = {name: values[used] for name, values in ({"point": number} | now).items()}
         parts, whole = self.system.comm.gather(mine) or [], {}
         for place in sorted({place for part in parts for place in part}):
             found = [part[place] for part in parts if place in part]
@@ -106,34 +107,18 @@ class MeshOrder:
         """The inverse of `collect_history`: give every point its history. Collective."""
         stored: Arrays = self.system.comm.bcast(whole)
         for place, (points, number) in self._points().items():
-            virgin, known = points.material.state(len(number)), stored[f"history/{place}/point"]
-            _, mine, theirs = np.intersect1d(number, known, assume_unique=True, return_indices=True)
-            for name, values in _arrays(virgin).items():
-                values[mine] = stored[f"history/{place}/{name}"][theirs]
-            points.state = points.trial = virgin
+            state, known = points.material.state(len(number)), stored[f"history/{place}/point"]
+            _, here, there = np.intersect1d(number, known, assume_unique=True, return_indices=True)
+            for name, values in vars(state).items():
+                values[here] = stored[f"history/{place}/{name}"][there]
+            points.state = points.trial = state
 
     def _points(self) -> dict[str, tuple[Points, np.ndarray]]:
-        """All points with history of this rank and their numbers ``(n,)``, by place."""
-        found = {}
-        for tag, (cells, points) in self.system.bulk.histories().items():
-            found[f"bulk {tag}"] = points, _through(self._cell_index[cells], points)
-        for place, (facets, points) in self.system.contact.histories().items():
-            found[place] = points, _through(facets, points)
-        return {place: entry for place, entry in found.items() if entry[0].state is not None}
-
-
-def _through(entity: np.ndarray, points: Points) -> np.ndarray:
-    """Numbers ``(n q,)`` of the points of the ``n`` cells or facets numbered ``entity``."""
-    q = points.n // max(len(entity), 1)
-    return (entity.astype(np.int64)[:, None] * q + np.arange(q)).ravel()
-
-
-def _arrays(state) -> Arrays:
-    return {f.name: getattr(state, f.name) for f in fields(state)}
-
-
-def _used(points: Points) -> np.ndarray:
-    """Which points ``(n,)`` are not what they were at the beginning."""
-    virgin = _arrays(points.material.state(points.n))
-    changed = [(v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in _arrays(points.state).items()]
-    return np.logical_or.reduce(changed)
+        """All points with history of this rank and their numbers ``(n q,)``, by place."""
+        found = {f"bulk {tag}": (self._cell_index[c], p) for tag, (c, p) in self.system.bulk.histories().items()}
+        numbered = {}
+        for place, (entity, points) in (found | self.system.contact.histories()).items():
+            if points.state is not None:
+                q = points.n // max(len(entity), 1)
+                numbered[place] = points, (entity.astype(np.int64)[:, None] * q + np.arange(q)).ravel()
+        return numbered

@@ -12,8 +12,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.linear.direct import Direct
-from archord.solver.linear.facts import Facts, Strategy, solve_by
+from archord.solver.linear.strategy import Direct, Facts, Strategy, solve_by
 
 _SINGULAR = 1e-9  # stiffness against the motion over ``stiffness`` below which nothing resists the force
 
@@ -67,8 +66,7 @@ class Bordered:
 
     def join(self, x: PETSc.Vec, u: Array, factor: float) -> None:
         """Put ``u`` ``(n_owned dofs,)`` and ``factor`` into ``x``."""
-        x.array[: self._n] = u
-        x.array[self._n :] = factor
+        x.array[: self._n], x.array[self._n :] = u, factor
 
     def update(self, b: Array, c: Array, d: float, *, factorise: bool = True) -> None:
         """New border for a matrix with new values: ``b`` and ``c`` of this rank's dofs, ``d`` of all ranks.
@@ -84,15 +82,12 @@ class Bordered:
         self._ksp.solve(self._x, self._y)
         return self._y.array_r.copy()
 
-    def _dot(self, a: Array, b: Array) -> float:
-        return self.comm.allreduce(float(a @ b))
-
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """``y = [A b; c d] x``, called by PETSc."""
         s, u = self.factor(x), x.array_r[: self._n]
         self._x.array[:] = u
         self._A.mult(self._x, self._y)
-        self.join(y, self._y.array_r + s * self.b, self._dot(self.c, u) + self.d * s)
+        self.join(y, self._y.array_r + s * self.b, self.comm.allreduce(float(self.c @ u)) + self.d * s)
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x = [A b; c d]^-1 r``, called by PETSc; where nothing resists the motion, the load factor stays."""
@@ -101,7 +96,7 @@ class Bordered:
             self._stale = False
         rho, u = self.factor(r), self._solve(r.array_r[: self._n])
         c, d = self._factorised
-        pivot = d - self._dot(c, self._along_b)
-        self.singular = abs(pivot) < _SINGULAR * self._stiffness
-        s = 0.0 if self.singular else (rho - self._dot(c, u)) / pivot
+        along_b, along_u = self.comm.allreduce(np.array([c @ self._along_b, c @ u]))
+        self.singular = abs(d - along_b) < _SINGULAR * self._stiffness
+        s = 0.0 if self.singular else (rho - along_u) / (d - along_b)
         self.join(x, u - s * self._along_b, s)

@@ -8,17 +8,15 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.solver.linear import bordered, condensed, lagged, substructured
-from archord.solver.linear.direct import Direct
-from archord.solver.linear.facts import Facts, Strategy
+from archord.solver.linear.strategy import Direct, Facts, Strategy
 
 # Every strategy beside MUMPS on the whole matrix, which always goes: None, or why it does not fit the facts.
 RULES = {
     "bordered": bordered.why_not,
     "condensed": condensed.why_not,
-    "substructured": substructured.why_not,
+    "substructured": substructured.why_not,  # in the place of MUMPS on the whole matrix
     "lagged": lagged.why_not,
 }
-WHOLE = ("substructured",)  # those that factorise the whole matrix, in the place of MUMPS
 LEFT_OUT: set[str] = set()  # strategies to do without; benchmarks and tests set it
 
 
@@ -44,7 +42,7 @@ class Choice:
     def words(self) -> dict[str, str | dict[str, str]]:
         """The choice for run.json: ``strategy`` names what is used, ``not_used`` has the reasons."""
         used = [name for name, reason in self.why_not.items() if reason is None]
-        if not {"condensed", *WHOLE} & {*used}:
+        if not {"condensed", "substructured"} & {*used}:
             used.append("direct")
         return {"strategy": " + ".join(used), "not_used": {n: r for n, r in self.why_not.items() if r is not None}}
 
@@ -54,5 +52,5 @@ def choose(facts: Facts) -> Choice:
     reasons = {name: rule(facts) for name, rule in RULES.items()}
     reasons |= {name: "left out on request" for name in LEFT_OUT & reasons.keys()}
     if reasons["condensed"] is None:
-        reasons |= {name: "the system is condensed" for name in (*WHOLE, "lagged")}
+        reasons |= {name: "the system is condensed" for name in ("substructured", "lagged")}
     return Choice(reasons)

@@ -22,7 +22,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.linear.facts import Facts, solve_by
+from archord.solver.linear.strategy import Facts, solve_by
 
 _MOST_DOFS = 8_000  # beyond, the work on contact dofs takes longer than factorisations
 _LARGE_GAMMA = 5.0  # beyond, the small system is close to singular

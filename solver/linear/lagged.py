@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from petsc4py import PETSc
 
-from archord.solver.linear.facts import Facts
+from archord.solver.linear.strategy import Facts
 
 _MANY_DOFS = 20_000  # for which a factorisation takes longer than some solves with an old one
 _TOLERANCE = 1e-3  # residual of a linear system over its right-hand side

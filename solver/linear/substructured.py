@@ -21,8 +21,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.kernels.compiled import CompilerError, library, pointer
-from archord.solver.linear.facts import Facts, solve_by
 from archord.solver.linear.nested_dissection import before_corners, corners, metis
+from archord.solver.linear.strategy import Facts, solve_by
 
 _LARGEST_INTERFACE = 4000  # unknowns: every rank factorises a dense matrix of that size
 

@@ -10,7 +10,7 @@ from archord.benchmarks.case import paper_joint
 from archord.output.run import solve_scene
 from archord.solver.linear import choose as module
 from archord.solver.linear.choose import choose
-from archord.solver.linear.facts import Facts
+from archord.solver.linear.strategy import Facts
 
 ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, 0.5, lambda: True)
 
