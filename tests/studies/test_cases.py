@@ -184,16 +184,11 @@ def test_of_many_faults_the_first_are_told(tmp_path):
     assert said[-1] == "FILE: has 10 more faults."
 
 
-@pytest.mark.parametrize(
-    ("base", "text", "said"),
-    [
-        ("", "", "FILE: base: is missing."),
-        ("", "base = 3", "FILE: base = 3: input should be a valid dictionary."),
-        ("nowhere.toml", "", "HERE/nowhere.toml: cannot be read: No such file or directory."),
-    ],
-)
-def test_a_base_is_needed(tmp_path, base, text, said):
-    assert faults(tmp_path, text, base) == [said.replace("HERE", str(tmp_path))]
+def test_a_base_is_needed(tmp_path):
+    assert faults(tmp_path, "", "") == ["FILE: base: is missing."]
+    assert faults(tmp_path, "base = 3", "") == ["FILE: base = 3: input should be a valid dictionary."]
+    said = f"{tmp_path}/nowhere.toml: cannot be read: No such file or directory."
+    assert faults(tmp_path, "", "nowhere.toml") == [said]
 
 
 def test_examples_are_sound(tmp_path):

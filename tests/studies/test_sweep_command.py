@@ -22,9 +22,9 @@ def solved(tmp_path_factory) -> Path:
 def test_each_case_is_what_solve_makes_of_it(solved, tmp_path):
     """To the last digit, though the process and its mesh had other cases before."""
     (tmp_path / "base.toml").write_text((solved / "some.sweep.toml").read_text().partition("[base]")[2])
-    for number, options in ((1, ["pin.E=0.5", "load.steps=2"]), (6, ["pin.E=1.82", "load.steps=3"])):
-        flags = [word for option in options for word in ("--set", option)]
-        assert run(["solve", str(tmp_path / "base.toml"), *flags, "-o", str(tmp_path / f"{number}"), "-q"]) == 0
+    for number, E, steps in ((1, 0.5, 2), (6, 1.82, 3)):
+        keys = ["--set", f"pin.E={E}", "--set", f"load.steps={steps}"]
+        assert run(["solve", str(tmp_path / "base.toml"), *keys, "-o", str(tmp_path / f"{number}"), "-q"]) == 0
         alone = read_history(tmp_path / f"{number}" / "history.csv")
         rows = [row for row in table(solved / "out" / "sweep.csv") if row["case"] == str(number)]
         for name in set(alone) - {"seconds"}:

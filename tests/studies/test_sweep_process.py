@@ -63,8 +63,7 @@ def test_a_killed_sweep_goes_on_where_it_was(whole, tmp_path):
     assert len(done(out)) < 12
     assert sweep(file, "-o", out, "-q") == 0
     same_numbers(out, whole)
-    restarted = [p for p in out.glob("cases/*") if report_of(p)["restarts"]]
-    assert len(restarted) >= min(continued, 1)
+    assert any(report_of(p)["restarts"] for p in out.glob("cases/*")) or not continued
 
 
 def same_numbers(a: Path, b: Path) -> None:
