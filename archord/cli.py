@@ -67,7 +67,7 @@ def _run(arguments: list[str], begun: float) -> int:
         return error.exit_code
     except (BrokenPipeError, SystemExit):  # the reader, like head, has seen enough; click makes one of the other
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 128 + signal.SIGPIPE if arguments[0] in COLLECTIVE else 0  # what solves is not done
+        return 128 + signal.SIGPIPE if arguments and arguments[0] in COLLECTIVE else 0  # what solves is not done
     except (KeyboardInterrupt, click.exceptions.Abort):
         _say("archord: interrupted.")
         return 130

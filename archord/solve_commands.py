@@ -13,7 +13,6 @@ import click
 from archord.options import SCENE, flag, output, overrides, quiet
 
 if TYPE_CHECKING:
-    from archord.output.restart import Plan
     from archord.scene.scene import Scene
 
 
@@ -50,25 +49,17 @@ def solve(
     if output is not None and scene.is_dir():
         raise click.UsageError("-o does not go with a run folder")
     folder, file = (scene, scene / "scene.toml") if scene.is_dir() else (output or Path("runs") / scene.stem, scene)
-    planned = _planned(lambda: load_scene(file, overrides), folder, extend=extend)
-    if not quiet:
-        print(f"{planned.said}.", flush=True)
-    if planned.finished:
-        return 0
-    return _solve(lambda: planned.scene, folder, begun, quiet, force=True, start=planned.start)
-
-
-def _planned(load: Callable[[], Scene], folder: Path, *, extend: bool) -> Plan:
-    """How the run in ``folder`` goes on, with the scene that ``load`` gives rank 0. Collective.
-
-    Raises `InputError` on every rank if it cannot.
-    """
     from mpi4py import MPI
 
     from archord.output.ranks import agreed
     from archord.output.restart import plan_restart  # on all ranks: it imports PETSc
 
-    return agreed(MPI.COMM_WORLD, lambda: plan_restart(folder, load(), extend=extend))
+    planned = agreed(MPI.COMM_WORLD, lambda: plan_restart(folder, load_scene(file, overrides), extend=extend))
+    if not quiet:
+        print(f"{planned.said}.", flush=True)
+    if planned.finished:
+        return 0
+    return _solve(lambda: planned.scene, folder, begun, quiet, force=True, start=planned.start)
 
 
 def _solve(load: Callable[[], Scene], folder: Path, begun: float, quiet: bool, **options: Any) -> int:

@@ -83,9 +83,9 @@ def mesh_joint(
         for facets, lines in drawn.lines.items():
             gmsh.model.addPhysicalGroup(1, lines, facets, facets.set_name)
         fields = []
-        for size in dict.fromkeys(drawn.sizes[body] for body in drawn.faces):
+        for expression in dict.fromkeys(drawn.sizes[body] for body in drawn.faces):
             fields.append(mesh.field.add("MathEval"))
-            mesh.field.setString(fields[-1], "F", f"{coarser!r} * ({size})")
+            mesh.field.setString(fields[-1], "F", f"{coarser!r} * ({expression})")
         if len(fields) > 1:
             for i, face in enumerate(drawn.faces.values()):
                 whole, fields[i] = fields[i], mesh.field.add("Restrict")

@@ -26,8 +26,12 @@ def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
     """
     if os.environ.get("ARCHORD_KEEP_MESHES") == "0":
         return make()
+    gmsh = importlib.util.find_spec("gmsh")
+    library = Path(gmsh.origin).stat().st_mtime_ns if gmsh and gmsh.origin else 0
+    sources = [source.read_bytes() for source in sorted(Path(__file__).parent.glob("*.py"))]
+    digest = hashlib.sha256(b"".join([repr((key, library)).encode(), *sources])).hexdigest()
     folder = cache_folder() / "meshes"
-    path = folder / f"{_digest(key)}.mesh"
+    path = folder / f"{digest[:32]}.mesh"
     with suppress(Exception):  # whatever a damaged file makes of it
         mesh = pickle.loads(path.read_bytes())
         os.utime(path)
@@ -42,12 +46,3 @@ def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
             for old in sorted(folder.glob("*.mesh"), key=os.path.getmtime)[:-_MOST]:
                 old.unlink()
     return mesh
-
-
-def _digest(key: tuple) -> str:
-    gmsh = importlib.util.find_spec("gmsh")
-    library = Path(gmsh.origin).stat().st_mtime_ns if gmsh and gmsh.origin else 0
-    digest = hashlib.sha256(repr((key, library)).encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:32]

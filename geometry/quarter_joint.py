@@ -48,14 +48,14 @@ def quarter_joint(
             lines = [geo.addLine(a, b) for a, b in zip([side, *corners], [*corners, bottom], strict=True)]
             return geo.addPlaneSurface([geo.addCurveLoop([arc, *lines])]), arc, lines
 
-        faces, axis, lines = {}, [], {}
+        faces: dict[Cells, int] = {}
+        lines: dict[Facets, list[int]] = {Facets.SYMMETRY: []}
         if not rigid_pin:
             faces[Cells.PIN], arc, (top, line) = face((0, 1 - hole), (0, -hole), (1, 1 - hole))
-            lines |= {Facets.PIN_ARC: [arc], Facets.PIN_TOP: [top]}
-            axis.append(line)
+            lines |= {Facets.PIN_ARC: [arc], Facets.PIN_TOP: [top], Facets.SYMMETRY: [line]}
         corners = (width, 0), (width, -width), (0, -width)
         faces[Cells.BLOCK], arc, (held, *_, line) = face((0, 0), (0, -hole), (hole, 0), *corners)
-        lines |= {Facets.HOLE_ARC: [arc], Facets.BLOCK_HELD: [held], Facets.SYMMETRY: [*axis, line]}
+        lines |= {Facets.HOLE_ARC: [arc], Facets.BLOCK_HELD: [held], Facets.SYMMETRY: [*lines[Facets.SYMMETRY], line]}
         from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
         sizes = {body: f"{size!r} + {from_arc}" for body, size in on_arc.items()}
         if edge is None:

@@ -36,7 +36,6 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     scene.require_mesh()
     g, analysis, by_force = scene.joint, scene.analysis, scene.force_controlled
     ring, rigid = g.is_ring, scene.pin.rigid
-    solids = {"pin": scene.pin.solid, "block": scene.block}
     supports = [Support("axis", "symmetry", 0), *(Support("block", "block held", axis) for axis in (0, 1))]
     if not rigid and not ring:
         supports.append(Support("pin", "pin top", 1, -1.0))
@@ -60,7 +59,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
 
     return Problem(
         _mesh(scene, comm, partitioner, ring),
-        [Body(name, solid.material(analysis.plane)) for name, solid in solids.items() if solid is not None],
+        [Body(name, solid.material(analysis.plane)) for name, solid in scene.solids.items()],
         [contact],
         supports,
         [Load("pin", (0.0, -1.0), core)] if ring else [],

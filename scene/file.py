@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -87,8 +86,7 @@ def override_key(data: dict[str, Any], override: str) -> str:
     key, sign, text = override.partition("=")
     section, dot, name = key.strip().partition(".")
     if "\n" in override or not (sign and dot and section and name and "." not in name):
-        shown = json.dumps(override, ensure_ascii=False) if "\n" in override else override
-        raise InputError(f"--set {shown}: must read section.key=value, like joint.clearance=0.01.")
+        raise InputError(f"--set {override!r}: must read section.key=value, like joint.clearance=0.01.")
     put(data, section, name, _value(text.strip()) if text.strip() else None, f"--set {override}")
     return f"{section}.{name}"
 

@@ -9,7 +9,7 @@ from archord.report.table import Table
 from archord.scene.keys import toml_value
 from archord.scene.scene import FORMAT, Scene
 
-_SECTIONS = {name: info for name, info in Scene.model_fields.items() if name != "format"}
+_SECTIONS: dict[str, Any] = {name: info for name, info in Scene.model_fields.items() if name != "format"}
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 _KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false"}
 

@@ -57,7 +57,7 @@ class Scene(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        joint, pin, block, load = self.joint, self.pin, self.block, f"load.{self.load.name}"
+        joint, pin, load = self.joint, self.pin, f"load.{self.load.name}"
         for name in CHOSEN if self.analysis.accuracy is not None else ():
             section, key = name.split(".")
             given: BaseModel = getattr(self, section)
@@ -65,16 +65,15 @@ class Scene(Section):
             require(free, name, "must not be given together with analysis.accuracy, which chooses it")
         said = 'must be "block" or "both": a rigid pin has no contact edge to integrate'
         require(not pin.rigid or self.analysis.integration != "pin", "analysis.integration", said)
-        for name, size in {"joint.radius": joint.radius, "block.E": block.E, "pin.E": pin.E}.items():
-            allowed = size is None or _RANGE[0] <= size <= _RANGE[1]
-            require(allowed, name, "must be between 1e-30 and 1e30; choose other units")
-        for name, body in {"pin": pin.solid, "block": block}.items():
-            if body is not None:
-                strong = body.yield_stress is None or body.yield_stress >= _WEAKEST * body.E
-                require(strong, f"{name}.yield_stress", f"must be at least {_WEAKEST:g} times {name}.E")
-                allowed = body.hardening <= body.E / _WEAKEST
-                require(allowed, f"{name}.hardening", f"must not exceed {1 / _WEAKEST:g} times {name}.E")
-        alike = pin.rigid or _SOFTEST <= pin.E / block.E <= 1 / _SOFTEST
+        sizes = {"joint.radius": joint.radius} | {f"{name}.E": body.E for name, body in self.solids.items()}
+        for name, size in sizes.items():
+            require(_RANGE[0] <= size <= _RANGE[1], name, "must be between 1e-30 and 1e30; choose other units")
+        for name, body in self.solids.items():
+            strong = body.yield_stress is None or body.yield_stress >= _WEAKEST * body.E
+            require(strong, f"{name}.yield_stress", f"must be at least {_WEAKEST:g} times {name}.E")
+            allowed = body.hardening <= body.E / _WEAKEST
+            require(allowed, f"{name}.hardening", f"must not exceed {1 / _WEAKEST:g} times {name}.E")
+        alike = all(_SOFTEST <= body.E / self.block.E <= 1 / _SOFTEST for body in self.solids.values())
         require(alike, "pin.E", "must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
         if joint.is_ring:
             said = 'does not load a joint whose model is "ring"; give force or relative_force'
@@ -89,9 +88,7 @@ class Scene(Section):
     def require_mesh(self) -> None:
         """Raise `InputError` if the scene leaves its mesh to `archord.studies.accuracy`."""
         if self.analysis.accuracy is not None:
-            raise InputError(
-                f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; give element_size."
-            )
+            raise InputError(f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open.")
 
     @property
     def force_controlled(self) -> bool:
@@ -117,19 +114,22 @@ class Scene(Section):
     @property
     def monotonic(self) -> bool:
         """Whether the load only grows."""
-        targets = [0.0, *self.targets]
-        return all(a < b for a, b in pairwise(targets))
+        return all(a < b for a, b in pairwise([0.0, *self.targets]))
 
     @property
     def E_star(self) -> float:
         """Contact modulus of the pair, ``1/E* = sum over deformable bodies of 1/E*_i`` (Johnson 1985, eq. 4.20)."""
-        solids = [self.block] if self.pin.solid is None else [self.pin.solid, self.block]
-        return 1 / sum(1 / contact_modulus(s.E, s.nu, self.analysis.plane) for s in solids)
+        return 1 / sum(1 / contact_modulus(s.E, s.nu, self.analysis.plane) for s in self.solids.values())
 
     @property
     def plastic(self) -> bool:
         """Whether any body can yield."""
-        return self.pin.yield_stress is not None or self.block.yield_stress is not None
+        return any(solid.yield_stress is not None for solid in self.solids.values())
+
+    @property
+    def solids(self) -> dict[str, Solid]:
+        """The deformable bodies by name."""
+        return {"block": self.block} if self.pin.rigid else {"pin": self.pin, "block": self.block}
 
 
 def parse_scene(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> Scene:

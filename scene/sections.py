@@ -76,11 +76,6 @@ class Pin(Solid):
             require(self.rigid or getattr(self, name) is not None, name, "is missing (or set rigid = true)")
         return self
 
-    @property
-    def solid(self) -> Solid | None:
-        """The pin as a solid; None if it is rigid."""
-        return None if self.rigid else self
-
 
 class Load(Section):
     """The displacement of the pin, from first touch, or the force on it: a ramp to a target, or to several in turn."""

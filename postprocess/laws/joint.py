@@ -68,7 +68,7 @@ class LawJoint:
     @classmethod
     def from_scene(cls, scene: Scene) -> LawJoint:
         """The joint of ``scene``; of two yield stresses the lower one, hardening is left out."""
-        plane, pin, block = scene.analysis.plane, scene.pin.solid, scene.block
+        plane, pin, block = scene.analysis.plane, scene.solids.get("pin"), scene.block
         alpha, first, yields, second = 1.0, 0.0, [None, block.yield_stress], _transverse(block.nu, plane)
         if pin is not None:
             ratio = contact_modulus(pin.E, pin.nu, plane) / contact_modulus(block.E, block.nu, plane)

@@ -105,7 +105,7 @@ def test_overrides_replace_values_and_alternatives(tmp_path):
     assert scene.joint.dR == 0.01
     assert (scene.load.steps, scene.analysis.plane, scene.plastic) == (3, "stress", True)
     assert not load_scene(path, ["block.yield_stress=300", "block.yield_stress="]).plastic
-    assert load_scene(path, ["pin.rigid=true"]).pin.solid is None
+    assert load_scene(path, ["pin.rigid=true"]).pin.rigid
     with pytest.raises(InputError, match=r"^--set joint\.radius=-1: joint\.radius must be greater than 0\.$"):
         load_scene(path, ["joint.radius=-1"])
     for malformed in ("radius=3", "joint.radius", "joint=3", "a.b.c=1"):
@@ -125,7 +125,7 @@ def test_the_resolved_scene_is_the_same_scene():
         assert tomllib.loads(resolved(a))["format"] == 1
         assert (a.joint.dR, a.joint.h, a.joint.W) == (b.joint.dR, b.joint.h, b.joint.W)
         assert (a.targets, a.E_star) == (b.targets, b.E_star)
-        assert (a.pin.solid, a.block, a.analysis, a.load) == (b.pin.solid, b.block, b.analysis, b.load)
+        assert (a.solids, a.analysis, a.load) == (b.solids, b.analysis, b.load)
 
 
 def test_the_example_shows_every_key_and_loads():
