@@ -63,10 +63,11 @@ def arc_panel(axes: Any, run: Run) -> None:
     axes.secondary_yaxis("right", **_over(scene.E_star)).set_ylabel("p / E*")
 
 
-def field_panel(axes: Any, run: Run) -> None:
-    """PEEQ, or von Mises stress where nothing can yield, of the last step on the deformed joint near the contact, with
-    its outline before (dashed) and after; displacement and clearance are magnified by the factor in the title."""
-    scene, fields = run.scene, run.fields()
+def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
+    """PEEQ, or von Mises stress where nothing can yield, at ``step`` (the last) on the deformed joint near the
+    contact, with its outline before (dashed) and after; displacement and clearance are magnified by the factor in the
+    title."""
+    scene, fields = run.scene, run.fields(step)
     factor = magnification(scene, fields)
     x, ring, R = magnified(scene, fields, factor), scene.joint.is_ring, scene.joint.radius
     values, label, cmap = fields.von_mises, f"von Mises stress [{scene.units.stress}]", "viridis"

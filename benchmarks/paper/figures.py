@@ -17,10 +17,10 @@ from archord.geometry.basis import Array
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.chord import arc_angle, read_chord_pressure
 from archord.postprocess.curve import RunCurve
-from archord.postprocess.fields import SUBTRIANGLES, read_fields
 from archord.postprocess.laws.elastic_laws import hertz, persson_load, persson_pressure
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
+from archord.postprocess.panels import field_panel
 from archord.report.figure import new_figure, save
 from archord.report.files import write_rows
 
@@ -196,22 +196,10 @@ FIGURES: dict[str, Callable[[Runs], list[Part]]] = {
 
 
 def draw_zones(runs: Runs, file: Path) -> Path:
-    """Draw figure 8's plastic zones: PEEQ on the deformed shape near the contact at the stages A, B, C, a row a
-    plane."""
-    figure = new_figure(13, 8)
+    """Draw figure 8's plastic zones at the stages A, B, C, in plane strain above and in plane stress below."""
+    figure = new_figure(15, 9.5)
     for plane, row in zip(PLANES, figure.subplots(len(PLANES), len(STAGES)), strict=True):
-        run = runs.curve(MILD_YIELD, plane)
-        assert run.folder is not None
-        for name, stage, axes in zip("ABC", STAGES, row, strict=True):
-            step = int(np.argmin(np.abs(run.delta / run.dR - stage))) + 1
-            fields = read_fields(run.folder, run.scene, step)
-            assert fields.peeq is not None
-            x = fields.deformed / run.R
-            near = np.abs(x[fields.cells[:, :3]]).max(axis=(1, 2)) < 3
-            triangles = fields.cells[near][:, SUBTRIANGLES].reshape(-1, 3)
-            peeq = np.repeat(100 * fields.peeq[near], len(SUBTRIANGLES))
-            drawn = axes.tripcolor(*x.T, triangles, facecolors=peeq, cmap="inferno_r")
-            figure.colorbar(drawn, ax=axes, label="equivalent plastic strain [%]", shrink=0.85)
-            title = f"plane {plane}, {name}: delta = {stage:g} dR"
-            axes.set(xlim=(0, 1.5), ylim=(-1.9, 0.05), aspect="equal", xlabel="x / R", ylabel="y / R", title=title)
+        run = runs.run(MILD_YIELD, plane)
+        for stage, axes in zip(STAGES, row, strict=True):
+            field_panel(axes, run, int(np.argmin(np.abs(run.curve.delta / run.curve.dR - stage))) + 1)
     return save(figure, file)

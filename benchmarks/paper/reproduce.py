@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,7 @@ from archord.benchmarks.paper.figures import FIGURES, LAYOUTS, draw_zones, write
 from archord.benchmarks.paper.runs import JOINTS, PLANES, Runs, cases, solve_missing
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
-from archord.output.user_file import check_output
 from archord.scene.errors import InputError
-
-ZONES, REPORT = "fig8_zones.png", "report.md"
 
 
 def chosen(names: Sequence[str]) -> list[str]:
@@ -36,13 +34,7 @@ def reproduce(names: Sequence[str], folder: Path, comm: MPI.Comm, said: Callable
     failed. Collective.
     """
     wanted = chosen(names)
-
-    def claim() -> None:
-        claim_folder(folder, force=True)
-        for name in [*(f"{name}.{kind}" for name in wanted for kind in ("csv", "png")), ZONES, REPORT]:
-            check_output(folder / name)
-
-    agreed(comm, claim)
+    agreed(comm, lambda: claim_folder(folder, force=True))
     runs = Runs(folder / "runs")
     needed = cases(joint for name in wanted for joint in LAYOUTS[name]["joints"])
     if complaints := solve_missing(needed, runs.folder, comm, said):
@@ -52,28 +44,22 @@ def reproduce(names: Sequence[str], folder: Path, comm: MPI.Comm, said: Callable
     tables = {name: FIGURES[name](runs) for name in wanted}
     files = [file for name in wanted for file in write(tables[name], folder, name)]
     if "fig8" in wanted:
-        files.append(draw_zones(runs, folder / ZONES))
+        files.append(draw_zones(runs, folder / "fig8_zones.png"))
     if len(wanted) == len(FIGURES):
         pictures = [file.name for file in files if file.suffix == ".png"]
-        files.append(folder / REPORT)
+        files.append(folder / "report.md")
         files[-1].write_text(report(runs, judged(runs, tables).markdown(), pictures), encoding="utf-8")
     return files
 
 
-def mesh_errors(runs: Runs) -> dict[str, float]:
-    """By run: the largest difference of P between the two meshes over all steps from 0.2 dR on, over P."""
-    errors = {}
-    for joint in JOINTS:
-        for plane in PLANES:
-            fine, coarse = (runs.curve(joint, plane, mesh) for mesh in ("fine", "coarse"))
-            late = fine.delta >= 0.2 * fine.dR
-            errors[f"{joint}, plane {plane}"] = float(np.abs(coarse.P / fine.P - 1)[late].max())
-    return errors
-
-
 def report(runs: Runs, claims: str, pictures: list[str]) -> str:
-    """The judged ``claims`` and the figures as Markdown."""
-    worst, error = max(mesh_errors(runs).items(), key=lambda item: item[1])
+    """The judged ``claims`` and the figures as Markdown, and how far the meshes differ."""
+    errors = {}
+    for joint, plane in product(JOINTS, PLANES):
+        fine, coarse = (runs.curve(joint, plane, mesh) for mesh in ("fine", "coarse"))
+        late = fine.delta >= 0.2 * fine.dR
+        errors[f"{joint}, plane {plane}"] = float(np.abs(coarse.P / fine.P - 1)[late].max())
+    worst, error = max(errors.items(), key=lambda item: item[1])
     shown = "\n".join(f"![{name}]({name})\n" for name in pictures)
     return f"""# The claims of Hu et al., judged
 

@@ -15,10 +15,10 @@ from mpi4py import MPI
 
 from archord.benchmarks.case import Case, E, paper_joint, side_by_side
 from archord.materials.material import Plane
-from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.run import Run
+from archord.scene.errors import InputError
 
 PLANES: tuple[Plane, ...] = ("strain", "stress")
 MESHES = {"coarse": 0.04, "fine": 0.02}  # element size on the arcs over R
@@ -66,30 +66,27 @@ class Runs:
 
     folder: Path
 
+    def run(self, joint: str, plane: Plane, mesh: str = "fine") -> Run:
+        """One of them."""
+        return Run(case(joint, plane, mesh).folder(self.folder))
+
     def curve(self, joint: str, plane: Plane, mesh: str = "fine") -> RunCurve:
-        """The curves of a run."""
-        return Run(case(joint, plane, mesh).folder(self.folder)).curve
+        """Its curves."""
+        return self.run(joint, plane, mesh).curve
 
 
 def solve_missing(wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[Case, float], None]) -> list[str]:
     """Solve the cases that are not done yet into ``folder``, each on one rank, the ranks side by side.
 
-    ``said(case, P)`` follows each on the rank that solved it. Returns the complaints of all that failed. Raises
-    `InputError`, before any is solved, if ``folder`` cannot take them. Collective.
+    ``said(case, P)`` follows each on the rank that solved it. Returns the complaints of all that failed. Collective.
     """
-
-    def claimed() -> list[int]:
-        missing = [number for number, one in enumerate(wanted) if not one.is_done(folder)]
-        for number in missing:
-            claim_folder(wanted[number].folder(folder), force=True)
-        return missing
 
     def complaint(number: int) -> str:
         try:
-            steps = wanted[number].solve(folder).steps
-        except RuntimeError as error:
-            return str(error)
-        said(wanted[number], steps[-1].P)
+            said(wanted[number], wanted[number].solve(folder).steps[-1].P)
+        except (RuntimeError, InputError) as error:
+            return str(error).rstrip(".")
         return ""
 
-    return [text for text in side_by_side(comm, agreed(comm, claimed), complaint) if text]
+    missing = agreed(comm, lambda: [number for number, case in enumerate(wanted) if not case.is_done(folder)])
+    return [text for text in side_by_side(comm, missing, complaint) if text]

@@ -18,10 +18,8 @@ _PROBE_LIMIT = 120.0  # seconds; the first import from a cold disk is slow
 
 @dataclass(frozen=True)
 class Peer:
-    """A code beside archord: ``series`` has (element size over R, order) from coarse to fine for each case.
-
-    ``time_limit`` is what one run may take, in seconds; ``python`` the interpreter that has the code.
-    """
+    """A code beside archord, and the interpreter ``python`` that has it. ``series`` has (element size over R, order)
+    from coarse to fine for each case; one run may take ``time_limit`` seconds."""
 
     label: str
     script: Path

@@ -15,8 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.benchmarks.case import Case, Expected, matches, quantities, side_by_side
-from archord.benchmarks.stability.cases import FINE, cases
-from archord.benchmarks.stability.fine import Values, read_fine
+from archord.benchmarks.stability.cases import FINE, Values, cases, read_fine
 from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.run import Outcome
@@ -179,8 +178,7 @@ def _energy_limit(scene: Scene, steps: list[Measures]) -> float:
     press_fit = scene.joint.dR < 0
     if press_fit and len(steps) == 1:
         return math.inf
-    begin = [] if press_fit else [0.0]
-    P, delta = np.array(begin + [m.P for m in steps]), np.array(begin + [m.delta for m in steps])
+    P, delta = np.array([[0.0, 0.0]] * (not press_fit) + [[m.P, m.delta] for m in steps]).T
     largest = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
     return float(np.abs(np.diff(P) * np.diff(delta)).sum() / 2 / largest) if largest else 0.0
 

@@ -8,8 +8,7 @@ from dataclasses import replace
 import h5py
 
 from archord.benchmarks.case import Expected, slug
-from archord.benchmarks.stability.cases import FINE, cases
-from archord.benchmarks.stability.fine import fine_scene, read_fine
+from archord.benchmarks.stability.cases import FINE, cases, fine_scene, read_fine
 from archord.benchmarks.stability.run import Check, Result, chosen, judge, not_finite, solve_case, with_references
 from archord.cli import run
 
