@@ -42,8 +42,7 @@ class Case:
     """A scene by name, in a ``group`` of its benchmark, and how its run must end.
 
     With ``stops``, a part of the sentence that the run must end with (exit code 3); with ``warns``, a part of one of
-    its warnings. At most ``budget`` Newton iterations, failed attempts included, and ``seconds`` of wall time, where
-    the benchmark limits them.
+    its warnings. At most ``budget`` Newton iterations, failed attempts included, where the benchmark limits them.
     """
 
     name: str
@@ -53,7 +52,6 @@ class Case:
     stops: str = ""
     warns: str = ""
     budget: int = 300
-    seconds: float = 90.0
 
     def folder(self, parent: Path) -> Path:
         """The case's run folder below ``parent``."""
