@@ -62,7 +62,7 @@ def draw(lines: list[Line], file: Path) -> Path:
     """Draw the heat map: a row per case, and in it each check's error over what is allowed."""
     panels = np.array_split(np.arange(len(lines)), 1 + len(lines) // _PANEL)
     figure = new_figure(4.5 * len(panels), 1.2 + 0.17 * len(panels[0]))
-    # green: a millionth of what is allowed; yellow: all of it
+    # green: a millionth of what is allowed; orange: all of it
     colours = colormaps["RdYlGn_r"].with_extremes(over="firebrick", bad="white")
     for ax, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
         some = [lines[i] for i in panel]
