@@ -13,21 +13,16 @@ from archord.postprocess.run import Run
 _QUADRATIC_TRIANGLE = 22  # VTK's number
 
 
-@pytest.fixture(scope="module")
-def exported(runs, tmp_path_factory):
-    """The run that yields as VTK files."""
-    folder = tmp_path_factory.mktemp("vtk")
-    return folder, export_vtk(Run(runs["plastic"]), folder)
-
-
-def test_vtk_reads_back_the_fields(runs, exported):
-    """pyvista finds every step at its delta: the nodes, the curved triangles, displacement, stress and PEEQ of
-    fields.h5."""
-    run, reader = Run(runs["plastic"]), pyvista.get_reader(str(exported[0] / "run.pvd"))
+def test_vtk_reads_back_fields_and_contact(runs, tmp_path):
+    """pyvista finds every step at its delta: nodes, curved triangles, displacement, stress and PEEQ of fields.h5; and
+    lines along both arcs, which warped by their displacement are where contact.h5 has them."""
+    run = Run(runs["plastic"])
+    export_vtk(run, tmp_path)
+    reader = pyvista.get_reader(str(tmp_path / "run.pvd"))
     np.testing.assert_allclose(reader.time_values, run.columns["delta"], rtol=1e-15)
     for step in (1, run.steps):
         reader.set_active_time_value(reader.time_values[step - 1])
-        mesh, fields = reader.read()[0], run.fields(step)
+        (mesh, arcs), fields = reader.read(), run.fields(step)
         assert set(mesh.celltypes) == {_QUADRATIC_TRIANGLE}
         np.testing.assert_array_equal(mesh.cells.reshape(-1, 7)[:, 1:], fields.cells)
         np.testing.assert_array_equal(mesh.points[:, :2], fields.coordinates)
@@ -39,20 +34,12 @@ def test_vtk_reads_back_the_fields(runs, exported):
     # the curved quarters: the area of the pin is that of a quarter circle, which straight triangles miss by 1.7e-3
     pin = mesh.threshold([1, 1], scalars="body").triangulate().compute_cell_sizes()["Area"].sum()
     assert pin == pytest.approx(np.pi / 4, rel=6e-4)
-
-
-def test_vtk_has_the_contact_as_another_piece(runs, exported):
-    """Lines along both arcs; warped by their displacement they are where contact.h5 has them."""
-    run, reader = Run(runs["plastic"]), pyvista.get_reader(str(exported[0] / "run.pvd"))
-    reader.set_active_time_value(reader.time_values[-1])
-    arcs, contact = reader.read()[1], run.contact()
-    for number, side in enumerate(("pin", "hole"), 1):
+    for number, arc in enumerate(run.contact().values(), 1):
         chosen = arcs["side"] == number
         deformed = (arcs.points + arcs["displacement"])[chosen, :2]
-        np.testing.assert_allclose(deformed, contact[side].coordinates.reshape(-1, 2), atol=1e-14)
-        np.testing.assert_array_equal(arcs["pressure"][chosen], contact[side].pressure.ravel())
-    n, q = contact["pin"].angle.shape
-    assert arcs.n_cells == (q - 1) * (n + len(contact["hole"].angle))
+        np.testing.assert_allclose(deformed, arc.coordinates.reshape(-1, 2), atol=1e-14)
+        np.testing.assert_array_equal(arcs["pressure"][chosen], arc.pressure.ravel())
+    assert arcs.n_cells == sum(arc.angle[:, 1:].size for arc in run.contact().values())
 
 
 def test_csv_reads_back_the_tables(runs, tmp_path):

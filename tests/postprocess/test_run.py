@@ -1,14 +1,17 @@
-"""A run from Python is what its files hold."""
+"""A run from Python is what its files hold; gaps are drawn as many times as wide as displacements are."""
 
 import csv
 import shutil
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 import archord
+from archord.benchmarks.case import paper_joint
 from archord.postprocess.chord import read_chord_pressure
-from archord.postprocess.fields import BODIES
+from archord.postprocess.fields import BODIES, magnification, magnified, nominal, rigid_arc
 
 
 def test_the_history_is_history_csv(runs):
@@ -16,14 +19,12 @@ def test_the_history_is_history_csv(runs):
     run = archord.load(runs["plastic"])
     with (runs["plastic"] / "history.csv").open(newline="") as file:
         headings, *rows = csv.reader(file)
-    names = [heading.split(" [")[0] for heading in headings]
+    names, units = [heading.split(" [")[0] for heading in headings], run.history.attrs["units"]
     assert list(run.history) == names
     np.testing.assert_array_equal(run.history.to_numpy(), np.array(rows, dtype=float))
     assert run.history["iterations"].dtype.kind == "i"
-    units = run.history.attrs["units"]
     assert [f"{name} [{units[name]}]" if name in units else name for name in names] == headings
-    assert run.status == "done"
-    assert run.steps == len(rows)
+    assert (run.status, run.steps) == ("done", len(rows))
     assert run.summary["totals"]["newton_iterations"] == run.history["iterations"].sum()
 
 
@@ -31,14 +32,12 @@ def test_the_history_is_history_csv(runs):
 def test_the_fields_are_those_of_the_scene(runs, name):
     """The axis stays, the pin's top goes down by delta, the block's top is held; PEEQ only where a body can yield."""
     run = archord.load(runs[name])
-    fields, R = run.fields(3), run.scene.joint.radius
-    x, u = fields.coordinates, fields.displacement
+    fields = run.fields(3)
+    (x, y), (ux, uy), pin = fields.coordinates.T, fields.displacement.T, fields.body_of_node == BODIES["pin"]
     assert fields.delta == pytest.approx(run.history["delta"][2], rel=1e-11)
-    assert np.abs(u[np.abs(x[:, 0]) < 1e-12 * R, 0]).max() < 1e-14 * R
-    pin = fields.body_of_node == BODIES["pin"]
-    top = pin & (np.abs(x[:, 1] + run.scene.joint.dR) < 1e-12 * R)
-    np.testing.assert_allclose(u[top, 1], -fields.delta, rtol=1e-12)
-    assert np.abs(u[~pin & (np.abs(x[:, 1]) < 1e-12 * R)]).max() == 0
+    assert np.abs(ux[np.abs(x) < 1e-12]).max() < 1e-14
+    np.testing.assert_allclose(uy[pin & (np.abs(y + run.scene.joint.dR) < 1e-12)], -fields.delta, rtol=1e-12)
+    assert np.abs(fields.displacement[~pin & (np.abs(y) < 1e-12)]).max() == 0
     assert (fields.peeq is not None) == run.scene.plastic
     assert set(fields.cell_fields()) >= {"von_mises", "mean_stress", "contact_pressure"}
 
@@ -46,39 +45,32 @@ def test_the_fields_are_those_of_the_scene(runs, name):
 def test_the_contact_lies_on_the_deformed_outline(runs):
     """Undeformed points of the table, displaced, are on the boundary of the deformed mesh, as curved as that."""
     run = archord.load(runs["elastic"])
-    fields = run.fields()
+    fields, R = run.fields(), run.scene.joint.radius
     t = np.linspace(0, 1, 41)
     shape = np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
     outline = (shape @ fields.deformed[fields.outline()]).reshape(-1, 2)
     outline = outline[np.hypot(*outline.T) < 2]
-    for side in ("pin", "hole"):
+    for side, depth in (("pin", run.scene.joint.dR), ("hole", 0.0)):
         table = run.pressure(side=side)
-        points = table[["x", "y"]].to_numpy() + table[["ux", "uy"]].to_numpy()
-        distance = np.linalg.norm(points[:, None] - outline, axis=2).min(axis=1)
-        assert distance.max() < 0.1 / 40  # half a sample of the outline
-        centre = [0.0, -run.scene.joint.dR if side == "pin" else 0.0]
-        radius = np.hypot(*(table[["x", "y"]].to_numpy() - centre).T)
-        np.testing.assert_allclose(radius, run.contact()[side].radius, rtol=1e-12)
+        deformed = table[["x", "y"]].to_numpy() + table[["ux", "uy"]].to_numpy()
+        assert np.linalg.norm(deformed[:, None] - outline, axis=2).min(axis=1).max() < 0.1 / 40  # half a sample of it
+        np.testing.assert_allclose(np.hypot(table["x"], table["y"] + depth), run.contact()[side].radius, rtol=1e-12)
     normal = np.stack([np.sin(table["angle"]), -np.cos(table["angle"])], axis=1)
     touching = (table["raw_pressure"] > 0).to_numpy()
-    hole = table[["x", "y"]].to_numpy() + table[["ux", "uy"]].to_numpy()
-    assert (hole[touching] * normal[touching]).sum(axis=1).min() > run.scene.joint.radius  # pushed outward
+    assert (deformed * normal).sum(axis=1)[touching].min() > R  # the hole is pushed outward
 
 
-@pytest.mark.parametrize(
-    ("ask", "said"),
-    [
-        (lambda run: run.fields(0), r"has no step 0; its accepted steps are 1 to 6\."),
-        (lambda run: run.pressure(7), r"has no step 7; its accepted steps are 1 to 6\."),
-        (lambda run: run.pressure(1, "block"), r"has no side 'block'; its sides are pin, hole\."),
-        (lambda run: read_chord_pressure(run.folder, 7), r"has no step 7; its accepted steps are 1 to 6\."),
-        (lambda run: read_chord_pressure(run.folder, 1, "block"), r"has no side 'block'; its sides are pin, hole\."),
-    ],
-)
-def test_what_a_run_does_not_have(runs, ask, said):
+def test_what_a_run_does_not_have(runs):
     """A sentence."""
-    with pytest.raises(archord.InputError, match=said):
-        ask(archord.load(runs["elastic"]))
+    run = archord.load(runs["elastic"])
+    asked = [(run.fields, 0), (run.pressure, 7), (partial(read_chord_pressure, run.folder), 7)]
+    asked += [(run.pressure, 1, "block"), (partial(read_chord_pressure, run.folder), 1, "block")]
+    for ask, *arguments in asked:
+        said = (
+            "side 'block'; its sides are pin, hole" if arguments[1:] else f"step {arguments[0]}; its accepted steps are"
+        )
+        with pytest.raises(archord.InputError, match=f"has no {said}"):
+            ask(*arguments)
 
 
 def test_a_step_that_the_fields_do_not_hold_yet(runs, tmp_path):
@@ -91,3 +83,44 @@ def test_a_step_that_the_fields_do_not_hold_yet(runs, tmp_path):
         run.fields()
     with pytest.raises(archord.InputError, match=r"contact\.h5: cannot be read as the contact of a run\."):
         run.pressure()
+
+
+@pytest.mark.parametrize("factor", [1.0, 5.0, 20.0])
+def test_the_clearance_grows_by_the_factor(runs, factor):
+    """Before loading the pin keeps its circle, touches at the bottom, and the hole's radius is R + factor dR. Factor 1
+    is the deformed mesh itself."""
+    run = archord.load(runs["elastic"])
+    fields, (R, dR) = run.fields(), (run.scene.joint.radius, run.scene.joint.dR)
+    x = magnified(run.scene, fields, factor, displaced=False)
+    if factor == 1:
+        np.testing.assert_allclose(x, fields.coordinates, atol=1e-14)
+        np.testing.assert_allclose(magnified(run.scene, fields, 1.0), fields.deformed, atol=1e-14)
+    down, pin = np.array([0.0, -dR]), fields.body_of_node == BODIES["pin"]
+    hole = ~pin & (np.abs(np.hypot(*fields.coordinates.T) - R - dR) < 1e-9)
+    arc = pin & (np.abs(np.hypot(*(fields.coordinates - down).T) - R) < 1e-9)
+    np.testing.assert_allclose(np.hypot(*x[hole].T), R + factor * dR, rtol=1e-12)
+    np.testing.assert_allclose(np.hypot(*(x[arc] - factor * down).T), R, rtol=1e-12)
+    assert x[arc, 1].min() == pytest.approx(x[hole, 1].min(), rel=1e-12)
+    np.testing.assert_allclose(np.hypot(*nominal(run.scene, fields)[arc | hole].T), R, rtol=1e-12)
+
+
+@pytest.mark.parametrize("clearance", [1e-5, 1e-3, 0.05, 0.4])
+def test_the_factor_shows_the_clearance_and_no_more(runs, clearance):
+    """1 or more, never so large that clearance or displacement exceed a fifth of the radius as drawn."""
+    scene = paper_joint(0.2, 1, joint={"clearance": clearance}, load={"displacement": 0.2 if clearance > 0.1 else 2.0})
+    fields = archord.load(runs["elastic"]).fields()
+    times = clearance / 0.005
+    scaled = replace(fields, displacement=times * fields.displacement, delta=times * fields.delta)
+    factor = magnification(scene, scaled)
+    assert factor >= 1
+    if factor > 1:
+        assert factor * clearance <= 0.1 * (1 + 1e-9)
+        assert factor * np.abs(scaled.displacement).max() <= 0.2
+        assert factor * clearance > 0.02
+
+
+def test_a_rigid_pin_is_a_circle_that_goes_down():
+    """By the factor times clearance and delta."""
+    scene = paper_joint(0.2, 1, pin={"rigid": True})
+    arc = rigid_arc(scene, 0.01, 10.0)
+    np.testing.assert_allclose(np.hypot(arc[:, 0], arc[:, 1] + 10 * (0.01 + 0.005)), 1.0, rtol=1e-14)
