@@ -52,7 +52,6 @@ def test_a_scene_from_python_is_that_of_the_file():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"joint": {"radius": -1.0, "clearance": 0.1}}, "scene: joint.radius = -1.0 must be greater than 0."),
         ({"joint": 3}, "scene: joint = 3 must be a section, [joint]."),
         ({"blok": {}}, "scene: blok is not a known key; did you mean block? Sections are "),
         ({"block": None}, "scene: block is missing."),

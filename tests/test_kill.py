@@ -50,23 +50,19 @@ def test_a_run_survives_any_number_of_kills(tmp_path, request):
     assert whole.end() == 0
     seconds = time.monotonic() - whole.begun
     assert accepted_steps(tmp_path / "whole") == whole.printed == 15
-    number = killed = finished = steps = 0
-    name, arguments = "run0", [SCENE, *OPTIONS, "-o", "run0"]
-    caught_at = []
-    while killed < kills or steps:
-        run = Run(tmp_path, *arguments)
-        code = run.end(chance.uniform(0, 0.7 * seconds) if killed < kills else None)
-        before, steps = steps, accepted_steps(tmp_path / name) if (tmp_path / name).exists() else 0
+    finished = steps = 0
+    caught_at: list[int] = []
+    while len(caught_at) < kills or steps:
+        folder = tmp_path / f"run{finished}"
+        run = Run(tmp_path, SCENE, *OPTIONS, "-o", folder.name, *(["--restart"] if folder.exists() else []))
+        code = run.end(chance.uniform(0, 0.7 * seconds) if len(caught_at) < kills else None)
+        before, steps = steps, accepted_steps(folder) if folder.exists() else 0
         assert steps >= max(before, run.printed)
-        if code == 0:
-            assert steps == 15
-            same_run(tmp_path / "whole", tmp_path / name, 1e-12)
-            finished, number, steps = finished + 1, number + 1, 0
-            name = f"run{number}"
-            arguments = [SCENE, *OPTIONS, "-o", name]
-        else:
-            killed += 1
+        if code != 0:
             caught_at.append(steps)
-            arguments = [SCENE, *OPTIONS, "-o", name, "--restart"]
+            continue
+        assert steps == 15
+        same_run(tmp_path / "whole", folder, 1e-12)
+        finished, steps = finished + 1, 0
     assert finished > 0
     assert len(set(caught_at)) > min(kills, 10) / 3  # at steps all over the path, on a busy machine at fewer of them

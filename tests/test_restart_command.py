@@ -72,31 +72,19 @@ REFUSED = [
 ]
 
 
-@pytest.fixture
-def untouched(tmp_path, whole):
-    """The run seen from the test's folder; in the end nothing of either has changed."""
+def test_what_cannot_be_continued_is_refused_once(tmp_path, whole):
+    """All of these under one launcher: exit code 2 of each on every rank, each sentence told once, nothing changed."""
     (tmp_path / "run").symlink_to(whole)
     before = {path.name: path.stat().st_mtime_ns for path in whole.iterdir()}
-    yield tmp_path
-    assert {path.name: path.stat().st_mtime_ns for path in whole.iterdir()} == before
-    assert os.listdir(tmp_path) == ["run"]
-
-
-@pytest.mark.parametrize(("arguments", "said"), REFUSED)
-def test_what_cannot_be_continued_is_refused(untouched, arguments, said):
-    """Exit code 2, one sentence, nothing changed."""
-    assert archord("solve", *arguments, cwd=untouched, code=2).stderr.count(said) == 1
-
-
-def test_two_ranks_refuse_once(untouched):
-    """All of these under one launcher: exit code 2 of each on every rank, each sentence told by one of them."""
     lists = [["solve", *arguments] for arguments, _ in REFUSED]
     code = f"import sys; from archord.cli import run; sys.exit(2 if {{*map(run, {lists})}} == {{2}} else 1)"
     command = ["mpirun", "-n", "2", sys.executable, "-c", code]
-    result = subprocess.run(command, cwd=untouched, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    result = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
     assert result.returncode == 2
     assert [result.stderr.count(said) for _, said in REFUSED] == [1] * len(REFUSED)
     assert "Traceback" not in result.stderr
+    assert {path.name: path.stat().st_mtime_ns for path in whole.iterdir()} == before
+    assert os.listdir(tmp_path) == ["run"]
 
 
 def test_a_finished_run_is_extended(tmp_path):

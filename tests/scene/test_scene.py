@@ -115,11 +115,8 @@ def test_overrides_replace_values_and_alternatives(tmp_path):
 
 def test_the_resolved_scene_is_the_same_scene():
     """What a run folder keeps solves to the same numbers."""
-    for change in (
-        {},
-        {"pin": {"rigid": True}},
-        {"block": {"E": 1.0, "nu": 0.2, "yield_stress": 0.01, "hardening": 0.1}},
-    ):
+    plastic = {"E": 1.0, "nu": 0.2, "yield_stress": 0.01, "hardening": 0.1}
+    for change in ({}, {"pin": {"rigid": True}}, {"block": plastic}):
         a = parse_scene(basic() | change)
         b = parse_scene(tomllib.loads(resolved(a)))
         assert tomllib.loads(resolved(a))["format"] == 1
@@ -133,11 +130,8 @@ def test_the_example_shows_every_key_and_loads():
     text = example()
     parse_scene(tomllib.loads(text))
     for section, info in Scene.model_fields.items():
-        if section == "format":
-            assert "\nformat = 1 " in text
-            continue
-        assert f"[{section}]" in text
-        for key, field in info.annotation.model_fields.items():
+        assert f"\n[{section}]" in text or f"\n{section} = 1" in text
+        for key, field in getattr(info.annotation, "model_fields", {}).items():
             assert f"{key} = " in text
             assert field.description in text
 
@@ -165,19 +159,15 @@ def test_a_mesh_of_too_many_triangles_is_refused():
     assert parse_scene(data).joint.expected_cells < 1e6
 
 
-@pytest.mark.parametrize("value", [2, 10**30])
-def test_a_scene_of_a_newer_format_is_refused_for_that_alone(value):
-    """Whatever else it holds, which may mean something there."""
+@pytest.mark.parametrize("value", [2, 10**30, "1", 0, -1, [1]])
+def test_a_scene_of_another_format_is_refused(value):
+    """A newer one for that alone, whatever else it holds, which may mean something there."""
+    newer = isinstance(value, int) and value > 1
+    said = f"scene: format = {value} is for a newer archord; this one reads format 1." if newer else "must be 1."
     with pytest.raises(InputError) as caught:
-        parse_scene(basic() | {"format": value, "friction": {"mu": 0.1}})
-    assert str(caught.value) == f"scene: format = {value} is for a newer archord; this one reads format 1."
-
-
-@pytest.mark.parametrize("value", ["1", 0, -1, [1], {"a": 1}])
-def test_a_format_that_is_no_version_is_refused(value):
-    """A version is a whole number from 1."""
-    with pytest.raises(InputError, match=r"^scene: format( = .*)? must be 1\.$"):
-        parse_scene(basic() | {"format": value})
+        parse_scene(basic() | {"format": value} | ({"friction": {"mu": 0.1}} if newer else {}))
+    assert str(caught.value).endswith(said)
+    assert str(caught.value).startswith("scene: format = ")
 
 
 def test_a_byte_order_mark_and_carriage_returns_change_nothing(tmp_path):
