@@ -55,7 +55,7 @@ def compare_runs(runs: list[Run]) -> Comparison:
     delta = curves[0].delta
     margin = _SAME * np.abs(delta).max()
     step_by_step = all(len(c.delta) == len(delta) and np.allclose(c.delta, delta, rtol=0, atol=margin) for c in curves)
-    between = np.zeros((len(runs), len(delta)), dtype=bool)
+    between: np.ndarray = np.zeros((len(runs), len(delta)), dtype=bool)
     if not step_by_step:
         curves = [curve.first_loading() for curve in curves]
         low, high = max(c.delta[0] for c in curves), min(c.delta[-1] for c in curves)

@@ -136,7 +136,7 @@ def _mesh_lines(scene: Scene, mesh: PlaneMesh, thick: float) -> Iterator[str]:
     yield "*HEADING"
     yield f"archord: half a pin joint; {units.length}, {units.stress}; thickness {_number(thick)}"
     yield "*NODE, NSET=ALL_NODES"
-    yield from (f"{i}, {_number(x)}, {_number(y)}" for i, (x, y) in enumerate(mesh.x, 1))
+    yield from (f"{i}, {_number(x)}, {_number(y)}" for i, (x, y) in enumerate(zip(*mesh.x.T, strict=True), 1))
     name = ("CPE" if scene.analysis.plane == "strain" else "CPS") + str(mesh.elements.shape[1])
     for body in Cells:
         yield f"*ELEMENT, TYPE={name}, ELSET={body.name}"

@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -91,6 +92,7 @@ def read_fields(folder: str | Path, scene: Scene, step: int) -> Fields:
             if int(file["accepted"][()]) < step:
                 raise KeyError(step)
             mesh = file["mesh"]
+            means: dict[str, Any] = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
             return Fields(
                 step,
                 float(file["load"][step - 1]),
@@ -98,7 +100,7 @@ def read_fields(folder: str | Path, scene: Scene, step: int) -> Fields:
                 mesh["cells"][()],
                 mesh["body"][()],
                 file[f"displacement/{at}"][:, :2],
-                *(file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS),
+                **means,
             )
     except (OSError, KeyError, RuntimeError, TypeError, ValueError, IndexError):
         raise InputError(f"{path}: cannot be read as the fields of a run at step {step}.") from None

@@ -145,7 +145,7 @@ def _differences(comparison: Comparison, quantity: str, names: list[str]) -> Tab
         first, *values = (
             f"{mark}{v:.6g}" for mark, v in zip(marks[:, k], comparison.values[quantity][:, k], strict=True)
         )
-        pairs = zip(values, map(_percent, relative[1:, k]), strict=True)
+        pairs = zip(values, (_percent(float(part)) for part in relative[1:, k]), strict=True)
         table.add(f"{load:.6g}", first, *(cell for pair in pairs for cell in pair))
     largest = np.abs(np.nan_to_num(relative[1:])).max(axis=1)
     table.add("", "largest difference", *(cell for size in largest for cell in ("", _percent(size))))
