@@ -22,10 +22,10 @@ from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
 from archord.output.stale_jit import without_stale_forms
 from archord.output.step_file import StepFile
-from archord.presets.arc import ArcProfile
+from archord.presets.arc import ArcProfile, arc_profiles
 from archord.presets.joint import Joint
 from archord.presets.joint_report import APART, UNSEEN, step_warnings
-from archord.presets.measures import Measures, Work, arc_profiles, measure
+from archord.presets.measures import Measures, Work, measure
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
 from archord.solver.coarse_start import coarse_start
@@ -163,8 +163,7 @@ class _Output:
         with joint.timer("output"):
             profiles = arc_profiles(joint)
             seconds, self._last = perf_counter() - self._last, perf_counter()
-            largest = max((abs(m.P) for m in self.steps), default=0.0)
-            m = measure(joint, len(self.steps) + 1, step, profiles, work, seconds, largest)
+            m = measure(joint, self.steps, step, profiles.values(), work, seconds)
         with joint.timer("checkpoint"):
             checkpoint = halt(self._order, self._scene, RunState(m, step, position, work))
             self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))

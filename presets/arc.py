@@ -14,8 +14,7 @@ import numpy as np
 from archord.materials.material import Array
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
-    from archord.solver.contact.contact import Contact
-    from archord.solver.contact.surface import Surface
+    from archord.presets.joint import Joint
 
 SYMMETRY = 2.0  # the half that is modelled makes up a joint so many times
 _PEAK_FRACTION = 0.25  # part of the contact angle over which the parabola of the peak is fitted
@@ -38,6 +37,11 @@ class ArcProfile:
     gap: Array  # (n, q) positive when open
 
     @property
+    def width(self) -> Array:
+        """Length ``(n,)`` of each facet."""
+        return self.weight.sum(axis=1)
+
+    @property
     def facet_force(self) -> Array:
         """Integral of the pressure over each facet ``(n,)``."""
         return (self.weight * self.raw_pressure).sum(axis=1)
@@ -50,38 +54,34 @@ class ArcProfile:
     @property
     def in_contact(self) -> Array:
         """Share ``(n,)`` of each facet that carries pressure."""
-        return (self.weight * (self.raw_pressure > 0)).sum(axis=1) / self.weight.sum(axis=1)
-
-    @property
-    def resultant(self) -> float:
-        """Vertical force of both halves, the sum of ``weight pressure cos(angle)`` on the undeformed arc."""
-        return SYMMETRY * float((self.weight * self.pressure * np.cos(self.angle)).sum())
+        return (self.weight * (self.raw_pressure > 0)).sum(axis=1) / self.width
 
     def facet_means(self) -> tuple[Array, Array]:
         """Angle ``(n,)`` and pressure ``(n,)`` of the facets: their means, which do not scatter where it yields."""
-        total = self.weight.sum(axis=1)
-        return (self.weight * self.angle).sum(axis=1) / total, (self.weight * self.pressure).sum(axis=1) / total
+        angle, pressure = ((self.weight * v).sum(axis=1) / self.width for v in (self.angle, self.pressure))
+        return angle, pressure
 
 
-def arc_profile(contact: Contact, side: Surface, radius: float, axis_point: Array, u: Array) -> ArcProfile | None:
-    """State of ``side`` at the displacement ``u`` ``(n, 2)``, last evaluated; None if its edge is not integrated.
-
-    ``axis_point`` is the end of the arc on the contact axis. Collective.
-    """
-    pair = contact.pair_of(side)
-    if pair is None:
-        return None
-    n, q = side.n_facets, side.weight.shape[1]
-    local = np.zeros((n, q, 5))
-    displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
-    at_points = (side.weight, displaced[..., 0], displaced[..., 1], pair.pressure, pair.distance)
-    local[side.facet] = np.stack(at_points, axis=-1)
-    whole = side.sum_over_ranks(local)
-    s = side.arc_position(axis_point)
-    order, along = np.argsort(s[:, 0]), slice(None, None, -1 if s[0, 0] > s[0, -1] else 1)
-    whole, s = whole[order, along], s[order, along]
-    weight, raw = whole[..., 0], whole[..., 3]
-    return ArcProfile(radius, s, weight, whole[..., 1:3], project(raw, s, weight), raw, whole[..., 4])
+def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
+    """Contact state along the integrated arcs, by side, at the last evaluation. Collective."""
+    g, u = joint.scene.joint, joint.equilibrium.displacement()
+    radius = {"pin": g.radius, "hole": g.radius + g.dR}
+    found = {}
+    for name, side in joint.sides.items():
+        pair = joint.contact.pair_of(side)
+        if pair is None:  # its edge is not integrated
+            continue
+        displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
+        local = np.zeros((side.n_facets, side.weight.shape[1], 5))
+        at_points = (side.weight, displaced[..., 0], displaced[..., 1], pair.pressure, pair.distance)
+        local[side.facet] = np.stack(at_points, axis=-1)
+        whole, s = side.sum_over_ranks(local), side.arc_position(np.array([0.0, -radius["hole"]]))
+        order, along = np.argsort(s[:, 0]), slice(None, None, -1 if s[0, 0] > s[0, -1] else 1)
+        whole, s = whole[order, along], s[order, along]
+        weight, raw = whole[..., 0], whole[..., 3]
+        pressure = project(raw, s, weight)
+        found[name] = ArcProfile(radius[name], s, weight, whole[..., 1:3], pressure, raw, whole[..., 4])
+    return found
 
 
 def project(pressure: Array, s: Array, weight: Array) -> Array:
@@ -103,13 +103,11 @@ def semi_angle(profile: ArcProfile) -> float:
     last = int(np.flatnonzero(force > 0).max(initial=-1))
     if last < 0:
         return 0.0
-    width = profile.weight.sum(axis=1) / profile.radius
-    start = np.concatenate([[0.0], np.cumsum(width)])
-    count = min(_EDGE_FACETS, last + 1)
-    if count < 3:
-        return float((profile.weight * (profile.raw_pressure > 0)).sum() / profile.radius)
-    beyond = np.cumsum(force[::-1])[::-1][last + 1 - count : last + 1] ** (2 / 3)
-    angle = start[last + 1 - count : last + 1]
+    if last < 2:
+        return float((profile.in_contact * profile.width).sum() / profile.radius)
+    start = np.concatenate([[0.0], np.cumsum(profile.width)]) / profile.radius
+    at_edge = slice(max(0, last + 1 - _EDGE_FACETS), last + 1)
+    beyond, angle = np.cumsum(force[::-1])[::-1][at_edge] ** (2 / 3), start[at_edge]
     slope, value = np.polyfit(angle - angle[-1], beyond, 1)
     edge = angle[-1] - value / slope
     return float(np.clip(edge, angle[-1], start[-1]))
@@ -117,16 +115,13 @@ def semi_angle(profile: ArcProfile) -> float:
 
 def peak_pressure(profiles: list[ArcProfile], eps: float) -> float:
     """Pressure ``p0`` on the contact axis: an even parabola through the facet means of all sides near it."""
-    rows, means, weights = [], [], []
+    near = []
     for p in profiles:
-        width = p.weight.sum(axis=1)
-        near = np.cumsum(width) <= max(_PEAK_FRACTION * eps * p.radius, 3.001 * width[0])
-        near &= p.in_contact == 1
-        near[0] = True
-        square = (p.weight * p.angle**2).sum(axis=1) / width
-        rows.append(np.stack([np.ones(near.sum()), square[near]], axis=1))
-        means.append(p.facet_force[near] / width[near])
-        weights.append(width[near])
-    A, b, w = np.concatenate(rows), np.concatenate(means), np.sqrt(np.concatenate(weights))
-    columns = 2 if len(b) > len(profiles) else 1
-    return float(np.linalg.lstsq(A[:, :columns] * w[:, None], b * w, rcond=None)[0][0])
+        chosen = np.cumsum(p.width) <= max(_PEAK_FRACTION * eps * p.radius, 3.001 * p.width[0])
+        chosen &= p.in_contact == 1
+        chosen[0] = True
+        square = (p.weight * p.angle**2).sum(axis=1) / p.width
+        near.append(np.stack([np.sqrt(p.width), square, p.facet_force / p.width])[:, chosen])
+    w, square, mean = np.concatenate(near, axis=1)
+    A = np.stack([w, w * square], axis=1)[:, : 2 if len(w) > len(profiles) else 1]
+    return float(np.linalg.lstsq(A, w * mean, rcond=None)[0][0])

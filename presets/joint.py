@@ -10,7 +10,6 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.geometry.curve import RigidCircle
 from archord.geometry.half_ring import half_ring
 from archord.geometry.joint_mesh import refinements
@@ -58,7 +57,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         return Guess(shift, {"pin": (0.0, -shift)})
 
     return Problem(
-        _mesh(scene, comm, partitioner, ring),
+        _mesh(scene, comm, partitioner),
         [Body(name, solid.material(analysis.plane)) for name, solid in scene.solids.items()],
         [contact],
         supports,
@@ -76,12 +75,12 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     )
 
 
-def _mesh(scene: Scene, comm: MPI.Comm, partitioner, ring: bool) -> TaggedMesh:
+def _mesh(scene: Scene, comm: MPI.Comm, partitioner) -> TaggedMesh:
     g = scene.joint
     sizes = g.radius, g.dR, g.W, g.h, g.growth
     options = {"size_ratio": g.size_ratio, "degree": scene.analysis.degree, "partitioner": partitioner}
     options["refinements"] = refinements(g.expected_cells)
-    if ring:
+    if g.is_ring:
         return half_ring(comm, *sizes, scene.load.core_radius * g.radius, **options)
     edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
     return quarter_joint(comm, *sizes, edge=edge, rigid_pin=scene.pin.rigid, **options)
@@ -113,15 +112,6 @@ class Joint(System):
     def delta(self) -> float:
         """Displacement of the pin from first touch: of its diameter, or in a ring the mean over the core."""
         return self.driven() - (max(self.scene.joint.dR, 0.0) if self.problem.loads else 0.0)
-
-    def core_peeq(self) -> float:
-        """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a block. Collective."""
-        if not self.problem.loads or self.scene.pin.yield_stress is None:
-            return 0.0
-        cells, points = self.bulk.histories()[self.problem.mesh.cell_tag("pin")]
-        x = cell_basis(self.V.mesh, self.bulk.degree, cells, bulk_quadrature(self.bulk.degree)[0]).point
-        core = np.linalg.norm(x, axis=-1).ravel() < self.scene.load.core_radius * self.scene.joint.radius
-        return self.comm.allreduce(float(np.asarray(points.peeq)[core].max(initial=0.0)), op=MPI.MAX)
 
     def forces(self) -> dict[str, float]:
         """Downward force of the whole joint at pin, contact and block's support, per unit thickness."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
+from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
 from archord.presets.measures import Measures
@@ -51,18 +53,28 @@ def rough_arcs(joint: Joint) -> list[str]:
     return [f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"]
 
 
+def core_peeq(joint: Joint) -> float:
+    """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a block. Collective."""
+    if not joint.problem.loads or joint.scene.pin.yield_stress is None:
+        return 0.0
+    cells, points = joint.bulk.histories()[joint.problem.mesh.cell_tag("pin")]
+    x = cell_basis(joint.V.mesh, joint.bulk.degree, cells, bulk_quadrature(joint.bulk.degree)[0]).point
+    core = np.linalg.norm(x, axis=-1).ravel() < joint.scene.load.core_radius * joint.scene.joint.radius
+    return joint.comm.allreduce(float(np.asarray(points.peeq)[core].max(initial=0.0)), op=MPI.MAX)
+
+
 def step_warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
     """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
-    said, core_peeq = [], joint.core_peeq()
+    said, squashed = [], core_peeq(joint)
     if joint.scene.joint.arc_end < np.pi and any(p.in_contact[-1] > 0 for p in profiles.values()):
         said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
     touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
     if m.contact_area and touching < _FEW_FACETS:
         facets = "facet" if touching == 1 else "facets"
         said.append(f"only {touching} {facets} in contact; a smaller element_size would resolve it")
-    if core_peeq > 0:
+    if squashed > 0:
         said.append(
-            f"the pin yields where the force is applied, with PEEQ up to {core_peeq:.1e} in its core, and delta, the "
+            f"the pin yields where the force is applied, with PEEQ up to {squashed:.1e} in its core, and delta, the "
             "mean displacement of the core, contains by how much it is squashed there; a larger load.core_radius would "
             "spread the force"
         )

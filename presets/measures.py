@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from archord.presets.arc import ArcProfile, arc_profile, peak_pressure, semi_angle
+from archord.presets.arc import ArcProfile, peak_pressure, semi_angle
 from archord.presets.joint import Joint
 from archord.solver.stepping import Step
 
@@ -55,39 +55,22 @@ class Work:
         self.delta, self.force = delta, force
 
 
-def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
-    """Contact state along the integrated arcs, by side, at the last evaluation. Collective."""
-    geometry = joint.scene.joint
-    hole = geometry.radius + geometry.dR
-    radius = {"pin": geometry.radius, "hole": hole}
-    lowest, u = np.array([0.0, -hole]), joint.equilibrium.displacement()
-    profiles = {name: arc_profile(joint.contact, side, radius[name], lowest, u) for name, side in joint.sides.items()}
-    return {name: p for name, p in profiles.items() if p is not None}
-
-
 def measure(
-    joint: Joint,
-    number: int,
-    step: Step,
-    profiles: dict[str, ArcProfile],
-    work: Work,
-    seconds: float,
-    largest_force: float = 0.0,
+    joint: Joint, before: Sequence[Measures], step: Step, arcs: Collection[ArcProfile], work: Work, seconds: float
 ) -> Measures:
-    """Sum up the last accepted state of ``joint``; ``largest_force`` is that of the steps before. Collective."""
-    arcs = list(profiles.values())
+    """Sum up the last accepted state of ``joint``, which follows the steps ``before``. Collective."""
     peeq, peeq_integral = joint.peeq()
     stored, dissipated = joint.energies()
-    forces = joint.forces()
+    forces, delta = joint.forces(), joint.delta()
     P = forces["pin"]
-    area = joint.problem.symmetry * float(np.mean([(p.weight * (p.raw_pressure > 0)).sum() for p in arcs]))
-    scale = max(abs(P), largest_force, 0.0 if area else joint.scene.E_star * abs(joint.delta()))
+    area = joint.problem.symmetry * float(np.mean([(p.in_contact * p.width).sum() for p in arcs]))
+    scale = max(abs(P), *(abs(m.P) for m in before), 0.0 if area else joint.scene.E_star * abs(delta))
     eps = float(np.mean([semi_angle(p) for p in arcs]))
     return Measures(
-        step=number,
-        delta=joint.delta(),
+        step=len(before) + 1,
+        delta=delta,
         P=P,
-        p0=peak_pressure(arcs, eps),
+        p0=peak_pressure(list(arcs), eps),
         eps=eps,
         contact_area=area,
         peeq_max=peeq,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from mpi4py import MPI
 
 from archord.benchmarks.case import E, paper_joint
-from archord.presets.arc import ArcProfile
+from archord.presets.arc import ArcProfile, arc_profiles
 from archord.presets.joint import Joint
-from archord.presets.measures import Measures, Work, arc_profiles, measure
+from archord.presets.measures import Measures, Work, measure
 from archord.scene.scene import Scene
 from archord.solver.coarse_start import coarse_start
 from archord.solver.stepping import march
@@ -36,8 +36,7 @@ def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Sol
     def target_done(step, position):
         profiles = arc_profiles(joint)
         solution.profiles.append(profiles)
-        largest = max((abs(m.P) for m in solution.steps), default=0.0)
-        solution.steps.append(measure(joint, len(solution.steps) + 1, step, profiles, work, 0.0, largest))
+        solution.steps.append(measure(joint, solution.steps, step, profiles.values(), work, 0.0))
 
     march(
         joint.load_path(coarse=coarse_start(joint)),
