@@ -32,17 +32,6 @@ _HEADER = 512  # HDF5 looks for its own beginning at powers of two from here
 
 
 @dataclass
-class RunState:
-    """Where a run is after an output step: the step, in numbers and in how it was reached, and what the next one starts
-    from."""
-
-    measures: Measures
-    step: Step
-    position: Position
-    work: Work
-
-
-@dataclass
 class Checkpoint:
     """What the file holds of a run after ``step`` output steps.
 
@@ -57,14 +46,14 @@ class Checkpoint:
     arrays: Arrays
 
 
-def halt(order: MeshOrder, scene: str, at: RunState) -> Checkpoint:
-    """The checkpoint (on rank 0) of a run of ``scene``, from which `resume` goes on. Collective."""
-    system, position = order.system, at.position
-    state, increment = system.equilibrium.state(), position.increment
+def halt(order: MeshOrder, scene: str, m: Measures, step: Step, position: Position, work: Work) -> Checkpoint:
+    """The checkpoint (on rank 0) of a run of ``scene`` after the step ``m``, reached as ``step`` says, from which
+    `resume` goes on. Collective."""
+    system, state, increment = order.system, order.system.equilibrium.state(), position.increment
     scalars = {
-        "measures": asdict(at.measures),
-        "step": asdict(at.step),
-        "work": asdict(at.work),
+        "measures": asdict(m),
+        "step": asdict(step),
+        "work": asdict(work),
         "position": {name: value for name, value in vars(position).items() if name != "increment"},
         "largest_reaction": system.equilibrium.largest_reaction,
         "gamma_by_and_by": system.solver.continues_gamma,
@@ -75,22 +64,20 @@ def halt(order: MeshOrder, scene: str, at: RunState) -> Checkpoint:
         scalars["level_increment"] = float(increment[-1])
         arrays["fields/increment"] = order.collect(increment[:-1].reshape(-1, 2))
     mesh = order.mesh_digest() if system.comm.rank == 0 else ""
-    return Checkpoint(at.measures.step, scene, mesh, scalars, arrays)
+    return Checkpoint(m.step, scene, mesh, scalars, arrays)
 
 
-def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> RunState:
-    """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``). Collective.
+def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple[Measures, Step, Position, Work]:
+    """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``); returns what `halt` was
+    given. Collective.
 
     Raises `InputError` on every rank if it is of another mesh.
     """
-    equilibrium = order.system.equilibrium
     known = checkpoint and (checkpoint.mesh == order.mesh_digest(), checkpoint.scalars)
     same_mesh, scalars = order.system.comm.bcast(known)
     if not same_mesh:
-        raise InputError(
-            f"{path}: belongs to another mesh than the scene makes here (another version of gmsh?), so that the run "
-            "cannot be continued."
-        )
+        said = "belongs to another mesh than the scene makes here (another version of gmsh?)"
+        raise InputError(f"{path}: {said}, so that the run cannot be continued.")
     order.spread_history(checkpoint.arrays if checkpoint else None)
 
     def state(name: str, level: str) -> Array:
@@ -100,10 +87,10 @@ def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> RunSt
     if "level_increment" in scalars:
         position.increment = state("fields/increment", "level_increment")
     order.system.solver.continues_gamma = scalars["gamma_by_and_by"]
-    equilibrium.resume(position.load, state("fields/displacement", "level"), scalars["largest_reaction"])
+    order.system.equilibrium.resume(position.load, state("fields/displacement", "level"), scalars["largest_reaction"])
     step = Step(**scalars["step"])
     step.attempts = [_newton(attempt) for attempt in scalars["step"]["attempts"]]
-    return RunState(Measures(**scalars["measures"]), step, position, Work(**scalars["work"]))
+    return Measures(**scalars["measures"]), step, position, Work(**scalars["work"])
 
 
 def _newton(attempt: dict[str, Any]) -> Newton:

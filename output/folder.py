@@ -15,13 +15,12 @@ from archord.scene.errors import InputError
 FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
 APART = "fields"  # the folder of the files that fields.h5 has links to
 CHECKPOINT = "checkpoint.h5"
-# drawn later, from a run's files
-PICTURES = ("picture.png", "force.png", "pressure.png", "field.png", "iterations.png")
+PICTURE = "picture.png"  # drawn later, from the others
 
 
 def clear(folder: Path) -> None:
     """Remove an old run's files, and what a kill left half done of them. Raises `OSError`."""
-    for name in (CHECKPOINT, *FILES, *PICTURES):
+    for name in (CHECKPOINT, *FILES, PICTURE):
         (folder / name).unlink(missing_ok=True)
         new_name(folder / name).unlink(missing_ok=True)
     for file in (folder / APART).glob("[0-9]*.h5*"):
@@ -46,7 +45,7 @@ def occupied(folder: Path) -> Iterator[None]:
 
 
 def claim_folder(folder: Path, force: bool) -> None:
-    """Make ``folder`` ready for a run. Raises `InputError` if it cannot be, or holds something already without
+    """Make ``folder`` ready for results. Raises `InputError` if it cannot be, or holds something already without
     ``force``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -54,7 +53,7 @@ def claim_folder(folder: Path, force: bool) -> None:
         if not os.access(folder, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
-        raise InputError(f"{folder}: cannot be used as run folder: {error.strerror}.") from None
+        raise InputError(f"{folder}: cannot be used for results: {error.strerror}.") from None
     if not (empty or force):
         said = "is not empty; choose another folder with -o, or overwrite a run in it with --force"
         raise InputError(f"{folder}: {said}.")
@@ -63,10 +62,3 @@ def claim_folder(folder: Path, force: bool) -> None:
 def is_sweep(folder: str | Path) -> bool:
     """Whether ``folder`` is that of a sweep."""
     return (Path(folder) / "sweep.toml").is_file()
-
-
-def no_run(folder: Path, missing: str) -> InputError:
-    """What to say of a ``folder`` that is no run folder, as a file is ``missing``."""
-    if is_sweep(folder):
-        return InputError(f"{folder}: is a sweep, not a run; its runs are the folders in {folder / 'cases'}.")
-    return InputError(f"{folder}: is not a run folder: {missing} is missing.")

@@ -15,12 +15,11 @@ Result = TypeVar("Result")
 _PAUSE = 0.01  # seconds between two looks
 
 
-def agreed(comm: MPI.Comm, function: Callable[[], Result], *, asleep: bool = True) -> Result:
+def agreed(comm: MPI.Comm, function: Callable[[], Result]) -> Result:
     """Call ``function`` on rank 0 alone; its result is that of all ranks. Collective.
 
-    Raises on every rank the `InputError` that it raises, and `WriteError` for an `OSError`. The other ranks sleep
-    meanwhile, which leaves their cores to rank 0, unless that is soon done. ``function`` must not call or import
-    anything collective; importing petsc4py is.
+    Raises on every rank the `InputError` that it raises, and `WriteError` for an `OSError`. ``function`` must not call
+    or import anything collective; importing petsc4py is.
     """
     result: Any = None
     fault: Exception | None = None
@@ -31,8 +30,6 @@ def agreed(comm: MPI.Comm, function: Callable[[], Result], *, asleep: bool = Tru
             fault = error
         except OSError as error:
             fault = WriteError(f"{error.filename} cannot be written: {error.strerror or error}")
-    if asleep and comm.size > 1:
-        arrived_before(comm)
     result, fault = comm.bcast((result, fault))
     if fault is not None:
         raise fault

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
-from archord.output.checkpoint import RunState, halt, resume
+from archord.output.checkpoint import halt, resume
 from archord.output.checkpoint import write as write_checkpoint
 from archord.output.contact import FIXED, PER_STEP, contact_arrays
 from archord.output.disk import WriteError, replace_file
@@ -81,7 +82,7 @@ def solve_scene(
     timer = timer or Timer()
     begun = perf_counter() - sum(timer.seconds.values())
     with ExitStack() as stack:
-        agreed(comm, lambda: bool(stack.enter_context(occupied(folder))), asleep=False)
+        agreed(comm, lambda: bool(stack.enter_context(occupied(folder))))
         joint = without_stale_forms(lambda: Joint(scene, comm, timer=timer))
         on_start(joint)
         output = _Output(folder, joint, begun, start)
@@ -125,6 +126,7 @@ class _Output:
 
     def __init__(self, folder: Path, joint: Joint, begun: float, start: Start | None) -> None:
         self.folder, self.joint, self._start, comm = folder, joint, start, joint.comm
+        self._on_root = partial(agreed, comm)
         self._scene, self._last = resolved(joint.scene), perf_counter()
         self.steps: list[Measures] = comm.bcast(start.done if start else [])
         with joint.timer("output"):
@@ -143,13 +145,11 @@ class _Output:
             self._on_root(self._make)
             return None, Work()
         with joint.timer("checkpoint"):
-            at = resume(self._order, self.folder / CHECKPOINT, self._start.checkpoint if self._start else None)
-        self._write(at.measures, at.step, arc_profiles(joint))
+            checkpoint = self._start.checkpoint if self._start else None
+            m, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
+        self._write(m, step, arc_profiles(joint))
         self._on_root(lambda: replace_file(self.folder / "scene.toml", self._scene))
-        return at.position, at.work
-
-    def _on_root(self, function: Callable[[], Any]) -> Any:
-        return agreed(self.joint.comm, function, asleep=False)
+        return position, work
 
     def _make(self) -> None:
         clear(self.folder)
@@ -165,7 +165,7 @@ class _Output:
             seconds, self._last = perf_counter() - self._last, perf_counter()
             m = measure(joint, self.steps, step, profiles.values(), work, seconds)
         with joint.timer("checkpoint"):
-            checkpoint = halt(self._order, self._scene, RunState(m, step, position, work))
+            checkpoint = halt(self._order, self._scene, m, step, position, work)
             self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
         self._write(m, step, profiles)
         return m

@@ -11,9 +11,9 @@ from archord.output.folder import CHECKPOINT, FILES
 from archord.scene.errors import InputError
 
 
-def check_output(path: Path) -> None:
-    """Raise `InputError` if ``path`` cannot become a file: no folder for it, a folder itself, no permission, or a file
-    that a run folder is made of. Another file in its place will be overwritten."""
+def check_target(path: Path, inputs: Iterable[Path] = (), *, force: bool = True) -> None:
+    """Raise `InputError` if ``path`` cannot become a file: no folder for it, a folder itself, no permission, a file
+    that a run folder is made of, or one of the ``inputs`` of the command; without ``force`` also if it is there."""
     fault = None
     if not path.parent.is_dir():
         fault = f"{path.parent} is not a folder"
@@ -23,34 +23,19 @@ def check_output(path: Path) -> None:
         fault = f"it belongs to the run in {path.parent}"
     elif not os.access(path if path.exists() else path.parent, os.W_OK):
         fault = "permission denied"
+    elif path.exists() and any(given.exists() and path.samefile(given) for given in inputs):
+        fault = "it is an input of the command"
     if fault:
         raise InputError(f"{path}: cannot be written: {fault}.")
-
-
-def check_target(path: Path, inputs: Iterable[Path], *, force: bool = False) -> None:
-    """`check_output` for a file that the user names: raise `InputError` also for one of the ``inputs`` of the command,
-    and, without ``force``, for a file that is there."""
-    check_output(path)
-    for given in inputs:
-        if path.exists() and given.exists() and path.samefile(given):
-            raise InputError(f"{path}: cannot be written: it is an input of the command.")
     if path.is_file() and not force:
         raise InputError(f"{path}: is there already; choose another file, or overwrite it with --force.")
 
 
-def make_folder(folder: Path) -> None:
-    """Make ``folder`` unless it is there. Raises `InputError` if it cannot be made."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {error.strerror or error}.") from None
-
-
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Around the writing of ``path``: `check_output` before, and `InputError` for what the system refuses all the
+    """Around the writing of ``path``: `check_target` before, and `InputError` for what the system refuses all the
     same."""
-    check_output(path)
+    check_target(path)
     try:
         yield
     except OSError as error:

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from archord.output.folder import claim_folder
 from archord.output.step_file import step_name
-from archord.output.user_file import check_target, make_folder, writing
+from archord.output.user_file import check_target, writing
 from archord.postprocess.fields import Fields
 from archord.postprocess.run import Run
 
@@ -100,6 +101,6 @@ def _check_new(files: Iterable[Path], folder: Path, force: bool) -> None:
 
     Raises `InputError`.
     """
-    make_folder(folder)
+    claim_folder(folder, force=True)
     for file in files:
         check_target(file, (), force=force)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from archord.output.folder import no_run
+from archord.output.folder import is_sweep
 from archord.output.history import read_history
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.curve import CURVES, RunCurve
@@ -44,7 +44,10 @@ class Run:
         self.folder = Path(folder)
         for name in ("scene.toml", "history.csv", "run.json"):
             if not (self.folder / name).is_file():
-                raise no_run(self.folder, name)
+                is_no_run = f"is not a run folder: {name} is missing"
+                if is_sweep(self.folder):
+                    is_no_run = f"is a sweep, not a run; its runs are the folders in {self.folder / 'cases'}"
+                raise InputError(f"{self.folder}: {is_no_run}.")
         self.columns = _read_columns(self.folder / "history.csv")
         self.scene: Scene = load_scene(self.folder / "scene.toml")
         self.summary: dict[str, Any] = _read_report(self.folder / "run.json")

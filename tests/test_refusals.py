@@ -23,11 +23,11 @@ RUN, OTHER = "{coarse}", "{elastic}"
         (["export", RUN], "export: give --vtk DIR, --csv DIR or both."),
         (["export", RUN, "--vtk", "new", "--step", "7"], f"{RUN}: has no step 7; its accepted steps are 1 to 6."),
         (["export", RUN, "--csv", RUN, "--force"], f"{RUN}/history.csv: cannot be written: it belongs to the run"),
-        (["export", RUN, "--csv", f"{RUN}/run.json"], f"{RUN}/run.json: cannot be made: File exists."),
+        (["export", RUN, "--csv", f"{RUN}/run.json"], f"{RUN}/run.json: cannot be used for results: File exists."),
         (["fit", RUN, "--json", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be written: it belongs to "),
         (["fit", RUN, "--json", "x", "--python", "./x"], "x: is named for two files; choose different ones."),
         (["fit", RUN, "--json", "/dev/full"], "/dev/full: cannot be written: No space left on device."),
-        (["reproduce", "fig2", "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be used as run folder: File"),
+        (["reproduce", "fig2", "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be used for results: File"),
         (["export-deck", SCENE, "-o", RUN], f"{RUN}: cannot be written: it is a folder."),
         (
             ["solve", SCENE, "--set", "analysis.accuracy=0.02", "--set", "joint.growth=0.5"],

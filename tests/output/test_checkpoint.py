@@ -8,7 +8,6 @@ from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.output import checkpoint
-from archord.output.checkpoint import RunState
 from archord.presets.joint import Joint
 from archord.presets.measures import Work
 from archord.scene.errors import InputError
@@ -27,8 +26,8 @@ def pressed():
     solution = solve(PROBLEM)
     joint = solution.joint
     position = Position(3, joint.equilibrium.load, 0.003, 0.1 * joint.equilibrium.state(), 0.7)
-    at = RunState(solution.steps[-1], Step(joint.equilibrium.load), position, Work(0.01, 0.02, 0.03))
-    return joint, checkpoint.halt(MeshOrder(joint), "scene", at)
+    at = solution.steps[-1], Step(joint.equilibrium.load), position, Work(0.01, 0.02, 0.03)
+    return joint, checkpoint.halt(MeshOrder(joint), "scene", *at)
 
 
 def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -64,7 +63,7 @@ def test_the_state_comes_back_on_any_ranks(comm, pressed, cut):
         assert np.array_equal(together[place][0], number)
         assert together[place][1] == pytest.approx(x, abs=1e-12)
     state = pressed[1]
-    again = checkpoint.halt(order, "scene", checkpoint.resume(order, "path", state if comm.rank == 0 else None))
+    again = checkpoint.halt(order, "scene", *checkpoint.resume(order, "path", state if comm.rank == 0 else None))
     if comm.rank == 0:
         assert (again.mesh, again.scalars, set(again.arrays)) == (state.mesh, state.scalars, set(state.arrays))
         for name, values in state.arrays.items():

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from archord import cli
-from archord.output.folder import APART, CHECKPOINT, FILES, PICTURES, claim_folder
+from archord.output.folder import APART, CHECKPOINT, FILES, PICTURE, claim_folder
 from archord.output.history import read_history
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
@@ -182,7 +182,7 @@ def test_results_are_not_overwritten_by_accident(tmp_path):
         claim_folder(tmp_path / "new", False)
     claim_folder(tmp_path / "new", True)
     assert (tmp_path / "new" / "history.csv").read_text() == "kept"
-    with pytest.raises(InputError, match="cannot be used as run folder: File exists"):
+    with pytest.raises(InputError, match="cannot be used for results: File exists"):
         claim_folder(tmp_path / "new" / "history.csv", True)
 
 
@@ -268,8 +268,8 @@ def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(tmp_path):
         without_stale_forms(lambda: exec('raise TimeoutError("another")'))
 
 
-def test_a_new_run_removes_the_pictures_of_the_old_one(tmp_path):
-    for name in (*PICTURES, "notes.txt"):
+def test_a_new_run_removes_the_picture_of_the_old_one(tmp_path):
+    for name in (PICTURE, "notes.txt"):
         (tmp_path / name).touch()
     solve_scene(scene(0.3, 1), tmp_path, MPI.COMM_SELF)
-    assert [name for name in (*PICTURES, "notes.txt") if (tmp_path / name).exists()] == ["notes.txt"]
+    assert [name for name in (PICTURE, "notes.txt") if (tmp_path / name).exists()] == ["notes.txt"]
