@@ -103,8 +103,7 @@ class Bulk:
     ``tags`` give the tags of ``materials``."""
 
     def __init__(self, V: fem.FunctionSpace, tags: MeshTags, materials: Mapping[int, Material]) -> None:
-        self.V = V
-        self.materials = materials
+        self.V, self.materials = V, materials
         for material in materials.values():
             _check_elastic_tangent(material)
         self.degree = V.element.basix_element.degree
@@ -237,20 +236,22 @@ class Bulk:
     def cell_fields(self, u: Array) -> dict[str, Array]:
         """Means over each cell of this rank ``(n_cells,)`` at ``u`` ``(n_nodes, 2)``: "von_mises", "mean_stress" and,
         where a body can yield, "peeq"."""
-        names = ["von_mises", "mean_stress", *(["peeq"] if self.plastic else [])]
-        fields = {name: np.zeros(self.V.mesh.topology.index_map(2).size_local) for name in names}
         X, w = bulk_quadrature(self.degree)
+        fields: dict[str, Array] = {}
         for tag, cells in self.cells.items():
-            values: dict[str, Array] = {}
             if tag in self._plastic:
-                data = self._plastic[tag]
-                weight, stress = data.weight, data.stress
-                values = {"peeq": np.asarray(data.points.peeq)}
+                body = self._plastic[tag]
+                weight, stress, peeq = body.weight, body.stress, np.asarray(body.points.peeq)
             else:
                 material, basis = self.materials[tag], cell_basis(self.V.mesh, self.degree, cells, X)
                 eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)
                 weight, (stress, _, _) = basis.measure * w, material.update(eps, material.state(len(eps)))
-            values |= {"von_mises": von_mises(stress), "mean_stress": mean_stress(stress)}
-            for name, at_points in values.items():
-                fields[name][cells] = (weight * at_points.reshape(weight.shape)).sum(axis=1) / weight.sum(axis=1)
-        return fields
+                peeq = np.zeros(len(eps))
+            for name, at_points in {
+                "von_mises": von_mises(stress),
+                "mean_stress": mean_stress(stress),
+                "peeq": peeq,
+            }.items():
+                whole = fields.setdefault(name, np.zeros(self.V.mesh.topology.index_map(2).size_local))
+                whole[cells] = (weight * at_points.reshape(weight.shape)).sum(axis=1) / weight.sum(axis=1)
+        return {name: values for name, values in fields.items() if self.plastic or name != "peeq"}

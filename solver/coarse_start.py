@@ -65,13 +65,12 @@ class CoarseStart:
                 u[nodes] = interpolate(on_nodes)
             return np.append(u, step[-1])
 
-    def commit(self) -> bool:
+    def follow(self) -> bool:
         """Follow the fine problem, which has accepted the last step; returns whether the coarse one could."""
         if self._reached is None:
             return False
         with self.fine.timer("coarse start"):
             self.path.accept(self._reached)
-            self.path.commit()
         return True
 
     def take_back(self) -> None:

@@ -1,7 +1,6 @@
 """What a load on the path prescribes: the load factor itself, or the force that works on it.
 
-Under force control the load factor is one more unknown, with the equation that the force on it is the load's. A control
-has the unknowns: `vector`, `join` and `factor` put them together and take them apart.
+Under force control the load factor is one more unknown, with the equation that the force on it is the load's.
 """
 
 from __future__ import annotations
@@ -29,12 +28,11 @@ class FactorControl:
     singular = False
 
     def __init__(self, V: fem.FunctionSpace) -> None:
-        self._V, self._n = V, 2 * V.dofmap.index_map.size_local
-        self._load = 0.0
+        self._index_map, self._load = V.dofmap.index_map, 0.0
 
     def vector(self) -> PETSc.Vec:
         """A vector of all unknowns of this rank."""
-        return create_vector(self._V.dofmap.index_map, 2)
+        return create_vector(self._index_map, 2)
 
     def start(self, load: float, guess: float) -> float:
         """The load factor with which a solve at ``load`` starts that was to start with ``guess``."""
@@ -46,9 +44,8 @@ class FactorControl:
         return self._load
 
     def join(self, x: PETSc.Vec, u: Array, factor: float) -> None:
-        """Put displacements (or forces) ``u`` ``(n_owned dofs,)`` and the load factor (or what is missing to the force
-        on it) into ``x``."""
-        x.array[: self._n] = u
+        """Put displacements (or forces) ``u`` and the load factor (or what the force on it lacks) into ``x``."""
+        x.array[:] = u
 
     def replace(self, A: PETSc.Mat) -> None:
         """Take note that the tangent of all displacements is another matrix, or has to be factorised once more."""
@@ -58,17 +55,14 @@ class FactorControl:
 
 
 class ForceControl(Bordered):
-    """The load is the force that works on the load factor, along the ``rate`` ``(n_local, 2)`` of prescribed
-    displacements and those of rigid discs. ``stiffness`` is that of the stiffest body, ``factoriser`` gives the
-    strategy for a matrix."""
+    """The load is the force that works on the load factor, along the ``rate`` of prescribed displacements, and those of
+    rigid discs. ``stiffness`` is that of the stiffest body, ``factoriser`` gives the strategy for a matrix."""
 
     def __init__(
-        self, tangent: TangentMatrix, rate: Array, stiffness: float, factoriser: Callable[[PETSc.Mat], Strategy]
+        self, tangent: TangentMatrix, rate: fem.Function, stiffness: float, factoriser: Callable[[PETSc.Mat], Strategy]
     ) -> None:
         super().__init__(tangent.A, stiffness, factoriser)
-        self.border = self
-        self._direction = fem.Function(tangent.V)
-        self._direction.x.array[:] = rate.ravel()
+        self.border, self._rate = self, rate
 
     def start(self, load: float, guess: float) -> float:
         """The guess itself."""
@@ -77,4 +71,4 @@ class ForceControl(Bordered):
     def follow(self, tangent: TangentMatrix, *, factorise: bool) -> None:
         """Assemble the derivatives with respect to the load factor, and those of the force on it. Collective."""
         with tangent.timer("assemble border"):
-            self.update(*tangent.border(self._direction), factorise=factorise)
+            self.update(*tangent.border(self._rate), factorise=factorise)

@@ -9,6 +9,8 @@ tolerance has no unit.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -25,7 +27,7 @@ from archord.solver.contact.law import Frictionless
 from archord.solver.control import FactorControl, ForceControl
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.linear.choose import choose
-from archord.solver.linear.strategy import Facts, Strategy
+from archord.solver.linear.strategy import Facts
 from archord.solver.problem import Load, Problem
 from archord.solver.tangent import TangentMatrix
 from archord.solver.timer import BEFORE_SOLVING, Timer
@@ -42,8 +44,9 @@ class Equilibrium:
     each over all ranks; ``largest_reaction`` is the largest norm of all accepted states.
     """
 
-    def __init__(self, problem: Problem, V: fem.FunctionSpace, bulk: Bulk, contact: Contact, timer: Timer) -> None:
-        self.problem, self.V, self.bulk, self.contact, self.timer = problem, V, bulk, contact, timer
+    def __init__(self, problem: Problem, bulk: Bulk, contact: Contact, timer: Timer) -> None:
+        self.problem, self.bulk, self.contact, self.timer = problem, bulk, contact, timer
+        self.V = V = bulk.V
         self.comm = V.mesh.comm
         self.interrupt = Interrupt()
         self.u = fem.Function(V, name="displacement")
@@ -76,12 +79,15 @@ class Equilibrium:
             lambda: all(self._held(problem.tag(body)) for body in problem.bodies),
         )
         self.choice = choose(facts)
+        self._factoriser = partial(self.choice.factoriser, V)  # of tangents of all displacements
         condense = self.choice.uses("condensed")
-        self.tangent = TangentMatrix(V, bulk, contact, self.fixed, self.rate, timer, condense=condense)
+        self.tangent = TangentMatrix(bulk, contact, self.fixed, self.rate, timer, condense=condense)
         self.control: FactorControl | ForceControl = FactorControl(V)
         with timer(BEFORE_SOLVING):
             if facts.by_force:
-                self.control = ForceControl(self.tangent, self.rate, self._stiffest, self._factoriser)
+                rate = fem.Function(V)
+                rate.x.array[:] = self.rate.ravel()
+                self.control = ForceControl(self.tangent, rate, self._stiffest, self._factoriser)
             self._choose_linear()
 
     def _held(self, tag: int) -> bool:
@@ -116,10 +122,6 @@ class Equilibrium:
         u = state[:-1].reshape(-1, 2).copy()
         u[self.fixed] = self.factor * self.rate[self.fixed]
         self.control.join(x, u[: self.n_owned].ravel(), self.factor)
-
-    def _factoriser(self, A: PETSc.Mat) -> Strategy:
-        """The strategy that factorises ``A``, a tangent of all displacements. Collective."""
-        return self.choice.factoriser(A, self.V)
 
     def _choose_linear(self) -> None:
         self.linear = self.control.border or self.tangent.condensed or self._factoriser(self.tangent.A)
@@ -218,10 +220,6 @@ class Equilibrium:
         x = self.V.tabulate_dof_coordinates()[at, :2] if len(size) else np.zeros(2)
         value, place = max(self.comm.allgather((size.max(initial=-1.0), tuple(x))))
         return place if value >= 0 else None
-
-    def residual(self) -> Array:
-        """Residual forces ``(n_local, 2)`` at the last evaluation, zero at prescribed displacements and ghosts."""
-        return np.pad(self._where_free(), ((0, self.n_local - self.n_owned), (0, 0)))
 
     def displacement(self) -> Array:
         """A copy of the nodal displacements ``(n_local, 2)``."""

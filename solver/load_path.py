@@ -82,18 +82,15 @@ class LoadPath:
             yield self.state, True
 
     def accept(self, load: float) -> None:
-        """Go to ``load``, where the last attempt has found equilibrium; its history waits for `commit`."""
+        """Go to ``load``, where the last attempt has found equilibrium, and keep its history."""
         at, new = self.at, self.solver.equilibrium.state()
         if load != at.load:
             known = self._from_rest or at.increment is not None
             at.increment = new - self.state if known else np.zeros_like(new)
             at.stride = load - at.load
         at.load, self.state = load, new
-
-    def commit(self) -> None:
-        """Keep the history of the step that was accepted."""
         self.solver.equilibrium.commit()
-        if self.coarse is not None and not self.coarse.commit():
+        if self.coarse is not None and not self.coarse.follow():
             self.coarse = None
 
     def take_back(self) -> None:

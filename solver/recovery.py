@@ -47,11 +47,10 @@ class Recovery:
 
     def _solve_in_stages(self, guess: Array, afar: bool) -> bool:
         contact = self.equilibrium.contact
-        wanted = contact.gamma_factor
-        if (wanted <= _STIFF_CONTACT or not self.continues_gamma) and self._solve_at_once(guess, afar):
-            return True
-        if wanted <= _STIFF_CONTACT:
-            return False
+        wanted, stiff = contact.gamma_factor, contact.gamma_factor > _STIFF_CONTACT
+        converged = not (stiff and self.continues_gamma) and self._solve_at_once(guess, afar)
+        if converged or not stiff:
+            return converged
         stages = math.ceil(math.log(wanted / GAMMA_FACTOR, _GAMMA_RATIO))
         for factor in np.geomspace(GAMMA_FACTOR, wanted, stages + 1):
             contact.use_gamma_factor(float(factor))

@@ -77,9 +77,8 @@ def march(
     """Follow ``path`` to the loads ``targets`` in turn and, where a step fails or ``rules`` ask for it, to loads in
     between.
 
-    ``substep_done(load)`` follows every accepted step with its history still to be committed,
-    ``target_done(step, position)`` every output target, ``attempted(load, iterations)`` every solve. Raises
-    `StepFailure`.
+    ``substep_done(load)`` follows every accepted step, ``target_done(step, position)`` every output target,
+    ``attempted(load, iterations)`` every solve. Raises `StepFailure`.
     """
     at, rules = path.at, rules or StepRules()
     at.size = at.size or rules.initial
@@ -101,7 +100,6 @@ def march(
                 just_cut, passed = False, end
                 path.accept(load)
                 substep_done(load)
-                path.commit()
                 continue
             record.cutbacks += 1
             path.take_back()

@@ -45,11 +45,9 @@ class System:
             materials = {problem.tag(body): body.material for body in problem.bodies}
             self.bulk = Bulk(self.V, problem.mesh.cells, materials)
             self.sides: dict[str, Surface] = {}
-            interfaces = [
-                Interface(i, [self._surface(surface, i.name) for surface in i.surfaces]) for i in problem.interactions
-            ]
-            self.contact = Contact(self.V, interfaces)
-            self.equilibrium = Equilibrium(problem, self.V, self.bulk, self.contact, self.timer)
+            surfaces = [[self._surface(given, i.name) for given in i.surfaces] for i in problem.interactions]
+            self.contact = Contact(self.V, list(map(Interface, problem.interactions, surfaces)))
+            self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
             tolerance, most = problem.tolerance, problem.max_iterations
             self.solver = Recovery(NewtonSolver(self.equilibrium, tolerance=tolerance, max_iterations=most))
 

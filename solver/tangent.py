@@ -23,24 +23,16 @@ class TangentMatrix:
     """
 
     def __init__(
-        self,
-        V: fem.FunctionSpace,
-        bulk: Bulk,
-        contact: Contact,
-        fixed: np.ndarray,
-        rate: Array,
-        timer: Timer,
-        *,
-        condense: bool = False,
+        self, bulk: Bulk, contact: Contact, fixed: np.ndarray, rate: Array, timer: Timer, *, condense: bool
     ) -> None:
-        self.V, self.bulk, self.contact, self.timer = V, bulk, contact, timer
-        self.comm, index_map = V.mesh.comm, V.dofmap.index_map
+        self.V, self.bulk, self.contact, self.timer = bulk.V, bulk, contact, timer
+        self.comm, index_map = self.V.mesh.comm, self.V.dofmap.index_map
         self._size, self._start, self._n = index_map.size_global, index_map.local_range[0], index_map.size_local
         self._fixed, self._rate = fixed[: self._n], rate[: self._n]
         self._bcs = []
         for axis in range(2):
             dofs = 2 * np.flatnonzero(fixed[:, axis]).astype(np.int32) + axis
-            self._bcs.append(fem.dirichletbc(0.0, dofs, V.sub(axis)))
+            self._bcs.append(fem.dirichletbc(0.0, dofs, self.V.sub(axis)))
         # prescribed dofs of all ranks and their rates, with those of rigid surfaces and one that is none behind
         own = np.flatnonzero(self._fixed)
         rigid = np.append([surface.rate for surface in contact.rigid], 0.0)

@@ -30,7 +30,8 @@ class Contact:
     """All ``interfaces``, if any, in the displacement space ``V``: ``surfaces`` of bodies, ``rigid`` ones, ``pairs``.
 
     A surface belongs to one interface, as its points do. ``active_set_changes`` counts the points of this rank that
-    opened or closed at the last evaluation. Collective.
+    opened or closed at the last evaluation; ``tangent`` is the derivative of what `add_force` adds, another one
+    whenever the pattern had to grow. Collective.
     """
 
     def __init__(self, V: fem.FunctionSpace, interfaces: Sequence[Interface] = ()) -> None:
@@ -43,9 +44,10 @@ class Contact:
         for number, surface in enumerate(self.rigid):
             surface.curve_dofs[:] = self._n_dofs + number
         self.gamma_factor = max((i.interaction.gamma_factor for i in interfaces), default=0.0)
+        self.use_gamma_factor(self.gamma_factor)
         self.active_set_changes = 0
         self._reaches = [Reach(pair, i.slide) for i in interfaces for pair in i.pairs]
-        self._tangent: ContactTangent | None = None
+        self.tangent = ContactTangent(self._reaches)
 
     def move(self, factor: float) -> None:
         """Displace rigid surfaces by their rates times the load ``factor``."""
@@ -59,8 +61,9 @@ class Contact:
 
     def use_gamma_factor(self, factor: float) -> None:
         """Limit the gamma factor of all interactions to ``factor``, for the time being."""
-        for pair in self.pairs:
-            pair.limit_gamma(factor)
+        for interface in self.interfaces:
+            for pair in interface.pairs:
+                pair.use_gamma(min(interface.interaction.gamma_factor, factor))
 
     def hold(self) -> None:
         """Keep all points on the facets they were last paired with, until `search`: the forces become smooth."""
@@ -84,7 +87,7 @@ class Contact:
         self.active_set_changes = sum(pair.changes for pair in self.pairs)
         grew = any([reach.extend() for reach in self._reaches if reach.pair.moves])
         if grew:
-            self._tangent = None
+            self.tangent = ContactTangent(self._reaches)
         return grew
 
     def anticipate(self, u: Array) -> bool:
@@ -112,13 +115,6 @@ class Contact:
             pair.add_forces(on[id(pair.surface)], on[id(pair.opposite)])
         for surface in self.surfaces:
             surface.add_to_owned(surface.sum_over_ranks(-on[id(surface)]), force)
-
-    @property
-    def tangent(self) -> ContactTangent:
-        """Derivative of what `add_force` adds; another one whenever the pattern had to grow."""
-        if self._tangent is None:
-            self._tangent = ContactTangent(self._reaches)
-        return self._tangent
 
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
         """Block ``(rows, columns)`` in global dofs that the contact may fill, those of all ranks, each once.

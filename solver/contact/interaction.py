@@ -85,7 +85,7 @@ class Interface:
                 opposite = surfaces[1] if own is surfaces[0] else surfaces[0]
                 if isinstance(opposite, Surface):
                     own.place_points(*segment_rule(own.curve, opposite.curve))
-                self.pairs.append(Pair(own, opposite, law, float(share), interaction.gamma_factor, moves=moves))
+                self.pairs.append(Pair(own, opposite, law, float(share), moves=moves))
         if not moves and isinstance(surfaces[1], Surface) and chosen[0] is surfaces[0]:
             self.pairs[0].use_own_normals()
 

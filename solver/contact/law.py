@@ -46,11 +46,9 @@ class Frictionless(ContactLaw):
 
     def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
         """Pressure where the trial pressure is positive."""
-        touches = ~(trial[:, 0] <= 0)
-        traction, derivative = np.zeros_like(trial), np.zeros((len(trial), 2, 2))
-        traction[:, 0] = np.where(touches, trial[:, 0], 0.0)
+        touches, derivative = ~(trial[:, 0] <= 0), np.zeros((len(trial), 2, 2))
         derivative[:, 0, 0] = touches
-        return traction, derivative, state
+        return np.where(touches[:, None], trial * [1.0, 0.0], 0.0), derivative, state
 
 
 class Tied(ContactLaw):

@@ -29,18 +29,9 @@ class Pair:
     """
 
     def __init__(
-        self,
-        surface: Surface,
-        opposite: Surface | RigidSurface,
-        law: ContactLaw,
-        share: float,
-        gamma_factor: float,
-        *,
-        moves: bool,
+        self, surface: Surface, opposite: Surface | RigidSurface, law: ContactLaw, share: float, *, moves: bool
     ) -> None:
         self.surface, self.opposite, self.law, self.share, self.moves = surface, opposite, law, share, moves
-        self._gamma_factor = gamma_factor
-        self.limit_gamma(gamma_factor)
         x, self._outward = surface.point.reshape(-1, 2), surface.outward.reshape(-1, 2)
         self.projection = opposite.curve.closest_point(x, self._outward, np.zeros_like(opposite.curve.X))
         self.separation = x - self.projection.point
@@ -49,11 +40,9 @@ class Pair:
         self.active = np.zeros(len(x), dtype=bool)
         self.start: Start = "anywhere"
 
-    def limit_gamma(self, factor: float) -> None:
-        """Nitsche's gamma ``(m,)`` is the gamma factor, at most ``factor``, times the share and the trace constant of
-        the point's cell."""
-        unit = np.repeat(self.share * self.surface.gamma, self.surface.weight.shape[1])
-        self.gamma = min(self._gamma_factor, factor) * unit
+    def use_gamma(self, factor: float) -> None:
+        """Nitsche's gamma ``(m,)`` is ``factor`` times the share and the trace constant of the point's cell."""
+        self.gamma = factor * np.repeat(self.share * self.surface.gamma, self.surface.weight.shape[1])
 
     def use_own_normals(self) -> None:
         """Measure the gap along this surface's normals, reversed, for good."""

@@ -24,8 +24,8 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     met = own.closest_point(*opposite.vertices(), np.zeros_like(own.X))
     inside = met.found & (met.xi > _SHORTEST) & (met.xi < 1 - _SHORTEST)
     breaks = [_apart(np.sort(met.xi[inside & (met.facet == k)])) for k in range(own.n_facets)]
-    segments = max(len(b) for b in breaks) - 1
-    ends = np.array([_refined(b, segments) for b in breaks])
+    points = max(map(len, breaks))
+    ends = np.array([_refined(b, points) for b in breaks])
     # two more than a quadratic pressure against quadratic shape functions wants, as pairs slide and breaks do not
     x, w = np.polynomial.legendre.leggauss(own.degree + 3)
     length = np.diff(ends, axis=1)[:, :, None]
@@ -35,13 +35,12 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
 
 def _apart(breaks: Array) -> Array:
     """0, the breaks that are distinct, and 1."""
-    keep = np.diff(breaks, prepend=0.0) > _SHORTEST
-    return np.concatenate([[0.0], breaks[keep], [1.0]])
+    return np.concatenate([[0.0], breaks[np.diff(breaks, prepend=0.0) > _SHORTEST], [1.0]])
 
 
-def _refined(ends: Array, segments: int) -> Array:
-    """``ends`` with the longest segment halved until there are ``segments``."""
-    while len(ends) <= segments:
+def _refined(ends: Array, points: int) -> Array:
+    """``ends`` with the longest segment halved until there are ``points`` of them."""
+    while len(ends) < points:
         k = int(np.argmax(np.diff(ends)))
         ends = np.insert(ends, k + 1, (ends[k] + ends[k + 1]) / 2)
     return ends

@@ -98,8 +98,6 @@ class Surface:
         Warburton and Hesthaven (2003) give the constant for polynomials; here the generalised eigenvalue problem of
         each contact cell is solved, with its curved geometry and its elastic moduli. Unit: stress / length.
         """
-        if not len(self.cells):
-            return np.zeros(0)
         C = self.material.elastic_tangent
         X, w = bulk_quadrature(self.degree)
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
@@ -147,8 +145,7 @@ class Surface:
 class RigidSurface:
     """A rigid disc as a surface of one facet, without points of its own, displaced by ``motion`` ``(1, 2)``.
 
-    ``rate`` ``(2,)`` is its displacement per unit of the load factor; ``curve_dofs`` ``(1,)`` is a block dof behind
-    those of the displacement.
+    ``rate`` ``(2,)`` is that per unit of the load factor; ``curve_dofs`` ``(1,)`` is a block dof behind the others.
     """
 
     n_facets = 1

@@ -30,7 +30,7 @@ class Choice:
         """Whether the strategy ``name`` is used."""
         return self.why_not[name] is None
 
-    def factoriser(self, A: PETSc.Mat, V: fem.FunctionSpace) -> Strategy:
+    def factoriser(self, V: fem.FunctionSpace, A: PETSc.Mat) -> Strategy:
         """The strategy that factorises ``A``, of the displacements ``V``. Collective."""
         if self.uses("substructured"):
             parts = substructured.substructures(A, V)

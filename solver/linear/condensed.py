@@ -66,8 +66,7 @@ class Condensed:
         pc.setFactorSolverType("mumps")
         self._y = K.createVecLeft()
         self._Z = self._responses(_dofs(nodes))
-        none = np.zeros(0, dtype=np.int64)
-        self.occupy(none, none)
+        self.occupy(*np.zeros((2, 0), dtype=np.int64))
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` solve with the matrix."""
@@ -75,28 +74,21 @@ class Condensed:
 
     def _responses(self, dofs: np.ndarray) -> Array:
         """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one after the other."""
-        unit = self._unit_forces(dofs)
-        self._found = PETSc.Mat().createDense((self.matrix.getSizes()[0], (None, len(dofs))), comm=self.matrix.comm)
+        K, m = self.matrix, len(dofs)
+        self._found, unit = (PETSc.Mat().createDense((K.getSizes()[0], (None, m)), comm=K.comm) for _ in range(2))
         self._found.setUp()
+        if self.comm.size == 1:  # sparse: MUMPS skips what they leave zero; of several ranks PETSc spoils sparse ones
+            csr = np.arange(m + 1, dtype=PETSc.IntType), dofs.astype(PETSc.IntType), np.ones(m)
+            unit = PETSc.Mat().createTranspose(PETSc.Mat().createAIJ((m, K.getSize()[0]), csr=csr, comm=K.comm))
+        else:
+            unit.setUp()
+            mine, at = self._own(dofs)
+            unit.getDenseArray()[at, mine] = 1.0
+            unit.assemble()
         self._ksp.setUp()
         self._ksp.getPC().getFactorMatrix().matSolve(unit, self._found)
         unit.destroy()
         return self._found.getDenseArray()
-
-    def _unit_forces(self, dofs: np.ndarray) -> PETSc.Mat:
-        """A column for each of ``dofs``. On one rank they are sparse, and MUMPS skips what they leave zero; on several
-        PETSc spoils sparse ones."""
-        if self.comm.size == 1:
-            offsets, columns = (part.astype(PETSc.IntType) for part in (np.arange(len(dofs) + 1), dofs))
-            shape = len(dofs), self.matrix.getSize()[0]
-            csr = offsets, columns, np.ones(len(dofs))
-            return PETSc.Mat().createTranspose(PETSc.Mat().createAIJ(shape, csr=csr, comm=self.matrix.comm))
-        unit = PETSc.Mat().createDense((self.matrix.getSizes()[0], (None, len(dofs))), comm=self.matrix.comm)
-        unit.setUp()
-        mine, at = self._own(dofs)
-        unit.getDenseArray()[at, mine] = 1.0
-        unit.assemble()
-        return unit
 
     def _own(self, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which of ``dofs`` this rank owns, and where they are among its own."""
@@ -152,14 +144,13 @@ class Condensed:
         singular."""
         self._ksp.solve(r, self._y)
         forces, near = np.zeros(self._Z.shape[1]), self._on_all(self._columns, self._y.array_r)
+        drawn = self._drawn(near)
         for _ in range(_MOST_REVISIONS):
-            drawn = self._drawn(near)
             change = self._revise((self._near_Z @ drawn - near).reshape(-1, 2))
             if change is None:
                 break
             forces += change.ravel()
             near += self._near_Z @ change.ravel()
-        else:
             drawn = self._drawn(near)
         x.array[:] = self._y.array_r + self._Z @ (forces - drawn)
 

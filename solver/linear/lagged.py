@@ -39,10 +39,8 @@ class Lagged:
         """Done when the residual is small, or when a new factorisation would have been quicker."""
         if iteration == 0:
             self._right_side = norm
-        if norm <= _TOLERANCE * self._right_side:
-            return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
-        many = iteration >= 2 * _MANY_SOLVES
-        return PETSc.KSP.ConvergedReason.CONVERGED_ITS if many else PETSc.KSP.ConvergedReason.ITERATING
+        done = norm <= _TOLERANCE * self._right_side or iteration >= 2 * _MANY_SOLVES
+        return PETSc.KSP.ConvergedReason.CONVERGED_ITS if done else PETSc.KSP.ConvergedReason.ITERATING
 
     def factorises(self, iterations: int, changes: int, *, renewed: bool) -> bool:
         """Whether to factorise the next matrix: the last system took so many ``iterations``, there were ``changes`` of

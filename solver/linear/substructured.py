@@ -129,10 +129,9 @@ class Substructures:
             self._mumps = self._kernels.schur_create(
                 MPI.COMM_SELF.py2f(), *sizes, rows, columns, len(kept), kept, place, pointer(status)
             )
-        worst = int(status[0])
-        if worst >= 0:
-            worst = self._kernels.schur_factorise(self._mumps, pointer(values), pointer(self._complement))
-        self.singular = self.comm.allreduce(worst, op=MPI.MIN) < 0
+        if status[0] >= 0:
+            status[0] = self._kernels.schur_factorise(self._mumps, pointer(values), pointer(self._complement))
+        self.singular = self.comm.allreduce(int(status[0]), op=MPI.MIN) < 0
         if self.singular:
             return
         self.comm.Allreduce(MPI.IN_PLACE, self._complement)
