@@ -46,7 +46,10 @@ class Scene(Section):
 
     def __init__(self, source: str = "scene", origin: Mapping[str, str] | None = None, /, **sections: Any) -> None:
         """Check ``sections`` as read from ``source``; ``origin`` names another source of some keys."""
-        data = plain(sections)
+        try:
+            data = plain(sections)
+        except RecursionError:
+            raise InputError(f"{source}: is not a scene: its tables are nested too deeply.") from None
         version = data.get("format", FORMAT)
         if isinstance(version, int) and version > FORMAT:  # it may hold anything else that is unknown here
             raise InputError(f"{source}: format = {version} is for a newer archord; this one reads format {FORMAT}.")

@@ -79,11 +79,12 @@ def test_a_missing_section_is_named(section):
         (b"x = " + b"9" * 5000, "is not valid TOML"),
         (b"x = " + b"[" * 20000, "is not valid TOML"),
         (b"date = 0000-00-00", "is not valid TOML"),
+        (b"a." * 3000 + b"b = 1", "tables are nested too deeply"),
         (b"".join(b"k%d = 1\n" % i for i in range(3000)), "k0 = 1 is not a known key"),
         (b"x" * 5000 + b" = 1", "is not a known key"),
         (b'"a\\nb" = 1', r'"a\\nb" = 1 is not a known key'),
     ],
-    ids=["folder", "binary", "section", "digits", "brackets", "date", "keys", "long key", "two-line key"],
+    ids=["folder", "binary", "section", "digits", "brackets", "date", "dots", "keys", "long key", "two-line key"],
 )
 def test_files_that_are_no_scenes_are_refused_briefly(tmp_path, content, said):
     """In sentences that name the file."""
