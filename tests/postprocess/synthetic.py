@@ -8,15 +8,8 @@ from archord.benchmarks.case import E, paper_joint
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.joint import LawJoint
-from archord.presets.arc import ArcProfile
 
 LOADS = np.linspace(0.1, 2.0, 20)
-
-
-def arc(angle, pressure, weight):
-    """One side of a joint of radius 1 with this pressure ``(n, q)``."""
-    nowhere = np.zeros((*angle.shape, 2))
-    return ArcProfile(1.0, angle, weight, nowhere, pressure, pressure, np.zeros_like(angle))
 
 
 def curve(k, c=None, *, dR=0.005, sigY=None, R=1.0, modulus=1.0, noise=0.0, seed=0, h=0.05, name="run", analysis=None):

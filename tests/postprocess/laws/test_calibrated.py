@@ -193,9 +193,3 @@ def test_outside_the_simulations_there_is_no_number(change, said):
         assert np.isnan(law.force(stray, 0.005))
     with pytest.warns(LawRangeWarning, match=said):
         assert law.force(stray, 0.005, extrapolate=True) > 0
-
-
-@pytest.mark.parametrize("bad", [{"plane": "axial"}, {"nu": 0.5}, {"pin_nu": -1.0}, {"yielding": "x"}])
-def test_what_is_no_joint_is_refused(bad):
-    with pytest.raises(ValueError, match=f"{next(iter(bad))} = "):
-        LawJoint(1.0, 0.005, 1.0, **bad)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from archord.postprocess.laws.chord_laws import parabola, plastic_winkler
 from archord.postprocess.laws.joint import LawJoint
@@ -17,20 +16,6 @@ DEPTHS = JOINT.clearance * np.array([1e-3, 0.1, 0.5, 1.0, 2.0])
 
 def contact_angle(delta):
     return np.arccos(JOINT.clearance / (JOINT.clearance + delta))
-
-
-def chord_integral(pressure, delta):
-    """2 * integral over the chord of ``pressure(x / l)``."""
-    l = 2 * JOINT.radius * np.sin(contact_angle(delta) / 2)  # noqa: E741
-    return 2 * l * quad(pressure, 0, 1, epsabs=0, epsrel=1e-12)[0]
-
-
-@pytest.mark.parametrize("delta", DEPTHS)
-def test_elastic_law_is_the_force_of_the_parabola(delta):
-    p0 = 0.85 * JOINT.E_star * delta / JOINT.radius
-    expected = chord_integral(lambda t: p0 * (1 - t**2), delta)
-    assert LAWS["paper"].force(JOINT, delta) == pytest.approx(expected, rel=1e-10)
-    assert LAWS["paper"].at_load(JOINT, expected).peak_pressure == pytest.approx(p0, rel=1e-9)
 
 
 @pytest.mark.parametrize(("k", "c"), [(0.85, 1.0), (0.7, 1.6), (1.2, 0.5)])
@@ -59,8 +44,8 @@ def test_up_to_the_onset_the_plastic_law_is_the_elastic_one(c):
     lower, deep = np.linspace(0, joint.first_yield, 7), 10 * joint.first_yield
     plastic, elastic = plastic_winkler(joint, lower), parabola(joint, lower)
     np.testing.assert_allclose(plastic.load, elastic.load, rtol=1e-14)
-    eq9 = 8 / 3 * joint.k * joint.E_star * lower * np.sqrt(lower / (2 * (joint.clearance + lower)))
-    np.testing.assert_allclose(elastic.load, eq9, rtol=1e-14)
+    eq9 = 8 / 3 * joint.k * joint.E_star * DEPTHS * np.sqrt(DEPTHS / (2 * (joint.clearance + DEPTHS)))
+    np.testing.assert_allclose(LAWS["paper"].force(joint, DEPTHS), eq9, rtol=1e-14)
     assert elastic.peak_pressure[-1] == pytest.approx(c * 300.0, rel=1e-14)
     assert parabola(joint, deep).load > plastic_winkler(joint, deep).load
 
@@ -131,15 +116,3 @@ def test_liu_is_the_force_of_the_ellipse(delta):
 def test_angle_is_that_of_overlapping_circles(name):
     assert LAWS[name].at_displacement(JOINT, DEPTHS).angle == pytest.approx(contact_angle(DEPTHS), rel=1e-9)
     assert LAWS[name].at_displacement(JOINT, 0.0).angle == 0
-
-
-@pytest.mark.parametrize("name", ["paper", "paper-plastic", "winkler", "liu"])
-def test_inverse_finds_the_root(name):
-    """As brentq does, and back to the force from loads of many sizes."""
-    law = LAWS[name]
-    loads = law.force(JOINT, 2 * JOINT.clearance) * np.array([1e-9, 1e-3, 0.2, 0.7, 1.0])
-    found = law.displacement(JOINT, loads)
-    for P, delta in zip(loads, found, strict=True):
-        root = brentq(lambda d, P=P: law.state(JOINT, np.array(d)).load - P, 0, 0.1, xtol=1e-18, rtol=1e-14)
-        assert delta == pytest.approx(root, rel=1e-9)
-    assert law.force(JOINT, found) == pytest.approx(loads, rel=1e-12)

@@ -50,11 +50,10 @@ def test_files_of_others_and_of_runs_stay(runs, tmp_path, capsys):
     capsys.readouterr()
     assert run(["fit", str(runs["elastic"]), "--json", str(link), "--force"]) == 2
     assert capsys.readouterr().err == f"{link}: cannot be written: it is an input of the command.\n"
-    for name in ("scene.toml", "history.csv", "run.json", "checkpoint.h5"):
+    for option, name in (("--json", "history.csv"), ("--python", "checkpoint.h5"), ("--picture", "run.json")):
         before = (runs["elastic"] / name).read_bytes()
-        for option in ("--json", "--python"):
-            assert run(["fit", str(runs["plastic"]), option, str(runs["elastic"] / name), "--force"]) == 2
-            assert "it belongs to the run" in capsys.readouterr().err
+        assert run(["fit", str(runs["plastic"]), option, str(runs["elastic"] / name), "--force"]) == 2
+        assert "it belongs to the run" in capsys.readouterr().err
         assert (runs["elastic"] / name).read_bytes() == before
 
 
@@ -78,20 +77,17 @@ def test_two_meshes_give_a_mesh_error(runs, capsys):
         (["{elastic}", "--json", "{empty}/x.json", "--picture", "{empty}/x.xyz"], "{empty}/x.xyz: must end in one of "),
         (["{apart}"], "{apart}: the bodies never touch in this run, so there is no law to fit to it."),
         (["{coarse}", "{apart}"], "{apart}: the bodies never touch in this run, so there is no law to fit to it."),
-        (["{level}"], "{level}: the bodies never touch in this run, so there is no law to fit to it."),
         (["{begun}"], "{begun}: holds no accepted step."),
         (["{broken}"], "{broken}/history.csv: cannot be read as the history of a run."),
     ],
 )  # fmt: skip
 def test_bad_input_is_one_sentence(runs, tmp_path, refused, arguments, said):
-    folders = runs | {name: tmp_path / name for name in ("empty", "begun", "broken", "apart", "level")}
+    folders = runs | {name: tmp_path / name for name in ("empty", "begun", "broken", "apart")}
     (tmp_path / "empty").mkdir()
     history = (runs["elastic"] / "history.csv").read_text()
     heading, first = history.splitlines()[:2]
-    none = ["0" for _ in first.split(",")]
-    apart, level = (",".join(["1", delta, delta, *none[3:]]) for delta in ("-0.001", "0.001"))
-    texts = {"begun": f"{heading}\n", "broken": f"{history}1,2\n"}
-    texts |= {"apart": f"{heading}\n{apart}\n", "level": f"{heading}\n{level}\n"}
+    apart = ",".join(["1", "0.001", "0.001", *("0" for _ in first.split(",")[3:])])
+    texts = {"begun": f"{heading}\n", "broken": f"{history}1,2\n", "apart": f"{heading}\n{apart}\n"}
     for name, text in texts.items():
         (tmp_path / name).mkdir()
         for file in ("scene.toml", "run.json"):
@@ -101,29 +97,18 @@ def test_bad_input_is_one_sentence(runs, tmp_path, refused, arguments, said):
     assert not list((tmp_path / "empty").iterdir())
 
 
-def _through(delta, P):
-    """The curve of a run through these points."""
-    return replace(curve(0.85), delta=np.array(delta), **dict.fromkeys(("P", "p0", "eps", "peeq_max"), np.array(P)))
-
-
-def test_unloading_is_left_out(runs):
+@pytest.mark.parametrize(
+    ("delta", "P", "kept"),
+    [
+        ([1, 2, 3, 2, 1, 1, 2, 3, 4], [1, 2, 3, 2, 1, 1, 2, 3, 4], [1, 2, 3, 4]),
+        # the same force again, a little deeper by what yielded on the way, or a smaller one
+        ([1, 2, 1.5, 2.002, 1.5, 2.003, 2.5, 3], [1, 2, 0, 2, 0, 2 + 1e-9, 2.5, 3], [1, 2, 2.5, 3]),
+        ([1, 2, 1, 2.001, 2.1, 3], [1, 2, 0, 1.999, 2.1, 3], [1, 2, 2.1, 3]),
+        # without an unloading every deeper step counts, also where P falls
+        ([1, 2, 3, 4], [1, 2, 1.9, 2], [1, 2, 3, 4]),
+    ],
+)
+def test_unloading_is_left_out(delta, P, kept):
     """Of a way there, back and further, the steps on new ground remain."""
-    curve = Run(runs["elastic"]).curve
-    there, back = np.arange(len(curve.delta)), np.arange(len(curve.delta))[::-1]
-    path = np.concatenate([there[:5], back[4:], there])
-    loop = replace(curve, **{name: getattr(curve, name)[path] for name in ("delta", "P", "p0", "eps", "peeq_max")})
-    np.testing.assert_array_equal(loop.loading().delta, curve.delta)
-    np.testing.assert_array_equal(loop.loading().P, curve.P)
-
-
-def test_a_step_on_the_way_back_to_the_first_loading_is_left_out():
-    """The same force again, a little deeper by what yielded on the way, or a smaller one, is not on new ground."""
-    cycles = _through([1, 2, 1.5, 2.002, 1.5, 2.003, 2.5, 3], [1, 2, 0, 2, 0, 2 + 1e-9, 2.5, 3])
-    assert list(cycles.loading().delta) == [1, 2, 2.5, 3]
-    softer = _through([1, 2, 1, 2.001, 2.1, 3], [1, 2, 0, 1.999, 2.1, 3])
-    assert list(softer.loading().delta) == [1, 2, 2.1, 3]
-
-
-def test_the_first_loading_may_soften():
-    """Without an unloading every deeper step counts, also where P falls."""
-    assert list(_through([1, 2, 3, 4], [1, 2, 1.9, 2]).loading().P) == [1, 2, 1.9, 2]
+    values = dict.fromkeys(("P", "p0", "eps", "peeq_max"), np.array(P))
+    assert list(replace(curve(0.85), delta=np.array(delta), **values).loading().delta) == kept

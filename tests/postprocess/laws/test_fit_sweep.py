@@ -1,6 +1,7 @@
 """``archord fit SWEEP`` as a user runs it."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +16,16 @@ from archord.studies.cases import read_sweep
 
 SWEEP = """
 list = [
-    {{ pin.nu = 0.3 }},
-    {{ pin.nu = 0.1 }},
-    {{ pin.nu = 0.1, block.yield_stress = 0.002, block.hardening = 0.1 }},
-    {{ pin.nu = 0.1, joint.relative_element_size = 0.2 }},
+    { pin.nu = 0.3 },
+    { pin.nu = 0.1 },
+    { pin.nu = 0.1, block.yield_stress = 0.002, block.hardening = 0.1 },
+    { pin.nu = 0.1, joint.relative_element_size = 0.2 },
 ]
 [base]
-joint = {{ radius = 1.0, relative_clearance = 0.005, relative_element_size = 0.12 }}
-pin = {{ E = 2.0, nu = 0.3 }}
-block = {{ E = 1.0, nu = 0.3 }}
-load = {{ displacement = 2.0, steps = 4 }}
+joint = { radius = 1.0, relative_clearance = 0.005, relative_element_size = 0.12 }
+pin = { E = 2.0, nu = 0.3 }
+block = { E = 1.0, nu = 0.3 }
+load = { displacement = 2.0, steps = 4 }
 """
 
 
@@ -32,7 +33,7 @@ load = {{ displacement = 2.0, steps = 4 }}
 def solved(tmp_path_factory) -> Path:
     """A small sweep: two elastic joints, one of them on two meshes, and one that hardens."""
     folder = tmp_path_factory.mktemp("sweep")
-    (folder / "some.sweep.toml").write_text(SWEEP.replace("{{", "{").replace("}}", "}"))
+    (folder / "some.sweep.toml").write_text(SWEEP)
     assert run(["sweep", str(folder / "some.sweep.toml"), "-o", str(folder / "out"), "-q"]) == 0
     return folder / "out"
 
@@ -54,22 +55,18 @@ def test_a_small_sweep_gets_its_table(solved, capsys):
     assert math.isnan(stored.k_mesh[0])
     assert 0 < stored.k_mesh[1] < 0.01
     assert f"left out: {cases[3].run}: {cases[1].run} is the same joint on a finer mesh" in printed
-    named = next(line for line in printed.splitlines() if line.startswith(f"left out: {cases[2].run}: "))
-    assert "block.hardening = 0.1 does not fit" in named
+    assert re.search(rf"left out: {cases[2].run}: .*block.hardening = 0.1 does not fit", printed)
     assert "elastic cases are too few for a model" in printed
     assert notes["distinct cases"] == "4"
-    judged = next(line for line in printed.splitlines() if line.startswith("| archord's law | strain | none"))
-    cells = [cell.strip() for cell in judged.split("|")]
-    assert cells[4] == "2"
-    assert float(cells[5].rstrip("%")) < 1.0
+    (judged,) = re.findall(r"archord's law . strain . none \(elastic\) . 2 . (.*?)% ", printed)
+    assert float(judged) < 1.0
 
 
 def test_small_blocks_are_named(solved, tmp_path, capsys):
     """k of a case is that of its own block; table and print say that there are such, of wide blocks they do not."""
     assert "small blocks" not in read_cases(solved / "fit.csv")[1]
     listed = "list = [{ joint.block_size = 5.0 }, { joint.block_size = 100.0 }]\n[base]"
-    text = SWEEP.replace("{{", "{").replace("}}", "}")
-    (tmp_path / "blocks.sweep.toml").write_text(listed + text.partition("[base]")[2])
+    (tmp_path / "blocks.sweep.toml").write_text(listed + SWEEP.partition("[base]")[2])
     assert run(["sweep", str(tmp_path / "blocks.sweep.toml"), "-o", str(tmp_path / "out"), "-q"]) == 0
     assert run(["fit", str(tmp_path / "out")]) == 0
     said = "small blocks: P up to about 5.6% smaller than in a wide block, and k, which a model does not know"
@@ -95,12 +92,6 @@ def test_files_of_others_and_inputs_stay(solved, tmp_path, capsys):
     assert run(["fit", str(solved)]) == 0
 
 
-def test_too_few_cases_write_no_law(solved, tmp_path, capsys):
-    assert run(["fit", str(solved), "--law", str(tmp_path / "law.json")]) == 2
-    assert "law.json: no law to write: 2 elastic cases are too few" in capsys.readouterr().err
-    assert not (tmp_path / "law.json").exists()
-
-
 def test_stored_rows_give_the_law_that_is_shipped(tmp_path, capsys):
     """By the documented command; errors are printed, the file holds what is printed; rows give back their file."""
     law = tmp_path / "law.json"
@@ -119,6 +110,7 @@ def test_stored_rows_give_the_law_that_is_shipped(tmp_path, capsys):
     ("words", "said"),
     [
         (["{out}", "{out}"], "a sweep is fitted alone"),
+        (["{out}", "--law", "x.json"], "x.json: no law to write: 2 elastic cases are too few"),
         (["{out}", "--picture", "x.png"], "a sweep is fitted alone; --json, --python and --picture are for runs."),
         (["{run}", "--law", "x.json"], "--law is for a sweep, and this is none."),
         (["nothing.csv"], "nothing.csv: cannot be read"),
