@@ -85,7 +85,9 @@ def _made(build: Callable, adjust: Callable[[Array, int], Array] | None, order: 
     if order == 2:  # in much less time than gmsh's setOrder
         mesh = mesh.second_order()
     if adjust is not None:
-        mesh.adjust(adjust)
+        for tag in np.unique(mesh.tags):
+            nodes = np.unique(mesh.edges[mesh.tags == tag])
+            mesh.x[nodes] = adjust(mesh.x[nodes], int(tag))
     return mesh
 
 

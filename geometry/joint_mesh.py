@@ -98,8 +98,8 @@ def mesh_joint(
     def exact(x: Array, tag: int) -> Array:
         return on_circle(x, *circles[Facets(tag)]) if tag in circles else x
 
-    options = {"order": degree, "refinements": refinements, "partitioner": partitioner}
-    joint = gmsh_to_mesh(comm, build, exact, **options, key=key)
+    how = {"order": degree, "refinements": refinements, "partitioner": partitioner}
+    joint = gmsh_to_mesh(comm, build, exact, **how, key=key)
     joint.mesh.geometry.x[:] *= radius
     return joint
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import basix
@@ -56,12 +55,6 @@ class PlaneMesh:
         of_cells, of_edges = np.split(len(self.x) + which, [3 * len(self.cells)])
         cells, edges = np.hstack([self.cells, of_cells.reshape(-1, 3)]), np.column_stack([self.edges, of_edges])
         return replace(self, x=x, cells=cells, edges=edges)
-
-    def adjust(self, move: Callable[[Array, int], Array]) -> None:
-        """Put the nodes ``x`` ``(n, 2)`` of each curve where ``move(x, tag)`` says."""
-        for tag in np.unique(self.tags):
-            nodes = np.unique(self.edges[self.tags == tag])
-            self.x[nodes] = move(self.x[nodes], int(tag))
 
 
 def distinct_edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
