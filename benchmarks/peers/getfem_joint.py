@@ -2,8 +2,7 @@
 
 Needs Debian's python3-getfem and python3-gmsh, and nothing of archord but `joint_script` beside it.
 
-- Bodies: curved second-order triangles (gmsh's, nodes on the circles), P2 displacements. Elements have the size h on
-  the arcs and grow by 0.25 times the distance from there, below h = 0.04 by 6.25 h times.
+- Bodies: curved second-order triangles (gmsh's, nodes on the circles), P2 displacements.
 - Contact: kinematics "current", GetFEM's integral large sliding contact brick with raytracing from the pin's deformed
   arc to the hole's, without friction: augmented Lagrangian, P1 multipliers on the pin's arc, augmentation E*/h
   (Poulios and Renard 2015).

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,50 +22,43 @@ class Peer:
     from coarse to fine for each case; one run may take ``time_limit`` seconds."""
 
     label: str
-    script: Path
+    script: str
     series: Mapping[str, tuple[tuple[float, int], ...]]
-    time_limit: float = 300.0
-    python: str = sys.executable
+    python: str = str(PLACE)
     version: str = ""
+    time_limit: float = 300.0
 
     def command(self, case: str, size: float, order: int, steps: int, output: Path) -> list[str]:
         """The command line that solves ``case`` and writes its result, JSON, to ``output``."""
         options = {"--case": case, "--size": size, "--order": order, "--steps": steps, "--output": output}
-        return [self.python, str(self.script), *(str(word) for option in options.items() for word in option)]
+        return [*self._start, *(str(word) for option in options.items() for word in option)]
+
+    @property
+    def _start(self) -> list[str]:
+        return [self.python, str(Path(__file__).with_name(self.script))]
+
+    def probe(self) -> str | None:
+        """The version of the code, None if it is not here."""
+        try:
+            done = subprocess.run([*self._start, "--probe"], capture_output=True, text=True, timeout=_PROBE_LIMIT)
+        except (OSError, subprocess.TimeoutExpired):
+            return None
+        return done.stdout.strip() if done.returncode == 0 else None
 
 
-def _peer(label: str, script: str, **sizes: Mapping[int, Sequence[float]]) -> Peer:
-    """The peer ``label`` with its element sizes by order for each case."""
-    series = {case: tuple((size, order) for order in known for size in known[order]) for case, known in sizes.items()}
-    return Peer(label, Path(__file__).with_name(script), series)
-
-
-_EACH = (0.16, 0.08, 0.04, 0.02)
+_COARSE = ((0.16, 2), (0.08, 2), (0.04, 2), (0.02, 2))
+_HIGH = ((0.16, 4), (0.08, 4), (0.04, 4), (0.02, 4))
 PEERS = (
-    _peer("scikit-fem", "skfem_joint.py", elastic={2: (*_EACH, 0.01)}, plastic={2: _EACH}),
-    _peer("GetFEM", "getfem_joint.py", elastic={2: _EACH}, plastic={2: _EACH}),
-    _peer("NGSolve", "ngsolve_joint.py", elastic={2: _EACH[1:], 4: _EACH}, plastic={2: _EACH[1:], 4: _EACH[:3]}),
+    Peer("scikit-fem", "skfem_joint.py", {"elastic": (*_COARSE, (0.01, 2)), "plastic": _COARSE}),
+    # of the image target peers
+    Peer("GetFEM", "getfem_joint.py", {"elastic": _COARSE, "plastic": _COARSE}, sys.executable),
+    Peer("NGSolve", "ngsolve_joint.py", {"elastic": _COARSE[1:] + _HIGH, "plastic": _COARSE[1:] + _HIGH[:3]}),
 )
 
 
-def probe(peer: Peer, python: str) -> str | None:
-    """The version of the peer's code that ``python`` has, None if it has none."""
-    try:
-        command = [python, str(peer.script), "--probe"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_PROBE_LIMIT)
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    return done.stdout.strip() if done.returncode == 0 else None
-
-
-def installed(pythons: Sequence[str] = (str(PLACE), sys.executable)) -> list[Peer]:
-    """The peers that run here, each with its version and the first of the interpreters ``pythons`` that has it: that of
-    the environment (scikit-fem, NGSolve), then this one (GetFEM, which the image target ``peers`` has)."""
-    found = []
-    for peer in PEERS:
-        versions = ((python, probe(peer, python)) for python in pythons)
-        found += [replace(peer, python=python, version=v) for python, v in versions if v is not None][:1]
-    return found
+def installed() -> list[Peer]:
+    """The peers that run here, each with its version."""
+    return [replace(peer, version=version) for peer in PEERS if (version := peer.probe()) is not None]
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """What the scripts ``*_joint.py`` share: the paper's quarter joint, its mesh by gmsh, the load path, the command line.
 
 They need nothing of archord, and start with ``python3 skfem_joint.py --case plastic --steps 20 --output r.json``.
-Units: R = 1, E* = 1. Plane strain, small strains; perfect J2 plasticity.
+Units: R = 1, E* = 1. Plane strain, small strains; perfect J2 plasticity. Elements have the size h on the arcs and grow
+by 0.25 times the distance from there, below h = 0.04 by 6.25 h times.
 
 Each has a class ``Joint(size, growth, order, plastic)``: half of the joint below the pin's diameter, discretised, with
 ``dofs``, the unloaded state ``zero`` (a state holds all displacements, and can be added and multiplied by numbers) and
@@ -111,10 +112,9 @@ def main(joint, kinematics: str, version: str, orders: tuple[int, ...] = (2,)) -
     parser.add_argument("--probe", action="version", version=version, help="print the code's version")
     options = parser.parse_args()
     made = joint(options.size, min(0.25, 6.25 * options.size), options.order, options.case == "plastic")
-    result: dict = {"kinematics": kinematics, "P": None, "p0": None, "eps": None, "iterations": 0, "failed": None}
+    result = {"kinematics": kinematics, "dofs": made.dofs, "failed": None}
     try:
-        result["iterations"] = load(made, options.steps, 2 * DR)
-        result |= made.results()
+        result |= {"iterations": load(made, options.steps, 2 * DR)} | made.results()
     except RuntimeError as error:
         result["failed"] = str(error)
-    options.output.write_text(json.dumps(result | {"dofs": made.dofs}), encoding="utf-8")
+    options.output.write_text(json.dumps(result), encoding="utf-8")

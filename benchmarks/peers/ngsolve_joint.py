@@ -2,9 +2,8 @@
 
 Needs NGSolve (of PyPI) and nothing of archord but `joint_script` beside it.
 
-- Bodies: Netgen's triangles, curved to the order of the displacements (2 to 4). Edges have the size h on the arcs and
-  grow by 0.25 times the distance from there, below h = 0.04 by 6.25 h times. With Netgen's grading that large P2
-  elements are coarser than gmsh's and four times as wrong: 0.6 of it makes about as many.
+- Bodies: Netgen's triangles, curved to the order of the displacements (2 to 4). With Netgen's grading large P2 elements
+  are coarser than gmsh's and four times as wrong: 0.6 of it makes about as many.
 - Contact: kinematics "reference", NGSolve's ContactBoundary paired once, in the touching configuration: a linear gap
   along the pin's normal, and the energy k/2 <-g>^2 with k = 1e5 E*/R (penalty).
 - Plasticity: J2, perfect, backward Euler. A step minimises the incremental energy, which for the elastic trial
@@ -110,7 +109,7 @@ class Joint:
             self.next.Interpolate(self.returned)
             self.strain.vec.data = self.next.vec
 
-    def results(self) -> dict[str, float | None]:
+    def results(self) -> dict[str, float]:
         """Force of the whole joint; what presses on a point, NGSolve does not tell."""
         return {"P": 2 * self.reaction}
 

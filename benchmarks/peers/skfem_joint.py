@@ -3,7 +3,6 @@
 Needs scikit-fem, gmsh and pypardiso (all of PyPI), and nothing of archord but `joint_script` beside it.
 
 - Bodies: MeshTri2 (gmsh's second-order triangles, nodes on the circles), P2 displacements, three points a triangle.
-  Elements have the size h on the arcs and grow by 0.25 times the distance from there, below h = 0.04 by 6.25 h times.
 - Contact: kinematics "reference". A point x of the pin's arc, with its normal n, faces the point y of the hole on
   that normal in the touching configuration; the gap g = (y - x) . n - (u(x) - u(y)) . n is linear and the pressure is
   k <-g>, k = 1e5 E*/R (penalty). Two Gauss points a facet, as many as it has own nodes.
@@ -23,8 +22,6 @@ import numpy as np
 import skfem
 from joint_script import BLOCK, DR, LAME, MU, PENALTY, PIN, SIGY, R, axis_pressure, main, mesh_bodies, newton
 from scipy import sparse
-
-POINTS = 2  # of contact on a facet
 
 
 class UpperTriangle:
@@ -95,8 +92,8 @@ class Joint:
 
     def __init__(self, size: float, growth: float, order: int, plastic: bool) -> None:
         points, cells = mesh_bodies(size, growth, PIN, BLOCK)
-        triangles = skfem.MeshTri2(points.T, cells.T)
-        basis = skfem.Basis(triangles, skfem.ElementVector(skfem.ElementTriP2()), intorder=2)
+        mesh, element = skfem.MeshTri2(points.T, cells.T), skfem.ElementVector(skfem.ElementTriP2())
+        basis = skfem.Basis(mesh, element, intorder=2)
         self.plastic, self.sigy = plastic, np.inf
         self.dofs, self.cells, self.zero = int(basis.N), len(cells), np.zeros(basis.N)
         grad = np.stack([basis.basis[a][0].grad for a in range(12)], axis=-1)  # (2, 2, m, q, 12)
@@ -114,31 +111,29 @@ class Joint:
         fixed[self.top] = True
         self.free = ~fixed
 
-        contact = self._pair(triangles, basis)
-        self.rows = np.concatenate([basis.element_dofs.T, contact])
+        self.rows = np.concatenate([basis.element_dofs.T, self._pair(basis)])
         self.system = UpperTriangle(self.rows, np.where(fixed, -1, np.cumsum(~fixed) - 1))
         self.C = return_map(np.zeros((1, 1, 3)), np.zeros((1, 1, 4)), np.inf)[1][0, 0]
         self.unyielding = self._element_matrices(self.C[None, None])
 
-    def _pair(self, mesh, basis):
-        """Contact points ``(f, g)`` on the pin's arc and their points on the hole; returns their dofs ``(f g, 12)``."""
+    def _pair(self, basis):
+        """Contact points ``(f, 2)`` on the pin's arc and their points on the hole; returns their dofs ``(f 2, 12)``."""
 
         def arc(centre, radius):
-            """Dofs ``(f, 3, 2)`` and nodes ``(f, 3, 2)`` of the facets on a circle, from the axis on."""
-            on = np.abs(np.hypot(mesh.p[0], mesh.p[1] - centre) - radius) < 1e-9
-            facets = mesh.boundary_facets()
-            facets = facets[on[mesh.facets[:, facets]].all(0)]
-            ends = np.take_along_axis(mesh.facets[:, facets], np.argsort(mesh.p[0][mesh.facets[:, facets]], axis=0), 0)
-            order = np.argsort(mesh.p[0][ends[0]])
-            dofs = np.stack([basis.nodal_dofs[:, ends[0]], basis.nodal_dofs[:, ends[1]], basis.facet_dofs[:, facets]])
-            dofs = dofs.transpose(2, 0, 1)[order]
+            """Dofs ``(f, 3, 2)`` and nodes ``(f, 3, 2)`` of the facets on a circle, ends and midpoint, from the axis
+            on."""
+            dofs = basis.element_dofs.T.reshape(-1, 6, 2)[:, [[0, 1, 3], [1, 2, 4], [0, 2, 5]]].reshape(-1, 3, 2)
+            x, y = basis.doflocs[:, dofs[..., 0]]
+            on = (np.abs(np.hypot(x, y - centre) - radius) < 1e-9).all(axis=1)
+            dofs = np.take_along_axis(dofs[on], np.argsort(x[on], axis=1)[:, [0, 2, 1], None], axis=1)
+            dofs = dofs[np.argsort(x[on].min(axis=1))]
             return dofs, basis.doflocs[:, dofs[..., 0]].transpose(1, 2, 0)
 
         def angle(x):
             """About the pin's centre, from the axis."""
             return np.arctan2(x[..., 0], -x[..., 1] - DR)
 
-        gauss, weights = np.polynomial.legendre.leggauss(POINTS)
+        gauss, weights = np.polynomial.legendre.leggauss(2)
         (pin, pin_nodes), (hole, hole_nodes) = arc(*PIN), arc(*BLOCK)
         N = shapes(gauss)
         x = N @ pin_nodes
