@@ -88,7 +88,9 @@ def law(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LawRangeWarning)
         if plot:
-            check_target(plot, [scene] if scene else [], force=True)
+            from archord.scene.file import files_read
+
+            check_target(plot, files_read(scene, overrides) if scene else [], force=True)
             said = [draw_laws(chosen, joint, plot, by_load, to, extrapolate)]
         else:
             said = [law_table(entry, joint, by_load, to, points, extrapolate, units) for entry in chosen]

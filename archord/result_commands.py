@@ -114,13 +114,13 @@ def export_deck(scene: Path, output: Path | None, elements: Elements, overrides:
     """Write a scene as an input deck for CalculiX or Abaqus."""
     from archord.output.user_file import check_target, writing
     from archord.postprocess.deck import deck, deck_mesh
-    from archord.scene.file import load_scene
+    from archord.scene.file import files_read, load_scene
 
     checked = load_scene(scene, overrides)
     if checked.joint.is_ring:
         raise InputError(f'{scene}: joint.model = "ring" cannot be exported; only "block" can.')
     path = output or Path(f"{scene.stem}.inp")
-    check_target(path, [scene], force=force)
+    check_target(path, files_read(scene, overrides), force=force)
     with writing(path):
         path.write_text(deck(checked, deck_mesh(checked, elements)), encoding="utf-8")
     print(path)

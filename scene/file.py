@@ -32,6 +32,16 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     return parse_scene(data, str(path), origin)
 
 
+def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
+    """The files that `load_scene` reads: the scene and, if it has one, that of its load.path. Raises `InputError`."""
+    data = read_toml(path)
+    for override in overrides:
+        override_key(data, override)
+    load = data.get("load")
+    targets = load.get("path") if isinstance(load, dict) else None
+    return [path, path.parent / targets] if isinstance(targets, str) else [path]
+
+
 def _give_way(data: dict[str, Any], overrides: Sequence[str]) -> None:
     """Drop from the file's ``data`` a mesh and steps if an accuracy is given instead, and the other way round."""
     given = {key.strip() for key, _, value in (o.partition("=") for o in overrides) if value.strip()}

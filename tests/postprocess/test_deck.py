@@ -172,6 +172,11 @@ def test_the_command_writes_a_deck_and_nothing_over_what_is_there(tmp_path, monk
     text = (tmp_path / "joint.inp").read_text()
     assert (text.count("*STEP"), text.count("TYPE=CPE3")) == (2, 2)
     assert refused(["export-deck", "joint.toml"]).startswith("joint.inp: is there already; choose another file")
-    said = "joint.toml: cannot be written: it is an input of the command.\n"
-    assert refused(["export-deck", "joint.toml", "--force", "-o", "joint.toml"]) == said
+    (tmp_path / "path.csv").write_text("displacement\n0.01\n")
+    with_path = [f"--set=load.{key}=" for key in ("displacement", "relative_displacement")] + [
+        "--set=load.path=path.csv"
+    ]
+    for name in ("joint.toml", "path.csv"):
+        said = f"{name}: cannot be written: it is an input of the command.\n"
+        assert refused(["export-deck", "joint.toml", *with_path, "--force", "-o", name]) == said
     assert (tmp_path / "joint.inp").read_text() == text
