@@ -85,6 +85,7 @@ def law(
         raise InputError(f"--points {points}: must be between 1 and 100000.")
     joint, units = _joint(scene, overrides, given)
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
+    said: list[object]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LawRangeWarning)
         if plot:

@@ -72,7 +72,7 @@ def fit(
         raise ValueError("the points do not determine the parameters")
     errors = np.full(m, np.inf)
     errors[felt] = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)) * (best.fun @ best.fun) / (n - m)) / size[felt]
-    return best.x.tolist(), errors.tolist()
+    return [float(value) for value in best.x], [float(error) for error in errors]
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class CurveFit:
     @property
     def largest(self) -> float:
         """The largest relative residual, with its sign."""
-        return float(max(self.relative, key=abs))
+        return float(self.relative[np.abs(self.relative).argmax()])
 
     @property
     def r2(self) -> float:
@@ -148,7 +148,7 @@ def fit_curve(groups: list[Refined], load_range: tuple[float, float] = (0.0, np.
     def scaled(data: Iterable[Array]) -> list[Array]:
         return [y[rows] / _scale(quantity, run) for y, run, rows in zip(data, runs, chosen, strict=True)]
 
-    def law(values: Sequence[float]) -> list[Array]:
+    def law(values: Sequence[float] | Array) -> list[Array]:
         return [dimensionless_law(quantity, run, run.delta[rows], *map(float, values))
                 for run, rows in zip(runs, chosen, strict=True)]  # fmt: skip
 

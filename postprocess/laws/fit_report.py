@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +18,10 @@ _BENT = 0.5  # serial correlation that noise in ten steps or more hardly ever re
 _COLUMNS = ("run", "of", "value", "s.e.", "mesh", "95 % interval", "R2", "rms", "largest", "steps")
 
 
-def parameters(calibration: Calibration) -> list[dict[str, object]]:
+def parameters(calibration: Calibration) -> list[dict[str, Any]]:
     """One row per fitted parameter, in numbers: value, errors (None where that of the mesh is unknown), interval,
     quality of the fit."""
-    rows: list[dict[str, object]] = []
+    rows: list[dict[str, Any]] = []
     named = [(fit.residuals[0].name, fit) for fit in calibration.each]
     if len(calibration.scenes) > 1:
         named.append(("all together", calibration.joint))

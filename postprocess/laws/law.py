@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -28,8 +27,8 @@ class LawState:
     delta: Array
     load: Array
     stiffness: Array
-    peak_pressure: Array | float = math.nan
-    angle: Array | float = math.nan
+    peak_pressure: Array = field(default_factory=lambda: np.array(np.nan))
+    angle: Array = field(default_factory=lambda: np.array(np.nan))
 
 
 @dataclass(frozen=True)

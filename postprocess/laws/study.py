@@ -132,7 +132,7 @@ def summary(found: pd.DataFrame) -> dict[str, Any]:
     """Of `errors`: number of cases; rms and largest of each error."""
     said: dict[str, Any] = {"cases": int((found.what == "k").sum())}
     for what, off in found.dropna().groupby("what").off:
-        said[what] = {"rms": round(math.sqrt((off**2).mean()), 5), "largest": round(max(off, key=abs), 5)}
+        said[what] = {"rms": round(math.sqrt((off**2).mean()), 5), "largest": round(off.iloc[off.abs().argmax()], 5)}
     return said
 
 
