@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from dolfinx import fem
+from dolfinx.graph import adjacencylist
 from dolfinx.mesh import Mesh, MeshTags
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -34,6 +36,17 @@ PERFECT = J2Material(E, NU, "strain", LinearHardening(YIELD_STRESS))
 HARDENING = J2Material(E, NU, "strain", LinearHardening(YIELD_STRESS, 0.1 * E))
 PLANE_STRESS = J2Material(E, NU, "stress", LinearHardening(YIELD_STRESS, 0.02 * E))
 R, DR = 1.0, 0.005
+
+
+def partition(owner: Callable[[np.ndarray, np.ndarray], np.ndarray]):
+    """Partitioner that sends cell ``i`` with vertices ``v`` to the rank ``owner(i, v) % size``."""
+
+    def partitioner(comm, n_parts, cell_types, cells):
+        mine = np.asarray(cells[0]).reshape(-1, 3)
+        rank = owner((comm.exscan(len(mine)) or 0) + np.arange(len(mine)), mine) % n_parts
+        return adjacencylist(rank.astype(np.int32), np.arange(len(mine) + 1, dtype=np.int32))
+
+    return partitioner
 
 
 def space(mesh: Mesh) -> fem.FunctionSpace:
@@ -137,37 +150,33 @@ def interact(surfaces, *, kinematics="current", integrated=None, **options) -> C
     )
 
 
-def blocks(comm: MPI.Comm, *edges: int) -> TaggedMesh:
-    """Unit squares on top of each other from y = -1, with so many ``edges`` on each of their sides.
+def blocks(comm: MPI.Comm, *edges: int, width: float = 1.0) -> TaggedMesh:
+    """Rectangles of a ``width`` and height 1 on top of each other from y = -1, with so many ``edges`` on their sides.
 
     Sets are "lower", "middle" (of three) and "upper", their tops and bottoms, all "left" and all "right" sides; "base"
     and "lid" are the outermost bottom and top.
     """
     names = ("lower", "middle", "upper") if len(edges) == 3 else ("lower", "upper")
-    left, right = 2 * len(edges) + 1, 2 * len(edges) + 2
 
     def build(gmsh) -> None:
-        geo = gmsh.model.geo
-        sides: dict[int, list[int]] = {left: [], right: []}
-        for k, n in enumerate(edges):
-            corners = [geo.addPoint(x, y, 0) for x, y in ((0, k - 1), (1, k - 1), (1, k), (0, k))]
-            lines = [geo.addLine(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
-            face = geo.addPlaneSurface([geo.addCurveLoop(lines)])
-            for line in lines:
-                geo.mesh.setTransfiniteCurve(line, n + 1)
-            geo.synchronize()
-            gmsh.model.addPhysicalGroup(2, [face], k + 1)
-            for tag, line in ((2 * k + 1, lines[0]), (2 * k + 2, lines[2])):
-                gmsh.model.addPhysicalGroup(1, [line], tag)
-            sides[right].append(lines[1])
-            sides[left].append(lines[3])
-        for tag, group in sides.items():
-            gmsh.model.addPhysicalGroup(1, group, tag)
+        walls: dict[str, list[int]] = {"left": [], "right": []}
+        for k, (name, n) in enumerate(zip(names, edges, strict=True)):
+            face = gmsh.model.occ.addRectangle(0, k - 1, 0, width, 1)
+            gmsh.model.occ.synchronize()
+            gmsh.model.addPhysicalGroup(2, [face], name=name)
+            bottom, right, top, left = (line for _, line in gmsh.model.getBoundary([(2, face)], oriented=False))
+            for line in (bottom, right, top, left):
+                gmsh.model.mesh.setTransfiniteCurve(line, n + 1)
+            gmsh.model.addPhysicalGroup(1, [bottom], name=f"{name} bottom")
+            gmsh.model.addPhysicalGroup(1, [top], name=f"{name} top")
+            walls["left"].append(left)
+            walls["right"].append(right)
+        for name, lines in walls.items():
+            gmsh.model.addPhysicalGroup(1, lines, name=name)
 
-    facets = {f"{name} {end}": 2 * k + e for k, name in enumerate(names) for e, end in ((1, "bottom"), (2, "top"))}
-    facets |= {"base": 1, "lid": 2 * len(edges), "left": left, "right": right}
-    cells = {name: k for k, name in enumerate(names, 1)}
-    return replace(gmsh_to_mesh(comm, build), cell_sets=cells, facet_sets=facets)
+    mesh = gmsh_to_mesh(comm, build)
+    sets = mesh.facet_sets
+    return replace(mesh, facet_sets={**sets, "base": sets["lower bottom"], "lid": sets["upper top"]})
 
 
 INNER, OUTER, ON_X, ON_Y = range(1, 5)

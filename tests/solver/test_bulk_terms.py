@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 from archord.materials.elasticity import von_mises
@@ -47,6 +48,12 @@ def warped_annulus(comm, size=0.4):
     return mesh, tagged.cells, tagged.facets
 
 
+@pytest.fixture
+def bulk_of(warped):
+    """``bulk_of(material)`` is the bulk of the warped annulus."""
+    return lambda material: Bulk(space(warped[0]), warped[1], {1: material})
+
+
 def stiffness(bulk):
     """Tangent of the last update, without supports."""
     A = matrix(bulk.V, bulk.pattern_forms())
@@ -57,10 +64,9 @@ def stiffness(bulk):
 
 
 @every_material
-def test_a_free_body_has_three_rigid_motions_and_no_other(material, warped):
+def test_a_free_body_has_three_rigid_motions_and_no_other(material, bulk_of):
     """Exactly three zero eigenvalues: the three-point rule leaves no spurious mode."""
-    mesh, cells, _ = warped
-    bulk = Bulk(space(mesh), cells, {1: material})
+    bulk = bulk_of(material)
     bulk.update(np.zeros((n_nodes(bulk.V), 2)))
     K = stiffness(bulk).toarray()
     np.testing.assert_allclose(K, K.T, rtol=0, atol=1e-14 * np.abs(K).max())
@@ -97,12 +103,10 @@ def test_patch(material, amount, comm):
 
 
 @every_material
-def test_the_tangent_is_the_derivative_of_the_internal_force(material, warped):
+def test_the_tangent_is_the_derivative_of_the_internal_force(material, bulk_of):
     """Central differences in random directions, from a state with a history and partly yielding."""
-    mesh, cells, _ = warped
-    V = space(mesh)
-    bulk = Bulk(V, cells, {1: material})
-    x = coordinates(V)
+    bulk = bulk_of(material)
+    x = coordinates(bulk.V)
     rng = np.random.default_rng(0)
     for step in (1.0, 1.5):
         u = step * YIELD_STRAIN * np.stack([np.sin(x[:, 0] + x[:, 1]), x[:, 1] ** 2 / 4], axis=1)
@@ -129,10 +133,9 @@ def test_the_tangent_is_the_derivative_of_the_internal_force(material, warped):
 
 
 @every_material
-def test_internal_forces_do_no_work_on_rigid_motions(material, warped):
+def test_internal_forces_do_no_work_on_rigid_motions(material, bulk_of):
     """Their sum and their moment are zero to round-off, whatever the displacement."""
-    mesh, cells, _ = warped
-    bulk = Bulk(space(mesh), cells, {1: material})
+    bulk = bulk_of(material)
     x = coordinates(bulk.V)
     force = internal_force(bulk, YIELD_STRAIN * np.random.default_rng(0).normal(size=x.shape))
     size = np.abs(force).sum()
@@ -140,14 +143,12 @@ def test_internal_forces_do_no_work_on_rigid_motions(material, warped):
     assert abs((x[:, 0] * force[:, 1] - x[:, 1] * force[:, 0]).sum()) < 1e-14 * size
 
 
-def test_elastic_energy_is_half_the_work_of_the_forces(warped):
+def test_elastic_energy_is_half_the_work_of_the_forces(bulk_of):
     """u . f / 2, for the body with a constant matrix and for the plastic body below yield."""
-    mesh, cells, _ = warped
-    V = space(mesh)
-    u = 1e-3 * YIELD_STRAIN * np.random.default_rng(0).normal(size=(n_nodes(V), 2))
     energies = []
     for material in (ELASTIC, PERFECT):
-        bulk = Bulk(V, cells, {1: material})
+        bulk = bulk_of(material)
+        u = 1e-3 * YIELD_STRAIN * np.random.default_rng(0).normal(size=(n_nodes(bulk.V), 2))
         force = internal_force(bulk, u)
         stored, dissipated = bulk.energies(u)
         assert stored == pytest.approx((u * force).sum() / 2, rel=1e-12)
@@ -157,12 +158,10 @@ def test_elastic_energy_is_half_the_work_of_the_forces(warped):
 
 
 @plastic_materials
-def test_an_update_without_commit_leaves_no_trace(material, warped):
+def test_an_update_without_commit_leaves_no_trace(material, bulk_of):
     """Forces after an excursion far beyond yield are those of a body that never made it."""
-    mesh, cells, _ = warped
-    V = space(mesh)
-    bulk = Bulk(V, cells, {1: material})
-    u = 0.3 * YIELD_STRAIN * np.random.default_rng(0).normal(size=(n_nodes(V), 2))
+    bulk = bulk_of(material)
+    u = 0.3 * YIELD_STRAIN * np.random.default_rng(0).normal(size=(n_nodes(bulk.V), 2))
     before = internal_force(bulk, u)
     internal_force(bulk, 50 * u)
     np.testing.assert_array_equal(internal_force(bulk, u), before)
@@ -172,18 +171,12 @@ def test_an_update_without_commit_leaves_no_trace(material, warped):
     assert np.abs(internal_force(bulk, u) - before).max() > 0.1 * np.abs(before).max()
 
 
-def test_bodies_keep_their_own_materials(warped):
-    """Two bodies, one elastic and one plastic: the force is the sum of what each gives alone."""
-    from dolfinx.mesh import meshtags
-
-    mesh, _, _ = warped
-    n = mesh.topology.index_map(2).size_local
-    tags = meshtags(mesh, 2, np.arange(n, dtype=np.int32), np.where(np.arange(n) < n // 2, 1, 2).astype(np.int32))
-    V = space(mesh)
+@pytest.mark.parametrize("first", [ELASTIC, HARDENING], ids=["elastic", "hardening"])
+def test_bodies_keep_their_own_materials(first, warped):
+    """Two bodies, the second plastic: the force is the sum of what each gives alone."""
+    V = space(warped[0])
+    n = V.mesh.topology.index_map(2).size_local
+    tags = meshtags(V.mesh, 2, np.arange(n, dtype=np.int32), np.where(np.arange(n) < n // 2, 1, 2).astype(np.int32))
     u = YIELD_STRAIN * np.random.default_rng(0).normal(size=(n_nodes(V), 2))
-    together = internal_force(Bulk(V, tags, {1: ELASTIC, 2: PERFECT}), u)
-    apart = internal_force(Bulk(V, tags, {1: ELASTIC}), u) + internal_force(Bulk(V, tags, {2: PERFECT}), u)
-    np.testing.assert_allclose(together, apart, rtol=0, atol=1e-15 * E)
-    plastic = internal_force(Bulk(V, tags, {1: HARDENING, 2: PERFECT}), u)
-    apart = internal_force(Bulk(V, tags, {1: HARDENING}), u) + internal_force(Bulk(V, tags, {2: PERFECT}), u)
-    np.testing.assert_allclose(plastic, apart, rtol=0, atol=1e-15 * E)
+    together, *apart = (internal_force(Bulk(V, tags, m), u) for m in ({1: first, 2: PERFECT}, {1: first}, {2: PERFECT}))
+    np.testing.assert_allclose(together, sum(apart), rtol=0, atol=1e-15 * E)

@@ -72,16 +72,11 @@ def test_iterations_hardly_grow_with_the_mesh(tmp_path):
 def test_a_coarse_joint_that_fails_is_left_behind(tmp_path, monkeypatch, always):
     """The fine joint goes on by itself."""
     scene = paper_joint(0.1, 4, yield_stress=0.002)
-    plain = solve_scene(scene, _made(tmp_path / "plain"), MPI.COMM_SELF)
-    make = preset._coarser
-    easy = {"max_iterations": 2}
-    monkeypatch.setattr(
-        preset,
-        "_coarser",
-        lambda s: make(s).model_copy(update={"analysis": make(s).analysis.model_copy(update=easy)}),
-    )
-    outcome = solve_scene(scene, _made(tmp_path / "left"), MPI.COMM_SELF)
-    assert [m.P for m in outcome.steps] == pytest.approx([m.P for m in plain.steps], rel=1e-8)
+    plain, _ = run(scene, tmp_path / "plain")
+    make, few = preset._coarser, {"max_iterations": 2}
+    coarser = lambda s: make(s).model_copy(update={"analysis": make(s).analysis.model_copy(update=few)})  # noqa: E731
+    monkeypatch.setattr(preset, "_coarser", coarser)
+    assert [m.P for m in run(scene, tmp_path / "left")[0]] == pytest.approx([m.P for m in plain], rel=1e-8)
 
 
 def test_a_mesh_too_coarse_for_the_contact_is_gone_without(monkeypatch, always):
@@ -102,15 +97,9 @@ def test_cut_steps_take_the_coarse_joint_back_too(tmp_path, monkeypatch, always)
     """Where few iterations are allowed steps are cut, and both joints go the same way."""
     scene = paper_joint(0.1, 3, yield_stress=0.002, analysis={"max_iterations": 5})
     scene = scene.model_copy(update={"stepping": Stepping(minimum=0.01)})
-    outcome = solve_scene(scene, _made(tmp_path / "cut"), MPI.COMM_SELF)
-    assert outcome.status == "done"
-    assert sum(m.cutbacks for m in outcome.steps) > 0
-    assert all(np.isfinite(m.P) for m in outcome.steps)
-
-
-def _made(folder):
-    folder.mkdir()
-    return folder
+    steps, _ = run(scene, tmp_path / "cut")
+    assert sum(m.cutbacks for m in steps) > 0
+    assert all(np.isfinite(m.P) for m in steps)
 
 
 @pytest.mark.mpi

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from tests.solver.parts import partition
 from tests.solver.solving import SEVERAL, E, scene, solve
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "quarter_joint.json").read_text())
@@ -35,19 +36,16 @@ def test_elastic_contact_angle_and_peak_pressure():
     assert last.p0 == pytest.approx(profile["p0_over_Estar"], rel=5e-3)
 
 
-def test_plastic_force_agrees_with_independent_solvers():
-    """P(2 dR) within 0.2 % of GetFEM's and NGSolve's 0.006692, in at most 7 iterations a step and without cutback."""
-    solution = solve(scene(0.02, steps=20, yield_stress=0.002, joint={"growth": 0.5}))
-    assert pytest.approx(0.006692, rel=2e-3) == solution.steps[-1].P
-    assert sum(m.iterations for m in solution.steps) <= 7 * 20
-    assert sum(m.cutbacks for m in solution.steps) == 0
-
-
-def test_the_finest_plastic_mesh_completes():
-    """0.5 %R elements, perfect plasticity with shear bands: the same force."""
-    solution = solve(scene(0.005, steps=20, yield_stress=0.002, joint={"growth": 0.5}))
+@pytest.mark.parametrize("size", [0.02, 0.005])
+def test_plastic_force_agrees_with_independent_solvers(size):
+    """P(2 dR) within 0.2 % of GetFEM's and NGSolve's 0.006692, without cutback, on 2 %R in at most 7 iterations a step;
+    on the finest mesh, with its shear bands, as well."""
+    solution = solve(scene(size, steps=20, yield_stress=0.002, joint={"growth": 0.5}))
     assert len(solution.steps) == 20
     assert pytest.approx(0.006692, rel=2e-3) == solution.steps[-1].P
+    if size == 0.02:
+        assert sum(m.iterations for m in solution.steps) <= 7 * 20
+        assert sum(m.cutbacks for m in solution.steps) == 0
 
 
 VARIANTS = {
@@ -81,16 +79,15 @@ def test_a_projected_pressure_has_no_more_than_its_force():
         assert 2 * (p.pressure * p.weight * np.cos(p.angle)).sum() == pytest.approx(solution.steps[-1].P, rel=1e-2)
 
 
-def test_one_sided_integration_converges_to_the_same_force():
-    """Pin's, block's and both sides' integrals differ by the discretisation error only."""
-    forces = [solve(scene(steps=1, analysis={"integration": i})).steps[-1].P for i in ("both", "pin", "block")]
-    assert forces == pytest.approx([forces[0]] * 3, rel=2e-4)
-
-
-def test_gamma_does_not_matter():
-    """Nitsche is consistent: gamma over a range of 20 moves P within the discretisation error."""
-    forces = [solve(scene(steps=1, analysis={"gamma_factor": g})).steps[-1].P for g in (0.5, 2.0, 10.0)]
-    assert forces == pytest.approx([forces[0]] * 3, rel=1e-4)
+@pytest.mark.parametrize(
+    ("key", "values", "within"),
+    [("integration", ("both", "pin", "block"), 2e-4), ("gamma_factor", (0.5, 2.0, 10.0), 1e-4)],
+)
+def test_what_the_form_leaves_open_does_not_matter(key, values, within):
+    """Which sides are integrated, and gamma over a range of 20, move P by the discretisation error: the form is
+    consistent."""
+    forces = [solve(scene(steps=1, analysis={key: value})).steps[-1].P for value in values]
+    assert forces == pytest.approx([forces[0]] * 3, rel=within)
 
 
 EXTREMES = {
@@ -177,29 +174,15 @@ def test_results_do_not_depend_on_the_units(sigma_y):
     assert rows[0] == pytest.approx(rows[1], rel=1e-9)
 
 
-def _deal(owner):
-    """A cell partitioner that gives cell ``i`` of ``n`` to the rank ``owner(i, n, size)``."""
-    from dolfinx.graph import adjacencylist
-
-    def partition(comm, n_parts, cell_types, cells):
-        n = len(np.asarray(cells[0])) // 3
-        total = comm.allreduce(n)
-        first = comm.exscan(n) or 0
-        parts = owner(np.arange(first, first + n), total, n_parts) % n_parts
-        return adjacencylist(parts.astype(np.int32), np.arange(n + 1, dtype=np.int32))
-
-    return partition
-
-
 CUT = [
     ("plastic", "dealt round"),
     ("rigid pin by force", "all on the last"),
     ("plastic", "sectors"),
     ("plastic", "all on the first"),
     ("rigid pin", "sectors"),
-    ("rigid pin", "halved by number"),
+    ("rigid pin", "blocks of 700"),
     ("rigid pin", "all on the last"),
-    ("plastic by force", "halved by number"),
+    ("plastic by force", "blocks of 700"),
 ]
 
 
@@ -212,10 +195,10 @@ def test_results_do_not_depend_on_the_ranks(cut, variant):
     """
     partitioner = {
         "sectors": None,
-        "dealt round": _deal(lambda i, n, size: i),
-        "halved by number": _deal(lambda i, n, size: i * size // n),
-        "all on the first": _deal(lambda i, n, size: 0 * i),
-        "all on the last": _deal(lambda i, n, size: 0 * i + size - 1),
+        "dealt round": partition(lambda i, _: i),
+        "blocks of 700": partition(lambda i, _: i // 700),
+        "all on the first": partition(lambda i, _: 0 * i),
+        "all on the last": partition(lambda i, _: 0 * i - 1),
     }[cut]
     load = {"load": {"displacement": None, "relative_force": 0.006}} if variant.endswith("force") else {}
     problem = scene(0.1, 4, **VARIANTS[variant.removesuffix(" by force")], **load)
@@ -224,15 +207,5 @@ def test_results_do_not_depend_on_the_ranks(cut, variant):
     assert together.joint.n_dofs == alone.joint.n_dofs
     for a, b in zip(together.steps, alone.steps, strict=True):
         assert (a.iterations, a.cutbacks) == (b.iterations, b.cutbacks)
-        for name in (
-            "P",
-            "delta",
-            "p0",
-            "eps",
-            "contact_area",
-            "peeq_max",
-            "peeq_integral",
-            "elastic_energy",
-            "plastic_dissipation",
-        ):
+        for name in set(vars(a)) - {"work", "force_balance", "seconds"}:
             assert getattr(a, name) == pytest.approx(getattr(b, name), rel=1e-9), name

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.geometry.fenicsx import gmsh_to_mesh
 from archord.materials.elasticity import Elastic
 from archord.solver.problem import Body, Guess, Interaction, Load, Problem, Support
 from archord.solver.system import System
@@ -18,34 +17,23 @@ DEPTH = 0.02
 ON_EACH_OTHER = Interaction("joint", ("upper bottom", "lower top"))
 
 
-def columns(width: float, supports, **options) -> Problem:
-    """Two hardening blocks of a ``width`` on top of each other."""
-
-    def build(gmsh) -> None:
-        for y, name in enumerate(("lower", "upper")):
-            face = gmsh.model.occ.addRectangle(0, y, 0, width, 1)
-            gmsh.model.occ.synchronize()
-            gmsh.model.addPhysicalGroup(2, [face], name=name)
-            sides = gmsh.model.getBoundary([(2, face)], oriented=False)
-            for side, (_, line) in zip(("bottom", "right", "top", "left"), sides, strict=True):
-                gmsh.model.mesh.setTransfiniteCurve(line, 4 + y)
-                gmsh.model.addPhysicalGroup(1, [line], name=f"{name} {side}")
-
-    bodies = [Body(name, HARDENING) for name in ("lower", "upper")]
-    return Problem(gmsh_to_mesh(MPI.COMM_SELF, build), bodies, [ON_EACH_OTHER], supports, **options)
-
-
-UPRIGHT = [Support("base", "lower bottom", 1), Support("lid", "upper top", 1, -1.0)]
 BETWEEN_WALLS = [
-    *UPRIGHT,
-    *(Support("walls", f"{name} {side}", 0) for name in ("lower", "upper") for side in ("left", "right")),
+    Support("base", "base", 1),
+    Support("lid", "lid", 1, -1.0),
+    *(Support("walls", side, 0) for side in ("left", "right")),
 ]
+
+
+def columns(width: float = 1.0, material=HARDENING, **options) -> Problem:
+    """Two blocks of a ``width`` on top of each other, between walls."""
+    bodies = [Body(name, material) for name in ("lower", "upper")]
+    return Problem(blocks(MPI.COMM_SELF, 3, 4, width=width), bodies, [ON_EACH_OTHER], BETWEEN_WALLS, **options)
 
 
 @pytest.mark.parametrize("control", ["factor", "force"])
 def test_half_a_problem_with_symmetry_two_is_the_whole(control):
     """Forces, energies and PEEQ under both controls: the load of the half is that of the whole."""
-    halves = [columns(width, BETWEEN_WALLS, symmetry=2 / width, control=control) for width in (1.0, 2.0)]
+    halves = [columns(width, symmetry=2 / width, control=control) for width in (1.0, 2.0)]
     systems = [solve(halves[0], [DEPTH if control == "factor" else 0.06])]
     systems.append(solve(halves[1], [systems[0].equilibrium.load]))
     found = [
@@ -58,8 +46,8 @@ def test_half_a_problem_with_symmetry_two_is_the_whole(control):
 
 def test_force_control_finds_the_load_factor_of_its_force():
     """The force that a displacement takes, prescribed, takes that displacement back."""
-    moved = solve(columns(1.0, BETWEEN_WALLS), [DEPTH])
-    pushed = solve(columns(1.0, BETWEEN_WALLS, control="force"), [moved.driving_force()])
+    moved = solve(columns(), [DEPTH])
+    pushed = solve(columns(control="force"), [moved.driving_force()])
     assert pushed.equilibrium.factor == pytest.approx(DEPTH, rel=1e-8)
     assert pushed.energies() == pytest.approx(moved.energies(), rel=1e-8)
 
@@ -122,8 +110,9 @@ class Lopsided(Elastic):
 def test_an_anisotropic_body_follows_the_closed_form():
     """Between walls: the pressure is the upright modulus times the strain."""
     grained = Grained(E, NU, "strain")
-    problem = replace(columns(1.0, BETWEEN_WALLS), bodies=[Body(name, grained) for name in ("lower", "upper")])
-    assert solve(problem, [DEPTH]).driving_force() == pytest.approx(grained.elastic_tangent[1, 1] * DEPTH / 2, rel=1e-9)
+    assert solve(columns(material=grained), [DEPTH]).driving_force() == pytest.approx(
+        grained.elastic_tangent[1, 1] * DEPTH / 2, rel=1e-9
+    )
 
 
 class Stiffening(Elastic):
@@ -164,12 +153,7 @@ class Rounded(Elastic):
 @pytest.mark.parametrize("nu", [0.2, 0.25, 1 / 3])
 def test_round_off_is_no_reason_to_refuse_a_material(nu):
     """Where a stress of the check cancels, nothing but round-off is left of it."""
-    problem = columns(1.0, BETWEEN_WALLS)
     for plane in ("strain", "stress"):
-        forces = [
-            solve(
-                replace(problem, bodies=[Body(name, kind(E, nu, plane)) for name in ("lower", "upper")]), [DEPTH]
-            ).driving_force()
-            for kind in (Elastic, Rounded)
-        ]
+        materials = Elastic(E, nu, plane), Rounded(E, nu, plane)
+        forces = [solve(columns(material=material), [DEPTH]).driving_force() for material in materials]
         assert forces[0] == pytest.approx(forces[1], rel=1e-9)

@@ -4,31 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dolfinx.graph import adjacencylist
 from mpi4py import MPI
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from archord.geometry.joint_mesh import Cells
-from tests.solver.parts import DR, ELASTIC, PERFECT, contact_force, coordinates, internal_force, joint_parts, nodes_of
+from tests.solver.parts import (
+    DR,
+    ELASTIC,
+    PERFECT,
+    contact_force,
+    coordinates,
+    internal_force,
+    joint_parts,
+    nodes_of,
+    partition,
+)
 from tests.solver.solving import SEVERAL
-
-
-def corners(comm, cells):
-    """Vertices ``(n, 3)`` of this rank's cells at partitioning, and the number of the first of them."""
-    mine = np.asarray(cells[0]).reshape(-1, 3)
-    return mine, comm.exscan(len(mine)) or 0
-
-
-def partition(owner):
-    """Partitioner that sends cell ``i`` with vertices ``v`` to the rank ``owner(i, v) % size``."""
-
-    def partitioner(comm, n_parts, cell_types, cells):
-        mine, first = corners(comm, cells)
-        rank = owner(np.arange(first, first + len(mine)), mine) % n_parts
-        return adjacencylist(rank.astype(np.int32), np.arange(len(mine) + 1, dtype=np.int32))
-
-    return partitioner
 
 
 def body(_, vertices):

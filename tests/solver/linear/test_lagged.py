@@ -1,7 +1,9 @@
 """Large elastic joints: GMRES with the factorisation of the step's first matrix."""
 
+import numpy as np
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from archord.benchmarks.case import paper_joint
 from archord.solver.linear import choose, lagged
@@ -33,14 +35,14 @@ def test_the_state_is_that_of_direct_solves(kind, small_is_large, monkeypatch):
     assert iterations <= 2 * sum(m.iterations for m in direct.steps)
 
 
-def test_many_solves_bring_a_new_factorisation(small_is_large, monkeypatch):
+@pytest.mark.parametrize(("limit", "few"), [("_MANY_SOLVES", 1), ("_MANY_CHANGES", 0)])
+def test_many_solves_or_changes_of_the_contact_bring_a_new_factorisation(limit, few, small_is_large, monkeypatch):
     scene = paper_joint(0.15, 2)
     usual = solve(scene)
-    monkeypatch.setattr(lagged, "_MANY_SOLVES", 1)
+    monkeypatch.setattr(lagged, limit, few)
     often = solve(scene)
-    P = often.steps[-1].P
     assert often.joint.factorisations > usual.joint.factorisations
-    assert abs(P / usual.steps[-1].P - 1) < 1e-9
+    assert pytest.approx(usual.steps[-1].P, rel=1e-9) == often.steps[-1].P
 
 
 def test_plastic_joints_factorise_every_matrix(small_is_large, monkeypatch):
@@ -52,9 +54,6 @@ def test_plastic_joints_factorise_every_matrix(small_is_large, monkeypatch):
 
 def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
     """The preconditioner stays the inverse of the old bordered matrix, while the product is of the new one."""
-    import numpy as np
-    from petsc4py import PETSc
-
     rng = np.random.default_rng(3)
     n = 6
     old, new = (rng.normal(size=(n, n)) + 5 * np.eye(n) for _ in range(2))
@@ -86,11 +85,3 @@ def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
     system.update(*borders[1])
     system.apply(None, r, x)
     assert whole(new, borders[1]) @ x.array_r == pytest.approx(r.array_r, abs=1e-12)
-
-
-def test_many_changes_of_the_contact_bring_a_new_factorisation(small_is_large, monkeypatch):
-    """A guess from afar opens and closes points everywhere: as many factorisations as these changes ask for."""
-    scene = paper_joint(0.15, 2)
-    usual = solve(scene).joint.factorisations
-    monkeypatch.setattr(lagged, "_MANY_CHANGES", 0)
-    assert solve(scene).joint.factorisations > usual

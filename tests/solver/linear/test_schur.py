@@ -45,14 +45,3 @@ def test_complement_and_solution_are_those_of_the_dense_matrix():
             assert b[others] == pytest.approx(x[others], abs=1e-12)
         kernels.schur_destroy(made)
         del arrays
-
-
-def test_a_singular_block_is_reported():
-    """An unknown without any stiffness."""
-    A = np.random.default_rng(1).normal(size=(6, 6))
-    made, arrays = created(A != 0, np.array([5]))
-    A[3] = A[:, 3] = 0.0
-    values, S = A.ravel().copy(), np.zeros((1, 1))
-    assert schur_kernels().schur_factorise(made, pointer(values), pointer(S)) < 0
-    schur_kernels().schur_destroy(made)
-    del arrays
