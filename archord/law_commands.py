@@ -77,6 +77,7 @@ def law(
     from archord.postprocess.laws.law import LawRangeWarning
     from archord.postprocess.laws.law_report import draw_laws, law_table
     from archord.postprocess.laws.laws import find_law
+    from archord.scene.file import files_read
 
     chosen = [find_law(name) for name in dict.fromkeys(names or ["calibrated"])]
     if not 0 < to < math.inf:
@@ -89,8 +90,6 @@ def law(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LawRangeWarning)
         if plot:
-            from archord.scene.file import files_read
-
             check_target(plot, files_read(scene, overrides) if scene else [], force=True)
             said = [draw_laws(chosen, joint, plot, by_load, to, extrapolate)]
         else:

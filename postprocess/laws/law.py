@@ -102,11 +102,12 @@ class Law:
         reason = self.unfit(joint)
         if not (beyond.any() or reason):
             return x
-        low, high = (f"{end:.4g}" for end in (x[beyond].min(initial=np.inf) / unit, x[beyond].max(initial=0) / unit))
-        span = low if low == high else f"{low} to {high}"
-        stray = reason or f"{what} = {span} {named} is outside 0 to {limit / unit:.4g} {named}"
-        warnings.warn(LawRangeWarning(f"{self.name}: {stray} (range: {self.range})"), stacklevel=4)
-        return np.where(x >= 0 if extrapolate else ~beyond & (not reason), x, np.nan)
+        valid = x >= 0 if extrapolate else ~beyond & (not reason)
+        if not reason:
+            ends = dict.fromkeys(f"{end / unit:.4g}" for end in (x[beyond].min(), x[beyond].max()))
+            reason = f"{what} = {' to '.join(ends)} {named} is outside 0 to {limit / unit:.4g} {named}"
+        warnings.warn(LawRangeWarning(f"{self.name}: {reason} (range: {self.range})"), stacklevel=4)
+        return np.where(valid, x, np.nan)
 
     def _check(self, joint: LawJoint) -> None:
         """Refuse a joint that lacks what the law needs; of laws with displacements also a ring, whose P(delta) is
@@ -114,15 +115,13 @@ class Law:
         for name in self.needs:
             if getattr(joint, name) is None:
                 raise ValueError(f"{self.name}: this law needs {name}.")
-        if not self.gives_displacement:
-            return
-        if joint.ring:
+        if joint.ring and self.gives_displacement:
             raise ValueError(
                 f'{self.name}: is a law for a pin in a block; of joint.model = "ring" its P would be about twice too '
                 "high. Of a ring only hertz and persson hold, which give no displacement."
             )
         about, most = joint.softer
-        if joint.block_size is not None and about > _FELT:
+        if joint.block_size and about > _FELT and self.gives_displacement:
             said = (
                 f"{self.name}: is a law for a block of {LARGE:g} R; in this one of "
                 f"{joint.block_size / joint.radius:.4g} R the joint is softer, and its P about {about:.1%} smaller "

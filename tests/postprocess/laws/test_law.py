@@ -11,7 +11,7 @@ import pytest
 
 from archord.postprocess.laws.joint import LARGE, LawJoint
 from archord.postprocess.laws.law import LawRangeWarning, rising_root
-from archord.postprocess.laws.laws import LAWS, find_law
+from archord.postprocess.laws.laws import LAWS
 from archord.scene.file import load_scene
 from tests.solver.solving import scene, solve
 
@@ -73,7 +73,7 @@ def test_outside_the_range_every_law_says_so(name):
     largest = law.force(JOINT, law.limit(JOINT))
     with pytest.warns(LawRangeWarning, match="E\\* dR is outside"):
         assert np.isnan(law.displacement(JOINT, 1.01 * largest))
-    with pytest.warns(LawRangeWarning):
+    with pytest.warns(LawRangeWarning, match=r"P = -[\d.]+ E\* dR is outside"):
         assert np.isnan(law.displacement(JOINT, -largest))
 
 
@@ -122,8 +122,6 @@ def test_what_a_law_needs_or_lacks_is_a_sentence():
         LAWS["persson"].force(bare, 0.01)
     assert np.isnan(LAWS["persson"].displacement(bare, 1.0))
     assert np.isnan(LAWS["esdu-78035"].at_load(bare, 1.0).angle)
-    with pytest.raises(ValueError, match="did you mean radzimovsky"):
-        find_law("radzimowsky")
 
 
 NO_JOINT = {"radius": 0.0, "clearance": -1.0, "E_star": np.nan, "dundurs_alpha": 1.5, "length": 0.0, "plane": "axial"}
