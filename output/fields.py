@@ -48,7 +48,7 @@ class FieldWriter:
         self.path, self._numbered = folder / "fields.xdmf", numbered
         self._nodes = SecondOrder(order.nodes_of_cell, order.system.problem.degree)
         cells, points = self._nodes.cells[:, _VTK_ORDER], self._nodes(order.coordinates)
-        self._sizes = len(points), len(cells)
+        self._sizes, self._grids = (len(points), len(cells)), list[str]()
         fixed = {"mesh/coordinates": points, "mesh/cells": cells, "mesh/body": bodies}
         self._file = StepFile(folder / "fields.h5", fixed, after, apart=True)
 
@@ -57,11 +57,11 @@ class FieldWriter:
         displacement = np.pad(self._nodes(fields["displacement"]), ((0, 0), (0, 1)))
         self._file.write(load, fields | {"displacement": displacement})
         of_cells = [name for name in fields if name != "displacement"]
-        loads = enumerate(self._file.loads, start=1)
-        grids = [self._grid(k, float(k if self._numbered else load), of_cells) for k, load in loads]
+        for step, load in enumerate(self._file.loads[len(self._grids) :], start=len(self._grids) + 1):
+            self._grids.append(self._grid(step, float(step if self._numbered else load), of_cells))
         head = '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
         collection = '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
-        replace_file(self.path, head + collection + "".join(grids) + "</Grid>\n</Domain>\n</Xdmf>\n")
+        replace_file(self.path, head + collection + "".join(self._grids) + "</Grid>\n</Domain>\n</Xdmf>\n")
 
     def _grid(self, step: int, time: float, of_cells: list[str]) -> str:
         place, (n_nodes, n_cells) = self._file.place, self._sizes

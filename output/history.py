@@ -45,29 +45,15 @@ def _columns(scene: Scene) -> list[tuple[str, str, float]]:
     return columns
 
 
-class History:
-    """Writes history.csv; ``done`` are the steps that a run which goes on has behind it."""
-
-    def __init__(self, path: Path, scene: Scene, done: Sequence[Measures] = ()) -> None:
-        self.path = path
-        self._columns = _columns(scene)
-        self._rows = [[heading for heading, _, _ in self._columns], *map(self._row, done)]
-
-    def add(self, m: Measures) -> None:
-        """Append one step. Raises `OSError`."""
-        self._rows.append(self._row(m))
-        self.write()
-
-    def _row(self, m: Measures) -> list[str]:
-        """The entries of a step; whole numbers stay whole."""
-        values = ((getattr(m, name), divisor) for _, name, divisor in self._columns)
-        return [str(v) if isinstance(v, int) else f"{v / divisor:.12g}" for v, divisor in values]
-
-    def write(self) -> None:
-        """Replace the file in one move, so that a reader never sees half a row. Raises `OSError`."""
-        text = io.StringIO(newline="")
-        csv.writer(text).writerows(self._rows)
-        replace_file(self.path, text.getvalue())
+def write_history(path: Path, scene: Scene, steps: Sequence[Measures]) -> None:
+    """Replace ``path`` by the table of ``steps`` in one move; whole numbers stay whole. Raises `OSError`."""
+    columns, text = _columns(scene), io.StringIO(newline="")
+    table = csv.writer(text)
+    table.writerow([heading for heading, _, _ in columns])
+    for m in steps:
+        values = ((getattr(m, name), divisor) for _, name, divisor in columns)
+        table.writerow([str(v) if isinstance(v, int) else f"{v / divisor:.12g}" for v, divisor in values])
+    replace_file(path, text.getvalue())
 
 
 def read_history(path: str | Path) -> dict[str, list[float]]:

@@ -26,7 +26,7 @@ _SAME = 1e-9  # relative difference up to which two targets are one
 
 @dataclass
 class Start:
-    """A run to go on from: its last checkpoint, its run.json, and the steps ``done`` before the checkpoint's."""
+    """A run to go on from: its checkpoint, its run.json, and the steps ``done`` before the checkpoint's."""
 
     checkpoint: Checkpoint
     report: dict[str, Any]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -17,7 +17,7 @@ from archord.output.checkpoint import write as write_checkpoint
 from archord.output.contact import FIXED, PER_STEP, contact_arrays
 from archord.output.disk import WriteError, replace_file
 from archord.output.folder import CHECKPOINT, clear, occupied
-from archord.output.history import History
+from archord.output.history import write_history
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
@@ -86,7 +86,8 @@ def solve_scene(
         joint = without_stale_forms(lambda: Joint(scene, comm, timer=timer))
         on_start(joint)
         output = _Output(folder, joint, begun, start)
-        status, message, failed, received = "done", "", None, 0
+        status, message, received = "done", "", 0
+        failed: dict[str, Any] = {}
         try:
             with nullcontext(interrupt) if interrupt else Interrupt() as joint.equilibrium.interrupt:
                 position, work = output.begin()
@@ -101,7 +102,7 @@ def solve_scene(
                     attempted=on_attempt,
                 )
         except StepFailure as failure:
-            status, message, failed = "stopped", str(failure), failure.attempt
+            status, message, failed = "stopped", str(failure), {"failed_step": asdict(failure.attempt)}
         except WriteError as error:
             status, message = "stopped", str(error)
         except Interrupted as interrupted:
@@ -112,7 +113,8 @@ def solve_scene(
         if unseen:
             status, message = "stopped", UNSEEN
         try:
-            warnings = output.finish(status, message, [APART] if apart and not unseen else [], failed)
+            said = [APART] if apart and not unseen else []
+            warnings = output.finish(said, status=status, message=message, **failed)
         except WriteError as error:
             status, message, warnings = "stopped", message if status == "stopped" else str(error), []
         return Outcome(folder, status, message, output.steps, warnings, received, unseen)
@@ -135,7 +137,6 @@ class _Output:
         self._fields: FieldWriter | None = None  # with the first step, on rank 0
         self._contact: StepFile | None = None
         if comm.rank == 0:
-            self._history = History(folder / "history.csv", joint.scene, self.steps)
             self._report = Report(folder / "run.json", joint, begun, self.steps, start.report if start else {})
 
     def begin(self) -> tuple[Position | None, Work]:
@@ -154,7 +155,7 @@ class _Output:
     def _make(self) -> None:
         clear(self.folder)
         replace_file(self.folder / "scene.toml", self._scene)
-        self._history.write()
+        write_history(self.folder / "history.csv", self.joint.scene, [])
         self._report.write()
 
     def add(self, step: Step, position: Position, work: Work) -> Measures:
@@ -189,14 +190,14 @@ class _Output:
                 if not self._contact:
                     self._contact = StepFile(self.folder / "contact.h5", contact_arrays(profiles, FIXED), after)
                 self._contact.write(m.delta, contact_arrays(profiles, PER_STEP))
-                self._history.add(m)
-                self._report.add(m, step, warnings)
+                write_history(self.folder / "history.csv", scene, self.steps)
+                self._report.add(step, warnings)
 
+            self.steps.append(m)
             self._on_root(write)
-        self.steps.append(m)
 
-    def finish(self, status: str, message: str, warnings: list[str], failed: Step | None) -> list[str]:
+    def finish(self, warnings: list[str], **ending: Any) -> list[str]:
         """Note how the run ended, with ``warnings`` beside those of the steps; returns all on rank 0. Collective."""
-        memory = self.joint.comm.gather(peak_memory())
-        found = self._on_root(lambda: self._report.finish(status, message, warnings, memory, failed))
+        ending["peak_memory"] = self.joint.comm.gather(peak_memory())
+        found = self._on_root(lambda: self._report.finish(warnings, **ending))
         return found if self.joint.comm.rank == 0 else []

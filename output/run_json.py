@@ -31,20 +31,13 @@ _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk",
 class Report:
     """run.json of ``joint``; ``begun`` is the ``perf_counter`` from which the seconds count.
 
-    A run that goes on has the steps ``done`` behind it, and its run.json ``before``.
+    ``steps`` are those of the run, also of the run that it goes on from, with the run.json ``before``; whoever appends
+    one to them calls `add`.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        joint: Joint,
-        begun: float,
-        done: Sequence[Measures],
-        before: dict[str, Any],
-    ) -> None:
-        self.path, self.joint, self.begun, self._before = path, joint, begun, before
-        self.measures = list(done)
-        now, n, comm = datetime.now(UTC).isoformat(timespec="seconds"), len(done), joint.comm
+    def __init__(self, path: Path, joint: Joint, begun: float, steps: list[Measures], before: dict[str, Any]) -> None:
+        self.path, self.joint, self.begun, self.steps, self._before = path, joint, begun, steps, before
+        now, n, comm = datetime.now(UTC).isoformat(timespec="seconds"), len(steps), joint.comm
         restart = {"when": now, "after_step": n + 1, "ranks": comm.size, "command": sys.argv}
         restarts = [*before.get("restarts", []), *([restart] if before else [])]
         warnings = before.get("warnings", rough_arcs(joint))
@@ -71,9 +64,9 @@ class Report:
             "steps": before.get("steps", [])[:n],
         }
 
-    def add(self, m: Measures, step: Step, warnings: Sequence[str]) -> None:
-        """Note an accepted output step, and what to warn of at it. Raises `OSError`."""
-        self.measures.append(m)
+    def add(self, step: Step, warnings: Sequence[str]) -> None:
+        """Note how the last of the steps was reached, and what to warn of at it. Raises `OSError`."""
+        m = self.steps[-1]
         self.content["warnings"] += [f"step {m.step}: {text}" for text in warnings]
         cost = {
             "substeps": step.substeps,
@@ -85,36 +78,32 @@ class Report:
         self.content["steps"].append(_finite(asdict(m) | cost))
         self.write()
 
-    def finish(
-        self, status: str, message: str, warnings: list[str], memory: list[int], failed: Step | None
-    ) -> list[str]:
-        """Note how the run ended, the ``memory`` of all ranks and the output step that ``failed``; returns all
-        warnings. Raises `OSError`."""
-        self.content |= {"status": status, "message": message, "peak_memory": memory}
+    def finish(self, warnings: list[str], **ending: Any) -> list[str]:
+        """Note how the run ended, and what else to warn of; returns all warnings. Raises `OSError`."""
+        self.content |= _finite(ending)
         self.content["warnings"] += warnings
-        if failed is not None:
-            self.content["failed_step"] = _finite(asdict(failed))
         self.write()
         return self.content["warnings"]
 
     def write(self) -> None:
-        """Replace run.json in one move, so that a reader never sees half of it. Raises `OSError`."""
+        """Replace run.json in one move, with a line for each of its keys. Raises `OSError`."""
         content = self.content | {
             "linear_solver": self.joint.equilibrium.choice.words(),  # a matrix may decide otherwise later
             "totals": self._totals(),
             "seconds": self._seconds(),
             "error_estimates": self._errors(),
         }
-        replace_file(self.path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+        lines = [f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items()]
+        replace_file(self.path, "{\n" + ",\n".join(lines) + "\n}\n")
 
     def _totals(self) -> dict[str, int]:
         counts, before = self.joint.timer.counts, self._before.get("totals", {})
         return {
-            "newton_iterations": sum(m.iterations for m in self.measures),
-            "cutbacks": sum(m.cutbacks for m in self.measures),
+            "newton_iterations": sum(m.iterations for m in self.steps),
+            "cutbacks": sum(m.cutbacks for m in self.steps),
             "factorisations": self.joint.factorisations + before.get("factorisations", 0),
             "residual_evaluations": counts.get("return mapping", 0) + before.get("residual_evaluations", 0),
-            "accepted_steps": len(self.measures),
+            "accepted_steps": len(self.steps),
         }
 
     def _seconds(self) -> dict[str, float]:
@@ -130,12 +119,12 @@ class Report:
         return {name: round(value, 4) for name, value in s.items()}
 
     def _errors(self) -> dict[str, float | None]:
-        if not self.measures:
+        if not self.steps:
             return {}
         touching = [step["residuals"] for step in self.content["steps"] if step["contact_area"]]
         return {
-            "force_balance": max(m.force_balance for m in self.measures),
-            "energy_balance": energy_balance(self.measures, press_fit=self.joint.scene.joint.dR < 0),
+            "force_balance": max(m.force_balance for m in self.steps),
+            "energy_balance": energy_balance(self.steps, press_fit=self.joint.scene.joint.dR < 0),
             "newton_residual": max((r[-1][-1] for r in touching if r and r[-1]), default=0.0),
         }
 
