@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,8 +48,8 @@ class Check:
 class Result:
     """How a case went. ``status`` is "done", "stopped" (exit code 3) or "failed" (an error).
 
-    ``quantities`` are those of the last step, or of the last force that held. ``forces`` checks the balance of forces
-    over P, ``energy`` that of energies over the work; None where nothing was solved, or nothing is known.
+    ``quantities`` are those of the last step. ``forces`` checks the balance of forces over P, ``energy`` that of
+    energies over the work; None where nothing was solved.
     """
 
     status: str = ""
@@ -167,9 +166,6 @@ def _look(result: Result, scene: Scene, outcome: Outcome) -> None:
             energy, 1.001 * _energy_limit(scene, outcome.steps) + 1e-8, f"energy is off by {energy:.1e} of the work"
         )
         result.quantities = quantities(scene, outcome.steps[-1])
-    held = re.search(r"last load that held is P = (\S+?)(;|$)", outcome.message)
-    if held:
-        result.quantities["P/(E* R)"] = float(held[1]) / (scene.E_star * scene.joint.radius)
 
 
 def _energy_limit(scene: Scene, steps: list[Measures]) -> float:
