@@ -100,6 +100,7 @@ def elastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
 def yield_plateau(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C4."""
     run = runs.curve(FULL_YIELD, plane)
+    assert run.sigY is not None
     angle, pressure = read_arcs(run, len(run.delta))["hole"].facet_means()
     middle = pressure[angle < 0.5 * run.eps[-1]] / run.sigY
     mean = columns(tables["fig5b"], plane=plane)["P/(A sigY)"][-1]

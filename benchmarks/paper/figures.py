@@ -53,7 +53,8 @@ def write(parts: list[Part], folder: Path, name: str) -> list[Path]:
     write_rows([{key: f"{v:.10g}" if isinstance(v, float) else v for key, v in row.items()} for row in rows], table)
 
     canvas = new_figure(9, 4.5)
-    axes, colours = canvas.subplots(), {}
+    axes = canvas.subplots()
+    colours: dict[tuple, int] = {}
     drawn = [part for part in parts if layout.get("where", {}).items() <= scalars(part).items()]
     for part in drawn:
         named = scalars(part)
@@ -141,6 +142,7 @@ def fig5(runs: Runs) -> list[Part]:
     """Pressure over the yield stress along arc and chord at 2 dR."""
     parts = []
     for run in (runs.curve(FULL_YIELD, plane) for plane in PLANES):
+        assert run.sigY is not None
         eps, x, py = chord_profile(run, len(run.delta))
         angle, pressure = (v[: len(x)] for v in read_arcs(run, len(run.delta))["hole"].facet_means())
         for side, at, p in (("arc", angle / eps, pressure), ("chord", x, py)):
@@ -150,10 +152,12 @@ def fig5(runs: Runs) -> list[Part]:
 
 def fig5b(runs: Runs) -> list[Part]:
     """The mean pressure over the projected area A over delta."""
-    curves = [runs.curve(FULL_YIELD, plane) for plane in PLANES]
-    return [
-        {"plane": r.plane, X: r.delta / r.dR, "P/(A sigY)": r.P / (2 * r.R * np.sin(r.eps)) / r.sigY} for r in curves
-    ]
+    parts = []
+    for run in (runs.curve(FULL_YIELD, plane) for plane in PLANES):
+        assert run.sigY is not None
+        mean = run.P / (2 * run.R * np.sin(run.eps))
+        parts.append({"plane": run.plane, X: run.delta / run.dR, "P/(A sigY)": mean / run.sigY})
+    return parts
 
 
 def fig7(runs: Runs) -> list[Part]:
@@ -161,6 +165,7 @@ def fig7(runs: Runs) -> list[Part]:
     parts = []
     for joint in LAYOUTS["fig7"]["joints"]:
         for run in (runs.curve(joint, plane) for plane in PLANES):
+            assert run.sigY is not None
             unit, law = run.R * run.sigY, law_force("paper-plastic", run) * run.E_star * run.dR
             named = {"dR/R [%]": JOINTS[joint][0], "sigY/E* [%]": JOINTS[joint][1], "plane": run.plane}
             forces = {"P/(R sigY)": run.P / unit, "eq. 12": law / unit, "P/P(eq. 12)": run.P / law}

@@ -71,7 +71,8 @@ def draw(lines: list[Line], file: Path) -> Path:
         shares = np.array([[math.log10(max(c.share, 1e-6)) if c else math.nan for c in row] for row in known])
         ax.imshow(np.where(shares > 0, 9.0, shares), colours, aspect="auto", vmin=-8, vmax=4)
         for (i, j), _ in np.ndenumerate(shares):
-            ax.text(j, i, f"{known[i][j].error:.0e}" if known[i][j] else "", ha="center", va="center", fontsize=5.5)
+            check = known[i][j]
+            ax.text(j, i, f"{check.error:.0e}" if check else "", ha="center", va="center", fontsize=5.5)
         ax.set_yticks(range(len(some)), [line.case.name for line in some], fontsize=6.5)
         for label, line in zip(ax.get_yticklabels(), some, strict=True):
             label.set_color("firebrick" if line.faults else "steelblue" if line.case.stops else "black")

@@ -209,9 +209,9 @@ def judge(case: Case, results: dict[str, Result], fine: Values) -> Line:
     if result.not_finite:
         faults.append(f"not finite: {', '.join(result.not_finite)}")
     comparisons = [_compare(case, expected, results, fine) for expected in case.expected if ended]
-    checks = [check for check in (result.forces, result.energy, *comparisons) if check]
-    faults += [check.fault for check in checks if check.share > 1]
-    return Line(case, result, max(comparisons, key=lambda c: c.share, default=None), faults)
+    faults += [c.fault for c in (result.forces, result.energy, *comparisons) if c is not None and c.share > 1]
+    worst = max(comparisons, key=lambda c: c.share) if comparisons else None
+    return Line(case, result, worst, faults)
 
 
 def _compare(case: Case, expected: Expected, results: dict[str, Result], fine: Values) -> Comparison:
