@@ -100,7 +100,7 @@ def _check_elastic_tangent(material: Material) -> None:
 
 class Bulk:
     """Internal forces of all bodies in the displacement space ``V`` (blocked, two components): those of the cells that
-    ``tags`` give the tags of ``materials``."""
+    ``tags`` give the tags of ``materials``. ``elastic_forms``, one a body, span the pattern of the matrix."""
 
     def __init__(self, V: fem.FunctionSpace, tags: MeshTags, materials: Mapping[int, Material]) -> None:
         self.V, self.materials = V, materials
@@ -119,7 +119,7 @@ class Bulk:
             domain, metadata = [(1, self.cells[tag])], {"quadrature_degree": rule}
             dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
             elastic[tag] = fem.form(ufl.inner(ufl.dot(moduli, u), v) * dx)
-        self._elastic_forms = list(elastic.values())
+        self.elastic_forms = list(elastic.values())
         if self._plastic:
             cell, metadata = V.mesh.basix_cell(), {"quadrature_degree": rule, "quadrature_rule": "default"}
             element = {shape: basix.ufl.quadrature_element(cell, shape, degree=rule) for shape in ((3,), (3, 3))}
@@ -146,10 +146,6 @@ class Bulk:
     def histories(self) -> dict[int, tuple[np.ndarray, Points]]:
         """Cells ``(n,)`` of this rank and their ``n q`` points with history, by the plastic body's tag."""
         return {tag: (body.cells, body.points) for tag, body in self._plastic.items()}
-
-    def pattern_forms(self) -> list[fem.Form]:
-        """Bilinear forms that together span the bulk's matrix pattern."""
-        return self._elastic_forms
 
     def update(self, u: Array) -> None:
         """Return-map the plastic bodies at the nodal displacements ``u`` ``(n_nodes, 2)`` of this rank."""
@@ -187,10 +183,6 @@ class Bulk:
             self._sigma.x.array.reshape(-1, q, 3)[body.cells] = np.einsum("nqij,nqj->nqi", moduli, eps)
         self.add_force(direction.x.petsc_vec, out)
 
-    def assemble_elastic(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
-        """Add the elastic stiffness of all bodies to ``A``."""
-        assemble(A, self._elastic_forms, bcs)
-
     def assemble_correction(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
         """Add the tangent correction to ``A``: the consistent minus the elastic tangent, in the cells that yield."""
         if not self._plastic:
@@ -202,11 +194,6 @@ class Bulk:
             form = fem.create_form(self._correction_kernel, [self.V, self.V], self.V.mesh, domains, coefficients, {})
             self._corrected_cells, self._correction_forms = cells, [form]
         assemble(A, self._correction_forms, bcs)
-
-    def commit(self) -> None:
-        """Accept the history of the last `update`."""
-        for body in self._plastic.values():
-            body.points.commit()
 
     def energies(self, u: Array) -> tuple[float, float]:
         """Elastic energy and plastic dissipation, this rank's part; collective."""

@@ -72,7 +72,3 @@ class CoarseStart:
         with self.fine.timer("coarse start"):
             self.path.accept(self._reached)
         return True
-
-    def take_back(self) -> None:
-        """Undo the last attempt."""
-        self.path.take_back()

@@ -208,10 +208,13 @@ class Equilibrium:
 
     # ------------------------------------------------------------------ state
 
+    def points(self) -> list[Points]:
+        """The points of bulk and contact, of materials and of contact laws."""
+        return [points for part in (self.bulk, self.contact) for _, points in part.histories().values()]
+
     def plastic_points(self) -> list[Points]:
-        """The points of bulk and contact that can yield."""
-        histories = [*self.bulk.histories().values(), *self.contact.histories().values()]
-        return [points for _, points in histories if points.yields]
+        """Those that can yield."""
+        return [points for points in self.points() if points.yields]
 
     def worst_place(self) -> tuple[float, float] | None:
         """Where the residual is largest, over all ranks."""
@@ -245,5 +248,5 @@ class Equilibrium:
     def commit(self) -> None:
         """Accept the last solve: bulk and contact keep their trial history."""
         self.largest_reaction = max(self.largest_reaction, self.reaction_norm)
-        self.bulk.commit()
-        self.contact.commit()
+        for points in self.points():
+            points.commit()

@@ -39,21 +39,18 @@ class LoadPath:
 
     The guess for a step is, where there is a ``coarse`` start, what a coarser mesh found. Else it extrapolates the last
     increment; where that fails elastic bodies start from the last state itself. Where the path starts or turns, the
-    guess comes from the elastic solution, at the start from ``first_guess(load)``. Without ``from_rest`` the bodies are
-    not in equilibrium before the first step (a press fit), whose increment then says nothing about the next.
+    guess comes from the elastic solution, at the start from ``first_guess(load)``. Where the bodies were not in
+    equilibrium before the first step (a press fit), its increment says nothing about the next.
     """
 
     def __init__(
         self,
         solver: Recovery,
         first_guess: Callable[[float], Array],
-        *,
-        from_rest: bool = True,
         at: Position | None = None,
         coarse: CoarseStart | None = None,
     ) -> None:
-        self.solver, self.at, self.coarse = solver, at or Position(), coarse
-        self._first_guess, self._from_rest = first_guess, from_rest
+        self.solver, self._first_guess, self.at, self.coarse = solver, first_guess, at or Position(), coarse
         self.state = solver.equilibrium.state()
         self.coarse_iterations = 0  # of the last attempt
 
@@ -85,7 +82,7 @@ class LoadPath:
         """Go to ``load``, where the last attempt has found equilibrium, and keep its history."""
         at, new = self.at, self.solver.equilibrium.state()
         if load != at.load:
-            known = self._from_rest or at.increment is not None
+            known = self.solver.equilibrium.problem.from_rest or at.increment is not None
             at.increment = new - self.state if known else np.zeros_like(new)
             at.stride = load - at.load
         at.load, self.state = load, new
@@ -97,4 +94,4 @@ class LoadPath:
         """Undo the last attempt."""
         self.solver.equilibrium.restore(self.at.load, self.state)
         if self.coarse is not None:
-            self.coarse.take_back()
+            self.coarse.path.take_back()

@@ -49,11 +49,11 @@ class Newton:
 
 
 class NewtonSolver:
-    """Newton's method for ``equilibrium``, to a residual of ``tolerance`` over the reaction of the supports."""
+    """Newton's method for ``equilibrium``, to the tolerance and within the iterations that its problem allows."""
 
-    def __init__(self, equilibrium: Equilibrium, *, tolerance: float = 1e-10, max_iterations: int = 25) -> None:
-        self.equilibrium, self.tolerance, self.max_iterations = equilibrium, tolerance, max_iterations
-        self._goal = tolerance
+    def __init__(self, equilibrium: Equilibrium) -> None:
+        self.equilibrium, problem = equilibrium, equilibrium.problem
+        self.tolerance, self.max_iterations = problem.tolerance, problem.max_iterations
         self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
         self._x = equilibrium.control.vector()
         self._raised: BaseException | None = None

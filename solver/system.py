@@ -36,20 +36,18 @@ class System:
 
     def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:
         self.problem, self.timer = problem, timer or Timer()
-        mesh = problem.mesh.mesh
-        self.comm = mesh.comm
+        self.comm = problem.mesh.mesh.comm
         with self.timer("setup"):
             variant = basix.LagrangeVariant.equispaced
             element = basix.ufl.element("P", "triangle", problem.degree, shape=(2,), lagrange_variant=variant)
-            self.V = fem.functionspace(mesh, element)
+            self.V = fem.functionspace(problem.mesh.mesh, element)
             materials = {problem.tag(body): body.material for body in problem.bodies}
             self.bulk = Bulk(self.V, problem.mesh.cells, materials)
             self.sides: dict[str, Surface] = {}
             surfaces = [[self._surface(given, i.name) for given in i.surfaces] for i in problem.interactions]
             self.contact = Contact(self.V, list(map(Interface, problem.interactions, surfaces)))
             self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
-            tolerance, most = problem.tolerance, problem.max_iterations
-            self.solver = Recovery(NewtonSolver(self.equilibrium, tolerance=tolerance, max_iterations=most))
+            self.solver = Recovery(NewtonSolver(self.equilibrium))
 
     def _surface(self, given: str | Rigid, interaction: str) -> Surface | RigidSurface:
         if isinstance(given, Rigid):
@@ -69,7 +67,7 @@ class System:
 
     def load_path(self, at: Position | None = None, coarse: CoarseStart | None = None) -> LoadPath:
         """The path of the problem's loads, from the position ``at`` or the beginning."""
-        return LoadPath(self.solver, self.first_guess, from_rest=self.problem.from_rest, at=at, coarse=coarse)
+        return LoadPath(self.solver, self.first_guess, at, coarse)
 
     def first_guess(self, load: float) -> Array:
         """A state of the equilibrium, with every body moved rigidly as the problem's guess says."""

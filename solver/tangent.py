@@ -8,7 +8,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.fenicsx import create_vector
-from archord.solver.bulk import Bulk, matrix
+from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact.contact import Contact
 from archord.solver.linear.condensed import Condensed, filled
 from archord.solver.timer import BEFORE_SOLVING, Timer
@@ -53,8 +53,8 @@ class TangentMatrix:
 
     def _allocated(self, slots: tuple[np.ndarray, np.ndarray] | None) -> PETSc.Mat:
         """The matrix of the bulk's constant part, with room for block ``slots`` in rows of this rank."""
-        A = matrix(self.V, self.bulk.pattern_forms(), slots)
-        self.bulk.assemble_elastic(A, self._bcs)
+        A = matrix(self.V, self.bulk.elastic_forms, slots)
+        assemble(A, self.bulk.elastic_forms, self._bcs)
         return A
 
     def renew(self) -> None:

@@ -142,12 +142,6 @@ class Contact:
             found[f"law {pair.surface.name}"] = pair.surface.facet, pair.points
         return found
 
-    def commit(self) -> None:
-        """Accept the history of the contact points at the last evaluation."""
-        for pair in self.pairs:
-            pair.surface.points.commit()
-            pair.points.commit()
-
     def n_active(self) -> int:
         """Number of points under pressure, over all ranks."""
         return self.comm.allreduce(sum(int((pair.traction[:, 0] > 0).sum()) for pair in self.pairs))

@@ -66,12 +66,6 @@ class Surface:
         self.place_points(np.tile(xi[:, 0], (self.n_facets, 1)), np.tile(w, (self.n_facets, 1)))
         self.gamma = self._trace_inequality()
 
-    def neighbours(self, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
-        """``facets`` ``(m,)`` and those within some ``rings`` around: places ``(k,)`` in ``facets`` and neighbours."""
-        near = facets[:, None] + np.arange(-rings, rings + 1)
-        which, _ = inside = np.nonzero((near >= 0) & (near < self.n_facets))
-        return which, near[inside]
-
     def facet_lengths(self) -> Array:
         """Arc length ``(n_facets,)`` of every facet, over all ranks."""
         return np.diff(self.curve.arc_length(np.array([0.0, 1.0])))[:, 0]
@@ -155,13 +149,17 @@ class RigidSurface:
         self.motion: Array = np.zeros((1, 2))
         self.curve_dofs = np.zeros(1, dtype=np.int64)
 
-    def neighbours(self, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
-        """As those of a `Surface`: there are none."""
-        return np.arange(len(facets)), facets
-
     def curve_displacement(self, u: Array) -> Array:
         """The displacement of the disc ``(1, 2)``, whatever that of the bodies."""
         return self.motion
+
+
+def neighbours(n: int, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
+    """``facets`` ``(m,)`` and those within some ``rings`` around, on a surface of ``n`` facets: places ``(k,)`` in
+    ``facets`` and neighbours."""
+    near = facets[:, None] + np.arange(-rings, rings + 1)
+    inside = np.nonzero((near >= 0) & (near < n))
+    return inside[0], near[inside]
 
 
 def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.kernels.compiled import library, pointer, structure
 from archord.solver.contact.pair import Pair
-from archord.solver.contact.surface import Surface
+from archord.solver.contact.surface import Surface, neighbours
 
 _SOURCE = Path(__file__).with_name("contact_tangent.c")
 _MARGIN = 2  # rings of opposite facets kept in the pattern around those that are paired
@@ -43,7 +43,7 @@ class Reach:
         if not self._comm.allreduce(len(new) > 0, op=MPI.LOR):
             return False
         facet, met = np.divmod(new, self._n)
-        which, near = self.pair.opposite.neighbours(met, self._rings)
+        which, near = neighbours(self._n, met, self._rings)
         parts = self._comm.allgather(facet[which] * self._n + near)
         self.keys = np.unique(np.concatenate([self.keys, *parts]))
         return True

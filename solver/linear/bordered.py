@@ -12,7 +12,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.linear.strategy import Direct, Facts, Strategy, solve_by
+from archord.solver.linear.strategy import Direct, Facts, Inverse, Strategy
 
 _SINGULAR = 1e-9  # stiffness against the motion over ``stiffness`` below which nothing resists the force
 
@@ -22,7 +22,7 @@ def why_not(facts: Facts) -> str | None:
     return None if facts.by_force else "the load is no force"
 
 
-class Bordered:
+class Bordered(Inverse):
     """Python context of the bordered matrix and of its preconditioner, which solves with the last one that was
     factorised.
 
@@ -51,10 +51,6 @@ class Bordered:
         self._ksp.destroy()
         self._ksp = PETSc.KSP().create(self.comm)
         self._factoriser(A).attach(self._ksp)
-
-    def attach(self, ksp: PETSc.KSP) -> None:
-        """Let ``ksp`` solve with the bordered matrix."""
-        solve_by(ksp, self.matrix, self)
 
     def vector(self) -> PETSc.Vec:
         """A vector with the load factor as its last entry."""

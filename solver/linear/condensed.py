@@ -22,7 +22,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.linear.strategy import Facts, solve_by
+from archord.solver.linear.strategy import Facts, Inverse
 
 _MOST_DOFS = 8_000  # beyond, the work on contact dofs takes longer than factorisations
 _LARGE_GAMMA = 5.0  # beyond, the small system is close to singular
@@ -44,7 +44,7 @@ def why_not(facts: Facts) -> str | None:
     return None if facts.held() else "supports alone do not hold every body"
 
 
-class Condensed:
+class Condensed(Inverse):
     """Python context of a preconditioner that solves with ``K + E D``. Collective.
 
     ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)``, sorted, are the block dofs that may get
@@ -67,10 +67,6 @@ class Condensed:
         self._y = K.createVecLeft()
         self._Z = self._responses(_dofs(nodes))
         self.occupy(*np.zeros((2, 0), dtype=np.int64))
-
-    def attach(self, ksp: PETSc.KSP) -> None:
-        """Let ``ksp`` solve with the matrix."""
-        solve_by(ksp, self.matrix, self)
 
     def _responses(self, dofs: np.ndarray) -> Array:
         """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one after the other."""

@@ -36,12 +36,17 @@ class Strategy(Protocol):
         """Let ``ksp`` solve so."""
 
 
-def solve_by(ksp: PETSc.KSP, matrix: PETSc.Mat, context: object) -> None:
-    """Let ``ksp`` solve with ``matrix`` by ``context``, a Python preconditioner that is an exact inverse."""
-    ksp.setType("preonly")
-    ksp.setOperators(matrix)
-    ksp.getPC().setType("python")
-    ksp.getPC().setPythonContext(context)
+class Inverse:
+    """A strategy that is the Python context of a preconditioner, which solves with the ``matrix`` exactly."""
+
+    matrix: PETSc.Mat
+
+    def attach(self, ksp: PETSc.KSP) -> None:
+        """Let ``ksp`` solve so."""
+        ksp.setType("preonly")
+        ksp.setOperators(self.matrix)
+        ksp.getPC().setType("python")
+        ksp.getPC().setPythonContext(self)
 
 
 class Direct:

@@ -88,6 +88,12 @@ def internal_force(bulk: Bulk, u: np.ndarray) -> np.ndarray:
     return force.array_r.reshape(-1, 2).copy()
 
 
+def commit(part: Bulk | Contact) -> None:
+    """Accept the history of the last evaluation."""
+    for _, points in part.histories().values():
+        points.commit()
+
+
 def contact_force(contact: Contact, u: np.ndarray) -> np.ndarray:
     """What the contact adds to the residual ``(n_owned, 2)`` at ``u``."""
     contact.evaluate(u)

@@ -16,7 +16,7 @@ from archord.solver.stepping import StepFailure, StepRules, march
 class Spring:
     """Equilibrium and solver in one, which converges in ``cost(load, stride)`` iterations; infinite: it fails."""
 
-    problem = SimpleNamespace(load_name="delta", control="factor", loads=[])
+    problem = SimpleNamespace(load_name="delta", control="factor", loads=[], from_rest=True)
     elastic = False
 
     def __init__(self, cost):

@@ -16,6 +16,7 @@ from tests.solver.parts import (
     PLANE_STRESS,
     YIELD_STRESS,
     E,
+    commit,
     contact_force,
     joint_parts,
 )
@@ -96,7 +97,7 @@ def indented(parts):
     if parts.cells.find(Cells.PIN).size == 0:
         contact.rigid[0].motion = np.array([[0.0, -1.5 * DR]])
     contact.evaluate(parts.pressed(1.2 * DR, noise=0.02 * YIELD_STRAIN, seed=1))
-    contact.commit()
+    commit(contact)
     return parts.pressed(1.5 * DR, noise=0.04 * YIELD_STRAIN, seed=2)
 
 
