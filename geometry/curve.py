@@ -137,7 +137,8 @@ class Curve:
             _END_MARGIN, _NEWTON_STEPS, *map(pointer, results),
         )  # fmt: skip
         if n_lost:
-            raise ProjectionError(f"{n_lost} contact points found no closest point, the first at {x[lost[0]]}")
+            at = "({:g}, {:g})".format(*x[lost[0]])
+            raise ProjectionError(f"{n_lost} contact points found no closest point, the first at {at}")
         nodes = self.connectivity[facet]
         return Projection(found, point, normal, tangent, bend, slides, nodes, shape, slope, facet, xi)
 
