@@ -86,11 +86,6 @@ class Points:
         """PEEQ ``(n,)`` at the last strain seen."""
         return np.broadcast_to(self.material.peeq(self.trial), self.n)
 
-    @property
-    def increment(self) -> Array:
-        """Increment of PEEQ ``(n,)`` from the committed state to the last strain seen."""
-        return self.peeq - self.material.peeq(self.state)
-
     def commit(self) -> None:
         """Make the state of the last strain seen the committed one."""
         self.state = self.trial

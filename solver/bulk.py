@@ -29,11 +29,8 @@ def _voigt(u):
 def matrix(
     V: fem.FunctionSpace, forms: list[fem.Form], extra: tuple[np.ndarray, np.ndarray] | None = None
 ) -> PETSc.Mat:
-    """An empty matrix with room for the bilinear ``forms`` of separate bodies and ``extra`` block (rows, columns).
-
-    The extra slots are global block dofs in rows that this rank owns. What is not written before the first assembly is
-    given back by PETSc.
-    """
+    """An empty matrix with room for the bilinear ``forms`` of separate bodies and ``extra`` blocks (rows, columns), in
+    global block dofs and rows that this rank owns. PETSc gives back what is not written before the first assembly."""
     index_map = V.dofmap.index_map
     n, start = index_map.size_local, index_map.local_range[0]
     diagonal, off = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
@@ -61,10 +58,8 @@ def matrix(
 
 
 def assemble(A: PETSc.Mat, forms: list[fem.Form], bcs: Sequence[fem.DirichletBC] = ()) -> None:
-    """Add bilinear ``forms`` to ``A``, with ones on the diagonal of the rows of ``bcs``.
-
-    dolfinx inserts those ones; without a flush after each form the next one's additions would be dropped silently.
-    """
+    """Add bilinear ``forms`` to ``A``, with ones on the diagonal of the rows of ``bcs``. dolfinx inserts those ones;
+    without a flush after each form the next one's additions would be dropped silently."""
     for form in forms:
         fem_petsc.assemble_matrix(A, form, list(bcs))
         A.assemblyBegin(PETSc.Mat.AssemblyType.FLUSH)

@@ -114,8 +114,6 @@ class Equilibrium:
         vector.scatter_reverse(InsertMode.add)
         return vector.array[: 2 * self.n_owned].reshape(-1, 2) / (problem.symmetry * total)
 
-    # ------------------------------------------------------------------ unknowns and tangent
-
     def pack(self, state: Array, x: PETSc.Vec) -> None:
         """Put ``state``, shaped like `state`, with its prescribed values replaced, into the unknowns ``x``."""
         self.factor = self.control.start(self.load, float(state[-1]))
@@ -139,13 +137,9 @@ class Equilibrium:
             self._choose_linear()
         return self._pattern_grew
 
-    # ------------------------------------------------------------------ residual
-
     def residual_of(self, x: PETSc.Vec, f: PETSc.Vec) -> bool:
         """The residual ``f`` at the unknowns ``x``; returns whether there is another tangent matrix now. Collective.
-
-        Raises `ProjectionError` if a contact point finds no partner, and what `evaluate` raises.
-        """
+        Raises `ProjectionError` if a contact point finds no partner, and what `evaluate` raises."""
         self.u.x.array[: 2 * self.n_owned] = x.array_r[: 2 * self.n_owned]
         self.u.x.scatter_forward()
         self.factor = self.control.factor(x)
@@ -205,8 +199,6 @@ class Equilibrium:
         """Force that works on the load factor: those of supports and rigid discs along their rates, over all ranks."""
         on_supports = self.comm.allreduce(float((self._reaction * self.rate[: self.n_owned]).sum()))
         return on_supports + self.contact.force_on_factor()
-
-    # ------------------------------------------------------------------ state
 
     def points(self) -> list[Points]:
         """The points of bulk and contact, of materials and of contact laws."""

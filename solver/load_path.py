@@ -74,7 +74,7 @@ class LoadPath:
         # where the path turns, it first goes back elastically
         afar = ratio < 0
         yield self.state + self.at.increment * ratio if near else self.state, afar
-        if near and not afar and self.solver.elastic:
+        if near and not afar and not self.solver.equilibrium.bulk.plastic:
             # an extrapolated state has a kink where the contact ended, which fine meshes resolve
             yield self.state, True
 

@@ -33,9 +33,8 @@ class Gather:
         parts = self.comm.gather(values)
         if parts is None:
             return np.zeros(0)
-        whole = np.concatenate(parts)
-        ordered = np.empty((len(self.unique), *whole.shape[1:]), dtype=whole.dtype)
-        ordered[self._slot] = whole
+        ordered = np.empty((len(self.unique), *values.shape[1:]), dtype=values.dtype)
+        ordered[self._slot] = np.concatenate(parts)
         return ordered
 
 

@@ -133,8 +133,8 @@ class NewtonSolver:
         result.converged = code > 0
         result.reason = "converged" if result.converged else self._failure or _REASONS.get(code, f"SNES reason {code}")
         if not result.converged:
-            increment = max((float(p.increment.max(initial=0.0)) for p in at.plastic_points()), default=0.0)
-            result.plastic_increment = at.comm.allreduce(increment, op=MPI.MAX)
+            grown = [(p.peeq - p.material.peeq(p.state)).max(initial=0.0) for p in at.plastic_points()]
+            result.plastic_increment = at.comm.allreduce(float(max(grown, default=0.0)), op=MPI.MAX)
             result.worst = at.worst_place()
         return result
 

@@ -26,11 +26,6 @@ class Recovery:
         self.newton, self.equilibrium = newton, newton.equilibrium
         self.continues_gamma = False
 
-    @property
-    def elastic(self) -> bool:
-        """Whether no body can yield, so that nothing but the contact is nonlinear."""
-        return not self.equilibrium.bulk.plastic
-
     def solve(self, load: float, guesses: Iterable[tuple[Array, bool]]) -> Newton:
         """Solve at ``load`` from one of the ``guesses`` after the other, of which each tells whether it comes from afar
         (see `_solve_at_once`). Collective.
@@ -104,7 +99,8 @@ class Recovery:
         circles = len(changes) > CIRCLING and not any(changes[-CIRCLING:])
         if result.converged or not circles or not any(pair.moves for pair in contact.pairs):
             return result.converged
-        contact.hold()
+        for pair in contact.pairs:
+            pair.start = "held"
         result = self.newton.solve(None, line_search=line_search, goal=goal)
         result.held = True
         self._solves.append(result)

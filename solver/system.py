@@ -77,8 +77,6 @@ class System:
             u[self.nodes_of(self.problem.tag(body))] = guess.moved.get(body.name, 0.0)
         return np.append(u, guess.factor)
 
-    # ------------------------------------------------------------------ what is asked of the last evaluation
-
     def reaction(self, name: str) -> Array:
         """Force ``(2,)`` of the supports ``name`` on the whole."""
         return self.problem.symmetry * self.equilibrium.reaction(name)

@@ -65,17 +65,10 @@ class Contact:
             for pair in interface.pairs:
                 pair.use_gamma(min(interface.interaction.gamma_factor, factor))
 
-    def hold(self) -> None:
-        """Keep all points on the facets they were last paired with, until `search`: the forces become smooth."""
-        for pair in self.pairs:
-            pair.start = "held"
-
     def evaluate(self, u: Array) -> bool:
-        """Gaps, tractions and trial history at the nodal displacements ``u`` ``(n, 2)`` of this rank.
-
-        Returns whether the matrix pattern had to grow (the pairs slid out of it). Collective; raises `ProjectionError`
-        on every rank if a point on any of them finds no partner.
-        """
+        """Gaps, tractions and trial history at the nodal displacements ``u`` ``(n, 2)`` of this rank; returns whether
+        the matrix pattern had to grow (the pairs slid out of it). Collective; raises `ProjectionError` on every rank if
+        a point on any of them finds no partner."""
         motions = [pair.opposite.curve_displacement(u) for pair in self.pairs]
         try:
             with on_every_rank(self.comm):
@@ -92,10 +85,8 @@ class Contact:
 
     def anticipate(self, u: Array) -> bool:
         """Open and close the points that would with the displacements ``u`` ``(n, 2)``, to first order and between the
-        same partners, while rigid surfaces stand still; returns whether any does.
-
-        Closed points carry their trial pressure, a tension too, until the next evaluation. Collective.
-        """
+        same partners, while rigid surfaces stand still; returns whether any does. Closed points carry their trial
+        pressure, a tension too, until the next evaluation. Collective."""
         for pair in self.pairs:
             pair.expect(trial_rate(pair, u))
         return self.comm.allreduce(sum(pair.changes for pair in self.pairs)) > 0

@@ -24,8 +24,8 @@ class Pair:
     ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)`` normal and tangent
     and ``opening`` ``(m, 2)`` gap and slip; ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` are those of the
     own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active``
-    ``(m,)`` points touch, and ``changes`` are how many opened or closed. The next evaluation searches partners from
-    ``start`` on: anywhere, near the last ones, or on their facets alone, where points are held until it is set again.
+    ``(m,)`` points touch, and ``changes`` opened or closed. The next evaluation searches partners from ``start`` on:
+    anywhere, near the last ones, or on their facets alone, where points are held until it is set again.
     """
 
     def __init__(
@@ -49,10 +49,8 @@ class Pair:
         self.projection = replace(self.projection, normal=-self._outward)
 
     def evaluate(self, u: Array, motion: Array) -> None:
-        """Pairs, gaps, tractions and trial history at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``.
-
-        Raises `ProjectionError`.
-        """
+        """Pairs, gaps, tractions and trial history at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``;
+        raises `ProjectionError`."""
         displacement, stress, moduli = self.surface.deform(u)
         self.moduli = np.ascontiguousarray(moduli)
         if self.moves:

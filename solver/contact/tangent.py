@@ -92,10 +92,8 @@ class ContactTangent:
 
 
 def trial_rate(pair: Pair, u: Array) -> Array:
-    """What displacements ``u`` ``(n, 2)`` add to the trial tractions ``(m, 2)``, linearised at the last evaluation.
-
-    Points keep their partners, and a rigid opposite stands still. Collective.
-    """
+    """What displacements ``u`` ``(n, 2)`` add to the trial tractions ``(m, 2)``, linearised at the last evaluation:
+    points keep their partners, and a rigid opposite stands still. Collective."""
     motion = pair.opposite.curve_displacement(u) if isinstance(pair.opposite, Surface) else np.zeros((1, 2))
     own, opposite = u[pair.surface.cell_dofs], motion[pair.projection.nodes]
     rate = np.empty_like(pair.trial)

@@ -65,10 +65,8 @@ class Bordered(Inverse):
         x.array[: self._n], x.array[self._n :] = u, factor
 
     def update(self, b: Array, c: Array, d: float, *, factorise: bool = True) -> None:
-        """New border for a matrix with new values: ``b`` and ``c`` of this rank's dofs, ``d`` of all ranks.
-
-        Without ``factorise`` the preconditioner stays that of the last matrix that was factorised.
-        """
+        """New border for a matrix with new values: ``b`` and ``c`` of this rank's dofs, ``d`` of all ranks. Without
+        ``factorise`` the preconditioner stays that of the last matrix that was factorised."""
         self.b, self.c, self.d = b, c, d
         self._stale |= factorise
         self._ksp.getPC().setReusePreconditioner(not self._stale)

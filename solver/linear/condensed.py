@@ -45,7 +45,7 @@ def why_not(facts: Facts) -> str | None:
 
 
 class Condensed(Inverse):
-    """Python context of a preconditioner that solves with ``K + E D``. Collective.
+    """Python context of the matrix ``K + E D`` and of its preconditioner, which solves with it. Collective.
 
     ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)``, sorted, are the block dofs that may get
     forces, and ``near`` ``(k,)`` those on which they depend, the same on every rank, as is all that is as small as the
@@ -55,7 +55,7 @@ class Condensed(Inverse):
     """
 
     def __init__(self, K: PETSc.Mat, nodes: np.ndarray, revise: Callable[[Array], Array | None]) -> None:
-        self.comm, self.matrix, self._nodes, self._revise = K.comm.tompi4py(), K, nodes, revise
+        self.comm, self._K, self._nodes, self._revise = K.comm.tompi4py(), K, nodes, revise
         self._start, self._end = K.getOwnershipRange()
         K.setOption(PETSc.Mat.Option.SPD, True)
         self._ksp = PETSc.KSP().create(K.comm)
@@ -67,10 +67,12 @@ class Condensed(Inverse):
         self._y = K.createVecLeft()
         self._Z = self._responses(_dofs(nodes))
         self.occupy(*np.zeros((2, 0), dtype=np.int64))
+        self.matrix = PETSc.Mat().createPython(K.getSizes(), context=self, comm=K.comm)
+        self.matrix.setUp()
 
     def _responses(self, dofs: np.ndarray) -> Array:
         """Displacements ``(n of this rank, 2 m)`` under unit forces at ``dofs`` ``(2 m,)``, one after the other."""
-        K, m = self.matrix, len(dofs)
+        K, m = self._K, len(dofs)
         self._found, unit = (PETSc.Mat().createDense((K.getSizes()[0], (None, m)), comm=K.comm) for _ in range(2))
         self._found.setUp()
         if self.comm.size == 1:  # sparse: MUMPS skips what they leave zero; of several ranks PETSc spoils sparse ones
@@ -134,6 +136,12 @@ class Condensed(Inverse):
         self._D[row], self._filled[row] = D, D.any(axis=1)
         used = np.flatnonzero(D.any(axis=0))
         self._DZ[row] = D[:, used] @ self._near_Z[used]
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """``y = (K + E D) x``, called by PETSc."""
+        self._K.mult(x, y)
+        mine, at = self._own(_dofs(self._nodes))
+        y.array[at] += (self._D @ self._on_all(self._columns, x.array_r))[mine]
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """``x = (K + E D)^-1 r`` with the points that are closed after ``-x``, called by PETSc; not a number if that is

@@ -17,7 +17,7 @@ class Spring:
     """Equilibrium and solver in one, which converges in ``cost(load, stride)`` iterations; infinite: it fails."""
 
     problem = SimpleNamespace(load_name="delta", control="factor", loads=[], from_rest=True)
-    elastic = False
+    bulk = SimpleNamespace(plastic=True)
 
     def __init__(self, cost):
         self.cost, self.load, self.at, self.solved = cost, 0.0, 0.0, []
@@ -58,7 +58,7 @@ def follow(targets, cost=lambda load, stride: 3, **rules):
 class Kinked(Spring):
     """An elastic joint for which no extrapolated guess is good enough."""
 
-    elastic = True
+    bulk = SimpleNamespace(plastic=False)
 
     def __init__(self):
         super().__init__(lambda load, stride: 3)

@@ -29,7 +29,7 @@ def as_it_is(increment):
 
 
 def test_solves_are_those_with_the_whole_matrix():
-    """Rows that come, go and come again, in any order: the solution is that of the dense matrix."""
+    """Rows that come, go and come again, in any order: product and solution as of the dense matrix."""
     rng = np.random.default_rng(5)
     nodes = 20
     dense, A = stiffness(2 * nodes, rng)
@@ -48,6 +48,8 @@ def test_solves_are_those_with_the_whole_matrix():
         r.array[:] = rng.normal(size=2 * nodes)
         condensed.apply(None, r, x)
         assert whole @ x.array_r == pytest.approx(r.array_r, abs=1e-11)
+        condensed.mult(None, x, r)
+        assert r.array_r == pytest.approx(whole @ x.array_r, abs=1e-12)
 
 
 def test_a_singular_system_has_no_number_for_an_answer():
