@@ -14,7 +14,7 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import lagrange
 from archord.geometry.plane_mesh import distinct_edges
 from archord.output.disk import replace_file
-from archord.output.step_file import StepFile
+from archord.output.step_file import StepFile, step_name
 from archord.solver.mesh_order import MeshOrder
 
 _EDGES = [(1, 2), (0, 2), (0, 1)]  # vertices of a cell's edges, in basix' order of its nodes
@@ -64,15 +64,15 @@ class FieldWriter:
         replace_file(self.path, head + collection + "".join(self._grids) + "</Grid>\n</Domain>\n</Xdmf>\n")
 
     def _grid(self, step: int, time: float, of_cells: list[str]) -> str:
-        place, (n_nodes, n_cells) = self._file.place, self._sizes
-        cells = _data(f"{n_cells} 6", place("mesh/cells"), "Int")
+        n_nodes, n_cells = self._sizes
+        cells = _data(f"{n_cells} 6", 0, "mesh/cells", "Int")
         lines = [
             f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>',
             f'<Topology TopologyType="Triangle_6" NumberOfElements="{n_cells}">{cells}</Topology>',
-            f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", place("mesh/coordinates"))}</Geometry>',
-            _attribute("displacement", "Vector", "Node", _data(f"{n_nodes} 3", place("displacement", step))),
-            *(_attribute(name, "Scalar", "Cell", _data(f"{n_cells}", place(name, step))) for name in of_cells),
-            _attribute("body", "Scalar", "Cell", _data(f"{n_cells}", place("mesh/body"), "Char", 1)),
+            f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", 0, "mesh/coordinates")}</Geometry>',
+            _attribute("displacement", "Vector", "Node", _data(f"{n_nodes} 3", step, "displacement")),
+            *(_attribute(name, "Scalar", "Cell", _data(f"{n_cells}", step, name)) for name in of_cells),
+            _attribute("body", "Scalar", "Cell", _data(f"{n_cells}", 0, "mesh/body", "Char", 1)),
         ]
         return "\n".join([*lines, "</Grid>\n"])
 
@@ -81,9 +81,9 @@ def _attribute(name: str, rank: str, centre: str, data: str) -> str:
     return f'<Attribute Name="{name}" AttributeType="{rank}" Center="{centre}">{data}</Attribute>'
 
 
-def _data(shape: str, place: str, kind: str = "Float", precision: int = 8) -> str:
+def _data(shape: str, step: int, name: str, kind: str = "Float", precision: int = 8) -> str:
     attributes = f'Dimensions="{shape}" NumberType="{kind}" Precision="{precision}" Format="HDF"'
-    return f"<DataItem {attributes}>{place}</DataItem>"
+    return f"<DataItem {attributes}>fields/{step_name(step)}.h5:/{name}</DataItem>"
 
 
 class SecondOrder:

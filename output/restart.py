@@ -71,7 +71,8 @@ def _start(folder: Path, scene: Scene) -> Start:
     before = parse_scene(tomllib.loads(checkpoint.scene), str(path))
     _same_but_for_the_load(folder, before, scene)
     n = checkpoint.step
-    if len(scene.targets) < n or not _same(before.targets[:n], scene.targets[:n]):
+    done, wanted = np.array(before.targets[:n]), np.array(scene.targets[:n])
+    if len(wanted) < n or np.abs(wanted - done).max() > _SAME * np.abs(done).max():
         raise InputError(
             f"{path}: its {n} steps are not the first ones of the scene's path; load.{scene.load.name} and load.steps "
             f"must begin as those of the run, {before.load.legs} and {before.load.leg_steps}."
@@ -86,11 +87,6 @@ def _start(folder: Path, scene: Scene) -> Start:
     except (OSError, ValueError, KeyError, TypeError):
         raise InputError(f"{path}: is missing or lacks some of the {n - 1} steps before the checkpoint's.") from None
     return Start(checkpoint, report, done)
-
-
-def _same(done: list[float], wanted: list[float]) -> bool:
-    """Whether both are the same targets."""
-    return np.allclose(done, wanted, rtol=0, atol=_SAME * np.abs(done).max())
 
 
 def _same_but_for_the_load(folder: Path, own: Scene, scene: Scene) -> None:

@@ -7,7 +7,6 @@ with their square. A reader opens one file and finds ``name/0001`` and so on, wh
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
@@ -51,12 +50,6 @@ class StepFile:
         self._add_step(load, arrays)
         replace_file(self.path, image(self._file))
 
-    def place(self, name: str, step: int = 0) -> str:
-        """Where XDMF finds the array ``name`` of ``step``, by default a fixed one."""
-        if self._apart:
-            return f"{self.path.stem}/{step_name(step)}.h5:/{name}"
-        return f"{self.path.name}:/{_dataset(name, step)}"
-
     def _add_step(self, load: float, arrays: Arrays) -> None:
         self.loads.append(load)
         self._add(len(self.loads), arrays)
@@ -82,20 +75,18 @@ class StepFile:
 
     def _read(self, fixed: Arrays, after: int) -> list[tuple[float, Arrays]]:
         """Load and arrays of the first steps, as many as ``after``."""
-        steps: dict[str, Arrays] = defaultdict(dict)
+        steps: dict[str, Arrays] = {}
         try:
             with h5py.File(self.path) as file:
-                there = int(file["accepted"][()]) >= after and all(file[k].shape == a.shape for k, a in fixed.items())
-                for name, array in all_arrays(file):
-                    steps[name.rpartition("/")[2]][name.rpartition("/")[0]] = array
-                loads = file["load"][:after].tolist()
+                if file["accepted"][()] < after or any(file[name].shape != a.shape for name, a in fixed.items()):
+                    raise ValueError(f"it does not hold the first {after} steps of this run")
+                for path, array in all_arrays(file):
+                    name, _, step = path.rpartition("/")
+                    steps.setdefault(step, {})[name] = array
+                return [(load, steps[step_name(k)]) for k, load in enumerate(file["load"][:after].tolist(), start=1)]
         except (OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
             said = f"is missing or damaged, so that the run cannot be continued ({error})"
             raise InputError(f"{self.path}: {said}.") from None
-        if not there:
-            said = f"does not hold the first {after} steps of this run, so that it cannot be continued"
-            raise InputError(f"{self.path}: {said}.")
-        return [(load, steps[step_name(step)]) for step, load in enumerate(loads, start=1)]
 
 
 def put(file: h5py.File, name: str, values: np.ndarray) -> None:
