@@ -71,8 +71,8 @@ def _start(folder: Path, scene: Scene) -> Start:
     before = parse_scene(tomllib.loads(checkpoint.scene), str(path))
     _same_but_for_the_load(folder, before, scene)
     n = checkpoint.step
-    done, wanted = np.array(before.targets[:n]), np.array(scene.targets[:n])
-    if len(wanted) < n or np.abs(wanted - done).max() > _SAME * np.abs(done).max():
+    reached, wanted = np.array(before.targets[:n]), np.array(scene.targets[:n])
+    if len(wanted) < n or np.abs(wanted - reached).max() > _SAME * np.abs(reached).max():
         raise InputError(
             f"{path}: its {n} steps are not the first ones of the scene's path; load.{scene.load.name} and load.steps "
             f"must begin as those of the run, {before.load.legs} and {before.load.leg_steps}."
