@@ -111,8 +111,8 @@ class Bulk:
         elastic = {}
         for tag, material in materials.items():
             moduli = fem.Constant(V.mesh, np.array(material.elastic_tangent))
-            domain, metadata = [(1, self.cells[tag])], {"quadrature_degree": rule}
-            dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
+            domain = [(1, self.cells[tag])]
+            dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": rule})(1)
             elastic[tag] = fem.form(ufl.inner(ufl.dot(moduli, u), v) * dx)
         self.elastic_forms = list(elastic.values())
         if self._plastic:

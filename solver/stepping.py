@@ -81,12 +81,12 @@ def march(
     ``attempted(load, iterations)`` every solve. Raises `StepFailure`.
     """
     at, rules = path.at, rules or StepRules()
-    at.size = at.size or rules.initial
+    size = at.size or rules.initial
     for number in range(at.targets_done, len(targets)):
         begun, target, passed, just_cut = at.load, targets[number], 0.0, False
         record = Step(target)
         while passed < 1:
-            end = passed + at.size if passed + at.size <= 1 - _SLIVER else 1.0
+            end = passed + size if passed + size <= 1 - _SLIVER else 1.0
             load = target if end == 1 else begun + end * (target - begun)
             result = path.attempt(load)
             record.iterations += result.iterations
@@ -96,27 +96,27 @@ def march(
             if result.converged:
                 record.substeps += 1
                 if result.iterations <= rules.target_iterations and not just_cut:
-                    at.size = min(rules.maximum, rules.growth * at.size)
-                just_cut, passed = False, end
+                    size = min(rules.maximum, rules.growth * size)
+                just_cut, passed, at.size = False, end, size
                 path.accept(load)
                 substep_done(load)
                 continue
             record.cutbacks += 1
             path.take_back()
-            if at.size <= rules.minimum:
-                raise StepFailure(_why(result, path.solver.equilibrium.problem, load, at), record)
-            at.size, just_cut = max(rules.minimum, rules.cutback * at.size), True
+            if size <= rules.minimum:
+                raise StepFailure(_why(result, path.solver.equilibrium.problem, load, at.load, size), record)
+            size, just_cut = max(rules.minimum, rules.cutback * size), True
         at.targets_done = number + 1
         target_done(record, at)
 
 
-def _why(result: Newton, problem: Problem, load: float, at: Position) -> str:
+def _why(result: Newton, problem: Problem, load: float, held: float, size: float) -> str:
     name, by_force = problem.load_name, problem.control == "force" or problem.loads
     where = "" if result.worst is None else f", the largest residual at ({result.worst[0]:.4g}, {result.worst[1]:.4g})"
     last = f"{result.residuals[-1]:.1e}" if result.residuals and np.isfinite(result.residuals[-1]) else "none"
-    cut = f"the step was cut to {at.size:.2g} of an output step" if at.size < 1 else "no smaller step is allowed"
+    cut = f"the step was cut to {size:.2g} of an output step" if size < 1 else "no smaller step is allowed"
     limit = "; if the bodies yield as a whole, the limit load is close" if by_force and result.plastic_increment else ""
     return (
         f"no equilibrium at {name} = {load:.6g}: {result.reason}; after {result.iterations} iterations the residual "
-        f"over reaction was {last}{where}; {cut}; the last load that held is {name} = {at.load:.6g}{limit}"
+        f"over reaction was {last}{where}; {cut}; the last load that held is {name} = {held:.6g}{limit}"
     )

@@ -36,9 +36,9 @@ class Contact:
 
     def __init__(self, V: fem.FunctionSpace, interfaces: Sequence[Interface] = ()) -> None:
         self.interfaces, self.comm = list(interfaces), V.mesh.comm
-        both = [surface for i in interfaces for surface in i.surfaces]
-        self.surfaces = [surface for surface in both if isinstance(surface, Surface)]
-        self.rigid = [surface for surface in both if isinstance(surface, RigidSurface)]
+        self._all = [surface for i in interfaces for surface in i.surfaces]
+        self.surfaces = [surface for surface in self._all if isinstance(surface, Surface)]
+        self.rigid = [surface for surface in self._all if isinstance(surface, RigidSurface)]
         self.pairs = [pair for i in interfaces for pair in i.pairs]
         self._n_dofs = V.dofmap.index_map.size_global
         for number, surface in enumerate(self.rigid):
@@ -101,7 +101,7 @@ class Contact:
 
     def add_force(self, force: Array) -> None:
         """Subtract the contact forces of the last evaluation from the residual ``force`` ``(n, 2)`` of owned nodes."""
-        on = {id(surface): np.zeros((len(surface.curve_dofs), 2)) for surface in [*self.surfaces, *self.rigid]}
+        on = {id(surface): np.zeros((len(surface.curve_dofs), 2)) for surface in self._all}
         for pair in self.pairs:
             pair.add_forces(on[id(pair.surface)], on[id(pair.opposite)])
         for surface in self.surfaces:
