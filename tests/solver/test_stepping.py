@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+from archord.presets.joint import Joint
 from archord.solver.stepping import StepFailure, StepRules, march
 from tests.solver.solving import scene, solve
 
@@ -39,9 +41,6 @@ def test_a_failed_step_leaves_no_trace():
 def test_a_solve_that_cannot_go_on_says_where_and_why():
     """The message holds delta, the reason, the residual and its place; accepted steps were reported before."""
     problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6})
-    from archord.presets.joint import Joint
-    from tests.solver.solving import MPI
-
     joint, accepted = Joint(problem, MPI.COMM_SELF), []
     targets = problem.targets
     with pytest.raises(
