@@ -65,20 +65,17 @@ class FieldWriter:
 
     def _grid(self, step: int, time: float, of_cells: list[str]) -> str:
         n_nodes, n_cells = self._sizes
+        nodal, body = _data(f"{n_nodes} 3", step, "displacement"), _data(f"{n_cells}", 0, "mesh/body", "Char", 1)
         cells = _data(f"{n_cells} 6", 0, "mesh/cells", "Int")
         lines = [
             f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>',
             f'<Topology TopologyType="Triangle_6" NumberOfElements="{n_cells}">{cells}</Topology>',
             f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", 0, "mesh/coordinates")}</Geometry>',
-            _attribute("displacement", "Vector", "Node", _data(f"{n_nodes} 3", step, "displacement")),
-            *(_attribute(name, "Scalar", "Cell", _data(f"{n_cells}", step, name)) for name in of_cells),
-            _attribute("body", "Scalar", "Cell", _data(f"{n_cells}", 0, "mesh/body", "Char", 1)),
+            f'<Attribute Name="displacement" AttributeType="Vector" Center="Node">{nodal}</Attribute>',
         ]
+        for name, data in [*((name, _data(f"{n_cells}", step, name)) for name in of_cells), ("body", body)]:
+            lines.append(f'<Attribute Name="{name}" AttributeType="Scalar" Center="Cell">{data}</Attribute>')
         return "\n".join([*lines, "</Grid>\n"])
-
-
-def _attribute(name: str, rank: str, centre: str, data: str) -> str:
-    return f'<Attribute Name="{name}" AttributeType="{rank}" Center="{centre}">{data}</Attribute>'
 
 
 def _data(shape: str, step: int, name: str, kind: str = "Float", precision: int = 8) -> str:

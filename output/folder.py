@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import os
 from collections.abc import Iterator
@@ -49,11 +48,11 @@ def claim_folder(folder: Path, force: bool) -> None:
     ``force``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        empty = not any(folder.iterdir())
-        if not os.access(folder, os.W_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        empty, fault = not any(folder.iterdir()), "" if os.access(folder, os.W_OK) else "Permission denied"
     except OSError as error:
-        raise InputError(f"{folder}: cannot be used for results: {error.strerror}.") from None
+        empty, fault = True, error.strerror
+    if fault:
+        raise InputError(f"{folder}: cannot be used for results: {fault}.")
     if not (empty or force):
         said = "is not empty; choose another folder with -o, or overwrite a run in it with --force"
         raise InputError(f"{folder}: {said}.")

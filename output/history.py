@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 def _columns(scene: Scene) -> list[tuple[str, str, float]]:
     """Heading, attribute of `Measures` and divisor of every column."""
     units, R, dR, E = scene.units, scene.joint.radius, scene.joint.dR, scene.E_star
-    energy = "E* R2", E * R * R
+    energy = "(E* R2)", E * R * R
     table: list[tuple[str, str, str, float]] = [
         # attribute, unit, what makes it dimensionless, its value
         ("step", "", "", 1.0),
         ("delta", units.length, "dR", dR),
-        ("P", units.force, "E* R", E * R),
+        ("P", units.force, "(E* R)", E * R),
         ("p0", units.stress, "E*", E),
         ("eps", "rad", "", 1.0),
         ("contact_area", units.length, "R", R),
@@ -41,7 +41,7 @@ def _columns(scene: Scene) -> list[tuple[str, str, float]]:
     for name, unit, scale, divisor in table:
         columns.append((f"{name} [{unit}]" if unit else name, name, 1.0))
         if scale:
-            columns.append((f"{name}/({scale})" if " " in scale else f"{name}/{scale}", name, divisor))
+            columns.append((f"{name}/{scale}", name, divisor))
     return columns
 
 

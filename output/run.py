@@ -8,13 +8,12 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mpi4py import MPI
 
 from archord.output.checkpoint import halt, resume
 from archord.output.checkpoint import write as write_checkpoint
-from archord.output.contact import FIXED, PER_STEP, contact_arrays
 from archord.output.disk import WriteError, replace_file
 from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import write_history
@@ -23,7 +22,7 @@ from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
 from archord.output.stale_jit import without_stale_forms
 from archord.output.step_file import StepFile
-from archord.presets.arc import ArcProfile, arc_profiles
+from archord.presets.arc import FIXED, PER_STEP, ArcProfile, arc_profiles
 from archord.presets.joint import Joint
 from archord.presets.joint_report import APART, UNSEEN, step_warnings
 from archord.presets.measures import Measures, Work, measure
@@ -36,16 +35,13 @@ from archord.solver.mesh_order import MeshOrder
 from archord.solver.stepping import Step, StepFailure, StepRules, march
 from archord.solver.timer import Timer
 
-if TYPE_CHECKING:
-    from archord.output.fields import FieldWriter
-
 
 @dataclass
 class Outcome:
     """How a run ended: ``status`` is "done", "stopped" or "interrupted" (``message`` says why), and its steps.
 
-    ``signal`` interrupted it. ``warnings`` are known on rank 0 only. ``unseen`` says that the mesh was too coarse to
-    notice the contact, ``accuracy`` how accurate a run is that was asked for it (`studies.accuracy.Accuracy`).
+    ``signal`` interrupted it. ``warnings`` are known on rank 0 only, ``accuracy`` of a run that was asked for it
+    (`studies.accuracy.Accuracy`).
     """
 
     folder: Path
@@ -54,7 +50,6 @@ class Outcome:
     steps: list[Measures]
     warnings: list[str]
     signal: int = 0
-    unseen: bool = False
     accuracy: Any = None
 
 
@@ -109,15 +104,13 @@ def solve_scene(
             status, message = "interrupted", f"{interrupted} after step {len(output.steps)}"
             received = interrupted.number
         apart = status == "done" and not any(m.contact_area for m in output.steps)
-        unseen = apart and any(m.delta > 0 for m in output.steps)  # pressed together, but no contact point noticed
-        if unseen:
-            status, message = "stopped", UNSEEN
+        if apart and any(m.delta > 0 for m in output.steps):  # pressed together, but no contact point noticed
+            status, message, apart = "stopped", UNSEEN, False
         try:
-            said = [APART] if apart and not unseen else []
-            warnings = output.finish(said, status=status, message=message, **failed)
+            warnings = output.finish([APART] if apart else [], status=status, message=message, **failed)
         except WriteError as error:
             status, message, warnings = "stopped", message if status == "stopped" else str(error), []
-        return Outcome(folder, status, message, output.steps, warnings, received, unseen)
+        return Outcome(folder, status, message, output.steps, warnings, received)
 
 
 class _Output:
@@ -134,7 +127,7 @@ class _Output:
         with joint.timer("output"):
             self._order = MeshOrder(joint)
             self._bodies = self._order.bodies()
-        self._fields: FieldWriter | None = None  # with the first step, on rank 0
+        self._fields: Any = None  # a `FieldWriter` with the first step, on rank 0
         self._contact: StepFile | None = None
         if comm.rank == 0:
             self._report = Report(folder / "run.json", joint, begun, self.steps, start.report if start else {})
@@ -188,8 +181,8 @@ class _Output:
                         self._fields = FieldWriter(self.folder, self._order, self._bodies, after, numbered)
                     self._fields.write(m.delta, fields)
                 if not self._contact:
-                    self._contact = StepFile(self.folder / "contact.h5", contact_arrays(profiles, FIXED), after)
-                self._contact.write(m.delta, contact_arrays(profiles, PER_STEP))
+                    self._contact = StepFile(self.folder / "contact.h5", _arrays(profiles, FIXED), after)
+                self._contact.write(m.delta, _arrays(profiles, PER_STEP))
                 write_history(self.folder / "history.csv", scene, self.steps)
                 self._report.add(step, warnings)
 
@@ -201,3 +194,8 @@ class _Output:
         ending["peak_memory"] = self.joint.comm.gather(peak_memory())
         found = self._on_root(lambda: self._report.finish(warnings, **ending))
         return found if self.joint.comm.rank == 0 else []
+
+
+def _arrays(profiles: dict[str, ArcProfile], names: tuple[str, ...]) -> dict[str, Any]:
+    """The arrays of all ``profiles`` that have these ``names``, as contact.h5 names them."""
+    return {f"{side}/{name}": getattr(profile, name) for side, profile in profiles.items() for name in names}

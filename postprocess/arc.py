@@ -8,11 +8,9 @@ import numpy as np
 from archord.materials.material import Array
 from archord.output.step_file import step_name
 from archord.postprocess.curve import RunCurve
-from archord.presets.arc import ArcProfile
+from archord.presets.arc import PER_STEP, ArcProfile
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
-
-_FIXED, _PER_STEP = ("s", "weight"), ("coordinates", "pressure", "raw_pressure", "gap")
 
 
 def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
@@ -29,8 +27,8 @@ def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
             if int(file["accepted"][()]) < step:
                 raise KeyError(step)
             for side in (side for side in radius if side in file):
-                arrays = {name: file[f"{side}/{name}"][()] for name in _FIXED}
-                arrays |= {name: file[f"{side}/{name}/{step_name(step)}"][()] for name in _PER_STEP}
+                arrays = {name: file[f"{side}/{name}"][()] for name in ("s", "weight")}
+                arrays |= {name: file[f"{side}/{name}/{step_name(step)}"][()] for name in PER_STEP}
                 found[side] = ArcProfile(radius[side], **arrays)
     except (OSError, KeyError, RuntimeError, TypeError, ValueError):
         raise InputError(f"{path}: cannot be read as the contact of a run.") from None

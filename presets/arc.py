@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solve
     from archord.presets.joint import Joint
 
 SYMMETRY = 2.0  # the half that is modelled makes up a joint so many times
+FIXED, PER_STEP = ("s", "angle", "weight"), ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
 _PEAK_FRACTION = 0.25  # part of the contact angle over which the parabola of the peak is fitted
 _EDGE_FACETS = 4  # facets whose forces give the edge of the contact
 

@@ -24,6 +24,7 @@ from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
 from archord.presets.joint import Joint
+from archord.presets.joint_report import UNSEEN
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupt, Interrupted
@@ -176,7 +177,7 @@ class _Search:
         begun, geometry = perf_counter(), scene.joint
         self.outcome = outcome = solve_scene(scene, self.folder, self.comm, on_start=self._started, **self.options)
         steps = outcome.steps
-        if outcome.status != "done" and not outcome.unseen:
+        if outcome.status != "done" and outcome.message != UNSEEN:
             raise _End
         area = max(m.contact_area for m in steps)
         # P is round-off where nothing touches
