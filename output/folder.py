@@ -50,7 +50,7 @@ def claim_folder(folder: Path, force: bool) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         empty, fault = not any(folder.iterdir()), "" if os.access(folder, os.W_OK) else "Permission denied"
     except OSError as error:
-        empty, fault = True, error.strerror
+        empty, fault = True, error.strerror or str(error)
     if fault:
         raise InputError(f"{folder}: cannot be used for results: {fault}.")
     if not (empty or force):
