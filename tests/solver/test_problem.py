@@ -129,6 +129,9 @@ REFUSED = {
     "no facet set 'top'": {"supports": [Support("base", "top", 1)]},
     "no cell set 'middle'": {"bodies": [Body("middle", ELASTIC)]},
     "'left' belongs to 2 cell sets": {"interactions": [Interaction("joint", ("left", "lower top"))]},
+    "does not have the surface 'lid'": {
+        "interactions": [Interaction("joint", ("upper bottom", "lower top"), integrated="lid")]
+    },
     'use "factor"': {"control": "force", "loads": [Load("lower", (0.0, -1.0))]},
     "must say yields": {"bodies": [Body("lower", Stiffening(E, NU, "strain"))]},
 }
