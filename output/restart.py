@@ -54,6 +54,8 @@ def plan_restart(folder: Path, scene: Scene | None = None, *, extend: bool = Fal
     """
     scene = load_scene(folder / "scene.toml") if scene is None else scene
     if not extend and not (folder / CHECKPOINT).exists():
+        if (folder / "scene.toml").exists():
+            _same_but_for_the_load(folder, load_scene(folder / "scene.toml"), scene)
         return Plan(scene, None, f"{folder} holds no accepted step: starting from the beginning")
     start = _start(folder, scene)
     step, total = start.checkpoint.step, len(scene.targets)

@@ -22,8 +22,9 @@ from archord.geometry.curve import ProjectionError
 from archord.materials.material import Points
 from archord.solver.contact.interaction import Interface, on_every_rank
 from archord.solver.contact.pair import Pair
+from archord.solver.contact.sparsity import Reach
 from archord.solver.contact.surface import RigidSurface, Surface
-from archord.solver.contact.tangent import ContactTangent, Reach, trial_rate
+from archord.solver.contact.tangent import ContactTangent, trial_rate
 
 
 class Contact:

@@ -9,7 +9,8 @@ import pytest
 
 from archord.materials.elasticity import von_mises
 from archord.materials.hardening import LinearHardening
-from archord.materials.j2 import J2Material, PlasticState, return_map
+from archord.materials.j2 import J2Material
+from archord.materials.return_map import PlasticState, return_map
 from tests.materials.test_elasticity import NU, E, hooke, turned
 from tests.materials.test_voce import Voce
 

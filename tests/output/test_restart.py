@@ -226,14 +226,17 @@ def halted(crashed, tmp_path):
 
 
 def test_only_step_control_may_change(halted):
-    """Another key is named with both values; [stepping] and max_iterations are free, and the run goes on with them."""
-    folder = halted
+    """Another key is named with both values; [stepping] and max_iterations are free, and the run goes on with them. A run
+    without its checkpoint is not overwritten by another scene either."""
+    folder, lost = halted, shutil.copytree(halted, halted.with_name("lost"))
+    (lost / "checkpoint.h5").unlink()
     own = tomllib.loads(resolved(scene(0.25, 3)))
     for section, key, value in (("block", "nu", 0.29), ("analysis", "plane", "stress"), ("load", "core_radius", 0.2)):
         other = parse_scene(own | {section: own[section] | {key: value}})
-        with pytest.raises(InputError, match=rf"was solved with {section}\.{key} = .*, the scene says") as error:
-            plan_restart(folder, other)
-        assert len(str(error.value).splitlines()) == 1
+        for there in (folder, lost):
+            with pytest.raises(InputError, match=rf"was solved with {section}\.{key} = .*, the scene says") as error:
+                plan_restart(there, other)
+            assert len(str(error.value).splitlines()) == 1
     analysis = own["analysis"] | {"max_iterations": 12}
     other = parse_scene(own | {"stepping": own["stepping"] | {"initial": 0.5}, "analysis": analysis})
     go_on(other, folder)

@@ -1,0 +1,127 @@
+"""The return map of J2 plasticity with isotropic hardening, for plane strain and plane stress, on arrays of points.
+
+Backward Euler, with the tangent consistent with it (Simo and Hughes, Computational Inelasticity, 1998, Boxes 3.2 and
+3.3). Of the components that a plane has, ``C`` are the elastic moduli and ``P`` takes a stress to its deviator (as a
+strain), so that the von Mises stress is ``q^2 = 1.5 sigma . P sigma``. The plastic strain grows by ``zeta P sigma``,
+``zeta = 1.5 d_peeq / q``, and the stress is ``(C^-1 + zeta P)^-1`` times the elastic trial strain. ``C`` and ``P``
+share their eigenvectors: each eigencomponent of the trial stress shrinks alone, by ``1 + zeta C_k P_k``, and one scalar
+equation a point is left for ``zeta``.
+
+With linear hardening in plane strain it has a closed form, `radial_return`, computed in C.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from archord.kernels.compiled import library, pointer
+from archord.materials.elasticity import Elastic
+from archord.materials.hardening import Hardening
+from archord.materials.material import Array
+
+_ITERATIONS = 60
+# components of (n, 4) stresses and of strains that a plane has; eigenvectors and eigenvalues of P
+_PLANES = {
+    "stress": (
+        [0, 1, 3],
+        np.array([[1, 1, 0], [-1, 1, 0], [0, 0, 1]]) / np.sqrt([[2], [2], [1]]),
+        np.array([1 / 3, 1.0, 2.0]),
+    ),
+    "strain": (
+        [0, 1, 2, 3],
+        np.array([[1, 1, 1, 0], [-1, 1, 0, 0], [1, 1, -2, 0], [0, 0, 0, 1]]) / np.sqrt([[3], [2], [6], [1]]),
+        np.array([0.0, 1.0, 1.0, 2.0]),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class PlasticState:
+    """History of ``n`` points: plastic strain ``(n, 4)``, ``[xx, yy, zz, xy]`` (tensor shear), and PEEQ ``(n,)``."""
+
+    plastic_strain: Array
+    peeq: Array
+
+
+def return_map(strain: Array, old: PlasticState, m: Elastic, hardening: Hardening) -> tuple[Array, Array, PlasticState]:
+    """Stress ``(n, 4)``, tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from the ``old`` state,
+    with the elasticity of ``m``."""
+    parts, Q, deviator = _PLANES[m.plane]
+    lam, mu = m.lame
+    first = 3 * lam + 2 * mu if m.plane == "strain" else m.E / (1 - m.nu)
+    moduli = np.array([first, *[2 * mu] * (len(parts) - 2), mu])
+    C, P = Q.T * moduli @ Q, Q.T * deviator @ Q
+    shear = np.array([1.0, 1.0, 1.0, 2.0])  # engineering over tensor
+    elastic = -old.plastic_strain * shear
+    elastic[:, [0, 1, 3]] += strain
+    stress, tangent = np.zeros((len(strain), 4)), np.tile(m.elastic_tangent, (len(strain), 1, 1))
+    stress[:, parts] = elastic[:, parts] @ C
+    a = stress[:, parts] @ Q.T
+    p = np.flatnonzero(np.sqrt(1.5 * a**2 @ deviator) > hardening.stress(old.peeq))
+    if not len(p):
+        return stress, tangent, old
+    zeta, q = plastic_multiplier(a[p], 1.5 * deviator, moduli * deviator, hardening, old.peeq[p])
+    shrink = 1 + zeta[:, None] * (moduli * deviator)
+    sigma = (a[p] / shrink) @ Q
+    stress[p[:, None], parts] = sigma
+
+    plastic_strain, peeq = old.plastic_strain.copy(), old.peeq.copy()
+    peeq[p] += 2 / 3 * zeta * q
+    flow = sigma @ P
+    grown = np.stack([flow[:, 0], flow[:, 1], -flow[:, 0] - flow[:, 1], flow[:, -1]], axis=1) / shear
+    plastic_strain[p] += zeta[:, None] * grown
+
+    softened = np.einsum("ki,nk,kj->nij", Q, moduli / shrink, Q)  # (C^-1 + zeta P)^-1
+    direction = np.einsum("nij,nj->ni", softened, flow)
+    slope = hardening.slope(peeq[p])
+    left = 1 - 2 / 3 * slope * zeta
+    factor = left / (left * np.einsum("ni,ni->n", flow, direction) + 4 / 9 * slope * q**2)
+    consistent = softened - factor[:, None, None] * direction[:, :, None] * direction[:, None, :]
+    in_plane = np.array([0, 1, len(parts) - 1])
+    tangent[p] = consistent[:, in_plane[:, None], in_plane]
+    return stress, tangent, PlasticState(plastic_strain, peeq)
+
+
+def plastic_multiplier(
+    a: Array, weights: Array, compliance: Array, hardening: Hardening, peeq: Array
+) -> tuple[Array, Array]:
+    """``zeta`` and von Mises stress ``q``, ``(n,)`` each, of points that yield.
+
+    With components ``a`` ``(n, k)`` of the trial stress, ``q^2 = sum_k weights_k (a_k / (1 + zeta compliance_k))^2``,
+    and ``d_peeq = 2/3 zeta q`` from the old ``peeq``. If the yield stress is concave, ``1/q - 1/stress(PEEQ)`` is
+    increasing and concave in ``zeta``: Newton from 0 cannot overshoot. What does not converge is not a number.
+    """
+    zeta = np.zeros(len(a))
+    close = 1e-10 / compliance.max()  # Newton is quadratic: a step this small leaves nothing but round-off
+    for _ in range(_ITERATIONS):
+        shrink = 1 + zeta[:, None] * compliance
+        q = np.sqrt((a / shrink) ** 2 @ weights)
+        fall = ((a**2 / shrink**3) @ (weights * compliance)) / q  # - dq / dzeta
+        now = peeq + 2 / 3 * zeta * q
+        strength = hardening.stress(now)
+        rise = hardening.slope(now) * 2 / 3 * (q - zeta * fall)
+        step = (1 / q - 1 / strength) / (fall / q**2 + rise / strength**2)
+        zeta = zeta - step
+        moving = ~(np.abs(step) <= 1e-10 * zeta + close)
+        if not moving.any():
+            break
+    else:
+        zeta[moving] = np.nan
+    return zeta, np.sqrt((a / (1 + zeta[:, None] * compliance)) ** 2 @ weights)
+
+
+def radial_return(
+    strain: Array, old: PlasticState, m: Elastic, yield_stress: float, modulus: float
+) -> tuple[Array, Array, PlasticState]:
+    """`return_map` with linear hardening in plane strain: ``d_peeq = (q_trial - stress(PEEQ)) / (3 mu + H)``."""
+    n, strain = len(strain), np.ascontiguousarray(strain, dtype=float)
+    stress, tangent = np.empty((n, 4)), np.empty((n, 3, 3))
+    new = PlasticState(np.empty((n, 4)), np.empty(n))
+    inputs = map(pointer, (strain, old.plastic_strain, old.peeq))
+    outputs = map(pointer, (stress, tangent, new.plastic_strain, new.peeq))
+    kernel = library(Path(__file__).with_name("radial_return.c")).radial_return
+    yielding = kernel(n, *inputs, *m.lame, yield_stress, modulus, pointer(m.elastic_tangent), *outputs)
+    return stress, tangent, new if yielding else old
