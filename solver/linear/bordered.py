@@ -12,7 +12,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.linear.strategy import Direct, Facts, Inverse, Strategy
+from archord.solver.linear.direct import Direct
+from archord.solver.linear.strategy import Facts, Inverse, Strategy
 
 _SINGULAR = 1e-9  # stiffness against the motion over ``stiffness`` below which nothing resists the force
 

@@ -8,7 +8,8 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.solver.linear import bordered, condensed, lagged, substructured
-from archord.solver.linear.strategy import Direct, Facts, Strategy
+from archord.solver.linear.direct import Direct
+from archord.solver.linear.strategy import Facts, Strategy
 
 # Every strategy beside MUMPS on the whole matrix, which always goes: None, or why it does not fit the facts.
 RULES = {

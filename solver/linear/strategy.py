@@ -1,4 +1,4 @@
-"""What a linear strategy is, what its choice depends on, and the one that always goes: MUMPS on the whole matrix."""
+"""What a linear strategy is, and what its choice depends on."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from typing import Protocol
 
 from mpi4py import MPI
 from petsc4py import PETSc
-
-_SPARE = 60  # per cent of MUMPS's workspace
 
 
 @dataclass(frozen=True)
@@ -47,22 +45,3 @@ class Inverse:
         ksp.setOperators(self.matrix)
         ksp.getPC().setType("python")
         ksp.getPC().setPythonContext(self)
-
-
-class Direct:
-    """One sparse factorisation of the whole ``matrix``, by MUMPS. Collective."""
-
-    def __init__(self, matrix: PETSc.Mat) -> None:
-        self.matrix = matrix
-
-    def attach(self, ksp: PETSc.KSP) -> None:
-        """Let ``ksp`` factorise the matrix."""
-        ksp.setType("preonly")
-        ksp.setOperators(self.matrix)
-        pc = ksp.getPC()
-        pc.setType("lu")
-        pc.setFactorSolverType("mumps")
-        pc.setFactorSetUpSolverType()
-        factors = pc.getFactorMatrix()
-        factors.setMumpsIcntl(14, _SPARE)
-        factors.setMumpsIcntl(8, 1)  # scale by the diagonal: MUMPS's own choice takes a seventh of a factorisation
