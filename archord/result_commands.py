@@ -117,8 +117,8 @@ def export_deck(scene: Path, output: Path | None, elements: Elements, overrides:
     from archord.scene.file import files_read, load_scene
 
     checked = load_scene(scene, overrides)
-    if checked.joint.is_ring:
-        raise InputError(f'{scene}: joint.model = "ring" cannot be exported; only "block" can.')
+    if not checked.joint.is_block:
+        raise InputError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
     path = output or Path(f"{scene.stem}.inp")
     check_target(path, files_read(scene, overrides), force=force)
     with writing(path):

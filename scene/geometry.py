@@ -93,6 +93,11 @@ class JointGeometry(Section):
         return self.arc_end * (ring(-1, 1.0) + ring(1, width - 1)) / (math.sqrt(3) / 4)
 
     @property
+    def is_block(self) -> bool:
+        """Whether it is the paper's joint, for which there are laws and decks."""
+        return self.model == "block"
+
+    @property
     def is_ring(self) -> bool:
         """Whether the hole's body is a ring under opposite forces, without supports, instead of a held block."""
         return self.model == "ring"

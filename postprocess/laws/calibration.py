@@ -65,8 +65,10 @@ def calibrate(runs: list[RunCurve], load_range: tuple[float, float] = (0.0, np.i
 def check_compatible(runs: list[RunCurve]) -> None:
     """Raise `InputError` for runs that have no such law, or none in common."""
     for run in runs:
-        if run.scene.joint.is_ring:
-            raise InputError(f'{run.name}: joint.model = "ring" has no law to fit; only "block" has.')
+        if not run.scene.joint.is_block:
+            raise InputError(
+                f'{run.name}: joint.model = "{run.scene.joint.model}" has no law to fit; only "block" has.'
+            )
         for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
             if solid.hardening > 0:
                 raise InputError(f"{run.name}: {body}.hardening = {solid.hardening:g} does not fit: the law is for "

@@ -85,7 +85,7 @@ class LawJoint:
             nu=block.nu,
             pin_nu=None if pin is None else pin.nu,
             yielding=_yielding(*yields),
-            ring=scene.joint.is_ring,
+            ring=not scene.joint.is_block,
             block_size=scene.joint.W,
         )
 

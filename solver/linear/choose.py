@@ -15,9 +15,10 @@ from archord.solver.linear.strategy import Facts, Strategy
 RULES = {
     "bordered": bordered.why_not,
     "condensed": condensed.why_not,
-    "substructured": substructured.why_not,  # in the place of MUMPS on the whole matrix
+    "substructured": substructured.why_not,
     "lagged": lagged.why_not,
 }
+INSTEAD = ("condensed", "substructured")  # of MUMPS on the whole matrix: the first that fits
 LEFT_OUT: set[str] = set()  # strategies to do without; benchmarks and tests set it
 
 
@@ -43,7 +44,7 @@ class Choice:
     def words(self) -> dict[str, str | dict[str, str]]:
         """The choice for run.json: ``strategy`` names what is used, ``not_used`` has the reasons."""
         used = [name for name, reason in self.why_not.items() if reason is None]
-        if not {"condensed", "substructured"} & {*used}:
+        if not {*INSTEAD} & {*used}:
             used.append("direct")
         return {"strategy": " + ".join(used), "not_used": {n: r for n, r in self.why_not.items() if r is not None}}
 
@@ -52,6 +53,6 @@ def choose(facts: Facts) -> Choice:
     """The strategies for a problem with these ``facts``. Collective."""
     reasons = {name: rule(facts) for name, rule in RULES.items()}
     reasons |= {name: "left out on request" for name in LEFT_OUT & reasons.keys()}
-    if reasons["condensed"] is None:
-        reasons |= {name: "the system is condensed" for name in ("substructured", "lagged")}
-    return Choice(reasons)
+    fitting = [name for name in INSTEAD if reasons[name] is None]
+    given_way = [*fitting[1:], *(["lagged"] if "condensed" in fitting else [])]
+    return Choice(reasons | {name: f"the system is {fitting[0]}" for name in given_way})
