@@ -20,22 +20,27 @@ if TYPE_CHECKING:
     from archord.api import InputError, Run, Scene, Sweep, load, load_scene, solve
     from archord.geometry.fenicsx import gmsh_to_mesh
     from archord.materials.elasticity import Elastic
-    from archord.materials.hardening import LinearHardening
+    from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
     from archord.materials.j2 import J2Material
+    from archord.materials.kinematic import KinematicMaterial
     from archord.solver.problem import Body, Interaction, Load, Problem, Support
     from archord.solver.system import System
 
 
 __all__ = [
-    "Body", "Elastic", "InputError", "Interaction", "J2Material", "LinearHardening", "Load", "Problem", "Run", "Scene",
-    "Support", "Sweep", "System", "gmsh_to_mesh", "load", "load_scene", "solve",
+    "Body", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LinearHardening", "Load",
+    "Problem", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System", "TabularHardening", "VoceHardening",
+    "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
     "gmsh_to_mesh": "archord.geometry.fenicsx",
     "Elastic": "archord.materials.elasticity",
     "J2Material": "archord.materials.j2",
-    "LinearHardening": "archord.materials.hardening",
+    "KinematicMaterial": "archord.materials.kinematic",
     "System": "archord.solver.system",
+    **dict.fromkeys(
+        ("LinearHardening", "SwiftHardening", "TabularHardening", "VoceHardening"), "archord.materials.hardening"
+    ),
     **dict.fromkeys(("Body", "Interaction", "Load", "Problem", "Support"), "archord.solver.problem"),
 }
 

@@ -119,6 +119,9 @@ def export_deck(scene: Path, output: Path | None, elements: Elements, overrides:
     checked = load_scene(scene, overrides)
     if not checked.joint.is_block:
         raise InputError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
+    for name, body in checked.solids.items():
+        if body.back_stresses:
+            raise InputError(f"{scene}: {name}.back_stresses cannot be exported.")
     path = output or Path(f"{scene.stem}.inp")
     check_target(path, files_read(scene, overrides), force=force)
     with writing(path):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
+
+import numpy as np
 
 from archord.materials.material import Array
 
@@ -15,6 +18,10 @@ class Hardening(Protocol):
     def linear(self) -> tuple[float, float] | None:
         """Yield stress at PEEQ 0 and slope of a law that is a straight line: its return map needs no iteration."""
         return None
+
+    def knots(self) -> Array:
+        """PEEQ between which straight lines are the law, or are close to it up to 1: what a table of it needs."""
+        return np.append(0.0, np.geomspace(1e-4, 1.0, 60))
 
     def stress(self, peeq: Array) -> Array:
         """Yield stress."""
@@ -41,6 +48,10 @@ class LinearHardening(Hardening):
         """Both numbers."""
         return self.yield_stress, self.modulus
 
+    def knots(self) -> Array:
+        """The line's beginning and a point of it, if it rises."""
+        return np.array([0.0, 1.0] if self.modulus else [0.0])
+
     def stress(self, peeq: Array) -> Array:
         """Yield stress."""
         return self.yield_stress + self.modulus * peeq
@@ -52,3 +63,110 @@ class LinearHardening(Hardening):
     def work(self, peeq: Array) -> Array:
         """Plastic work density."""
         return self.yield_stress * peeq + 0.5 * self.modulus * peeq**2
+
+
+@dataclass(frozen=True)
+class TabularHardening(Hardening):
+    """Straight lines between points ``(peeq, yield_stress)``, the first at PEEQ 0; constant beyond the last.
+
+    A yield plateau (Lueders) is two points of equal stress. Raises ValueError for points that are no such law.
+    """
+
+    points: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        """Check the points."""
+        peeq, stress = self._table
+        if not (len(peeq) and peeq[0] == 0 and (np.diff(peeq) > 0).all()):
+            raise ValueError("PEEQ must begin at 0 and increase from point to point")
+        if not (stress[0] > 0 and np.isfinite(stress).all() and (np.diff(stress) >= 0).all()):
+            raise ValueError("yield stresses must be positive and must not decrease with PEEQ")
+
+    @classmethod
+    def from_engineering(cls, points: Sequence[Sequence[float]], E: float) -> TabularHardening:
+        """From points (engineering strain, engineering stress) of a tension test, the first at first yield.
+
+        The true stress is ``s (1 + e)``, PEEQ is ``ln(1 + e) - s (1 + e) / E``, the logarithmic strain less the
+        elastic one, and 0 at the first point. Raises ValueError.
+        """
+        e, s = np.array(points, dtype=float).T
+        true = s * (1 + e)
+        peeq = np.log1p(e) - true / E
+        peeq[0] = 0.0
+        return cls(tuple(zip(peeq.tolist(), true.tolist(), strict=True)))
+
+    @property
+    def _table(self) -> tuple[Array, Array]:
+        peeq, stress = np.array(self.points, dtype=float).reshape(-1, 2).T
+        return peeq, stress
+
+    @property
+    def linear(self) -> tuple[float, float] | None:
+        """Perfect plasticity, if there is one point."""
+        return (self.points[0][1], 0.0) if len(self.points) == 1 else None
+
+    def knots(self) -> Array:
+        """The points."""
+        return self._table[0]
+
+    def stress(self, peeq: Array) -> Array:
+        """Yield stress."""
+        return np.interp(peeq, *self._table)
+
+    def slope(self, peeq: Array) -> Array:
+        """Slope of the line that begins at a point or contains it."""
+        at, stress = self._table
+        slopes = np.append(np.diff(stress) / np.diff(at), 0.0)
+        return slopes[np.searchsorted(at, peeq, side="right") - 1]
+
+    def work(self, peeq: Array) -> Array:
+        """Plastic work density."""
+        at, stress = self._table
+        below = np.append(0.0, np.cumsum(np.diff(at) * (stress[1:] + stress[:-1]) / 2))
+        line = np.searchsorted(at, peeq, side="right") - 1
+        return below[line] + (peeq - at[line]) * (stress[line] + self.stress(peeq)) / 2
+
+
+@dataclass(frozen=True)
+class VoceHardening(Hardening):
+    """From ``yield_stress`` to ``saturation``: ``saturation - (saturation - yield_stress) exp(-rate PEEQ)`` (Voce,
+    1948)."""
+
+    yield_stress: float
+    saturation: float
+    rate: float
+
+    def stress(self, peeq: Array) -> Array:
+        """Yield stress."""
+        return self.saturation - (self.saturation - self.yield_stress) * np.exp(-self.rate * peeq)
+
+    def slope(self, peeq: Array) -> Array:
+        """Derivative of `stress`."""
+        return self.rate * (self.saturation - self.stress(peeq))
+
+    def work(self, peeq: Array) -> Array:
+        """Plastic work density."""
+        rise = self.saturation - self.yield_stress
+        return self.saturation * peeq + rise * np.expm1(-self.rate * peeq) / self.rate
+
+
+@dataclass(frozen=True)
+class SwiftHardening(Hardening):
+    """``strength (offset + PEEQ)^exponent`` (Swift, 1952), the exponent between 0 and 1."""
+
+    strength: float
+    offset: float
+    exponent: float
+
+    def stress(self, peeq: Array) -> Array:
+        """Yield stress."""
+        return self.strength * (self.offset + peeq) ** self.exponent
+
+    def slope(self, peeq: Array) -> Array:
+        """Derivative of `stress`."""
+        return self.exponent * self.stress(peeq) / (self.offset + peeq)
+
+    def work(self, peeq: Array) -> Array:
+        """Plastic work density."""
+        n = self.exponent + 1
+        return self.strength * ((self.offset + peeq) ** n - self.offset**n) / n

@@ -91,10 +91,12 @@ def plastic_multiplier(
     """``zeta`` and von Mises stress ``q``, ``(n,)`` each, of points that yield.
 
     With components ``a`` ``(n, k)`` of the trial stress, ``q^2 = sum_k weights_k (a_k / (1 + zeta compliance_k))^2``,
-    and ``d_peeq = 2/3 zeta q`` from the old ``peeq``. If the yield stress is concave, ``1/q - 1/stress(PEEQ)`` is
-    increasing and concave in ``zeta``: Newton from 0 cannot overshoot. What does not converge is not a number.
+    and ``d_peeq = 2/3 zeta q`` from the old ``peeq``. ``1/q - 1/stress(PEEQ)`` increases with ``zeta``: Newton's steps
+    that leave what brackets its zero, as they can where a hardening law is not concave, are halved intervals instead.
+    What does not converge is not a number.
     """
-    zeta = np.zeros(len(a))
+    start: tuple[Array, ...] = tuple(np.full(len(a), value) for value in (0.0, 0.0, np.inf))
+    zeta, low, high = start
     close = 1e-10 / compliance.max()  # Newton is quadratic: a step this small leaves nothing but round-off
     for _ in range(_ITERATIONS):
         shrink = 1 + zeta[:, None] * compliance
@@ -103,9 +105,13 @@ def plastic_multiplier(
         now = peeq + 2 / 3 * zeta * q
         strength = hardening.stress(now)
         rise = hardening.slope(now) * 2 / 3 * (q - zeta * fall)
-        step = (1 / q - 1 / strength) / (fall / q**2 + rise / strength**2)
-        zeta = zeta - step
+        off = 1 / q - 1 / strength
+        low, high = np.where(off < 0, zeta, low), np.where(off > 0, zeta, high)
+        step = off / (fall / q**2 + rise / strength**2)
         moving = ~(np.abs(step) <= 1e-10 * zeta + close)
+        zeta = zeta - step
+        astray = moving & ~((zeta > low) & (zeta < high))
+        zeta[astray] = np.where(high == np.inf, 2 * low + close, (low + high) / 2)[astray]
         if not moving.any():
             break
     else:

@@ -156,9 +156,10 @@ def _model_lines(scene: Scene, thick: float) -> Iterator[str]:
     for body, solid in ((Cells.PIN, scene.block if scene.pin.rigid else scene.pin), (Cells.BLOCK, scene.block)):
         yield from (f"*MATERIAL, NAME={body.name}", "*ELASTIC", f"{solid.E!r}, {solid.nu!r}")
         if solid.yield_stress is not None:
-            yield from ("*PLASTIC", f"{_number(solid.yield_stress)}, 0.")
-            if solid.hardening:
-                yield f"{_number(solid.yield_stress + solid.hardening)}, 1."
+            yield "*PLASTIC"
+            peeq = solid.law.knots()
+            for stress, at in np.column_stack([solid.law.stress(peeq), peeq]):
+                yield f"{_number(stress)}, {_number(at)}"
         yield from (f"*SOLID SECTION, ELSET={body.name}, MATERIAL={body.name}", _number(thick))
     held = ["PIN_NODES, 1, 1"] if scene.pin.rigid else []
     yield from (*_CONTACT.format(_number(contact_stiffness(scene))).splitlines(), *held)

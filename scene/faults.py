@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from typing import Any
+from typing import Any, get_args
 
 from archord.scene.keys import Section, toml_value
 
@@ -26,7 +26,8 @@ _PHRASES = {
     "less_than": "must be less than {lt:g}",
     "less_than_equal": "must be at most {le:g}",
     "literal_error": "must be {expected}",
-    "too_short": "must not be empty",
+    "too_short": "must have {min_length} or more entries",
+    "too_long": "must have at most {max_length} entries",
 }
 
 
@@ -46,7 +47,7 @@ def shortened(text: str, length: int = 80) -> str:
 
 def _of_given_kind(location: tuple, data: dict[str, Any]) -> bool:
     """Whether a fault in a key that may be one value or a list of them is of the kind that was given."""
-    if len(location) < 3:
+    if len(location) < 3 or isinstance(location[2], int):
         return True
     section, key, kind = location[:3]
     return str(kind).startswith("list") == isinstance(data[section][key], list)
@@ -54,10 +55,11 @@ def _of_given_kind(location: tuple, data: dict[str, Any]) -> bool:
 
 def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]) -> str:
     place, inner = list(error["loc"][:2]), error["loc"][2:]  # section and key, and where in its value
+    place += [part for part in inner[1:] if isinstance(part, str)]  # keys of a table; the first is its kind
     context = dict(error.get("ctx", {}))
     if error["type"] == "value_error":
         name, said = str(context["error"]).split("|", 1)
-        place += name.split(".")
+        place += filter(None, name.split("."))
     else:
         if error["type"] == "extra_forbidden":
             context |= _known_keys(model, place)
@@ -75,11 +77,18 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
 def _known_keys(model: Any, place: list[str]) -> dict[str, str]:
     """What may stand in the ``place`` of an unknown key or section, and which of it may be meant."""
     for part in place[:-1]:
-        model = model.model_fields[part].annotation
+        model = _section(model.model_fields[part].annotation)
     known = list(model.model_fields)
     near = difflib.get_close_matches(place[-1], known, 1)
     hint = f"did you mean {near[0]}? " if near else ""
     return {"known": ", ".join(known), "kind": "Sections" if len(place) == 1 else "Keys", "hint": hint}
+
+
+def _section(kind: Any) -> Any:
+    """The section among the kinds of values that a key may have."""
+    if isinstance(kind, type):
+        return kind if issubclass(kind, Section) else None
+    return next(filter(None, map(_section, get_args(kind))), None)
 
 
 def _key_shown(part: str) -> str:

@@ -11,7 +11,7 @@ from archord.scene.scene import FORMAT, Scene
 
 _SECTIONS: dict[str, Any] = {name: info for name, info in Scene.model_fields.items() if name != "format"}
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
-_KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false"}
+_KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false", "array": "list"}
 
 
 def example() -> str:
@@ -55,8 +55,9 @@ def _keys(section: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:
 
 def _allowed(schema: dict[str, Any]) -> str:
     """Type and limits of a key from its JSON schema, for a table."""
-    one, *more = [s for s in schema.get("anyOf", [schema]) if s.get("type") != "null"]
+    kinds = schema.get("anyOf", schema.get("oneOf", [schema]))
+    one, *more = [s for s in kinds if s.get("type") != "null"]
     if "enum" in one:
         return ", ".join(f"`{toml_value(value)}`" for value in one["enum"])
-    kind = _KINDS[one["type"]] + (" or list" if more else "")
+    kind = " or ".join([_KINDS[one["type"]], *(_KINDS.get(s.get("type"), "table") for s in more)])
     return f"{kind} {', '.join(f'{sign} {one[limit]:g}' for limit, sign in _SIGNS.items() if limit in one)}".strip()

@@ -74,7 +74,7 @@ class Scene(Section):
         for name, body in self.solids.items():
             strong = body.yield_stress is None or body.yield_stress >= _WEAKEST * body.E
             require(strong, f"{name}.yield_stress", f"must be at least {_WEAKEST:g} times {name}.E")
-            allowed = body.hardening <= body.E / _WEAKEST
+            allowed = not isinstance(body.hardening, float) or body.hardening <= body.E / _WEAKEST
             require(allowed, f"{name}.hardening", f"must not exceed {1 / _WEAKEST:g} times {name}.E")
         alike = all(_SOFTEST <= body.E / self.block.E <= 1 / _SOFTEST for body in self.solids.values())
         require(alike, "pin.E", "must be between 1e-8 and 1e8 times block.E (or set rigid = true)")

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from archord.materials.elasticity import Elastic
-from archord.materials.hardening import LinearHardening
+from archord.materials.hardening import Hardening
 from archord.materials.material import Material, Plane
 from archord.scene.keys import LINE, Positive, Section, key, require
+from archord.scene.plasticity import HardeningKey, hardening_law, with_yield_stress
 
+NotNegative = Annotated[float, Field(ge=0)]
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
 # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
 Ratio = Annotated[float, Field(ge=-0.999, le=0.499999)]
@@ -18,6 +22,7 @@ _FORCE = {("MPa", "mm"): "N/mm", ("Pa", "m"): "N/m"}
 _MOST = 10_000  # output steps
 Targets = float | Annotated[list[float], Field(min_length=1)]
 Steps = Annotated[int, Field(ge=1, le=_MOST)]
+BackStress = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 
 
 class Units(Section):
@@ -39,25 +44,70 @@ class Units(Section):
 
 
 class Solid(Section):
-    """Isotropic elastic solid, elastic-plastic (J2, linear hardening) with a yield stress."""
+    """Isotropic elastic solid, elastic-plastic (J2) with a yield stress."""
 
     yield_stress: Positive | None = key("yield stress; elastic if absent", "stress", default=None, example=300.0)
-    hardening: float = key("modulus d(yield stress)/d(PEEQ); 0: perfect plasticity", "stress", default=0.0, ge=0)
+    hardening: HardeningKey = key(
+        "modulus d(yield stress)/d(PEEQ), 0: perfect plasticity; or points [PEEQ, true stress]; or a law: {saturation, "
+        "rate} (Voce), {offset, exponent} (Swift), {engineering = points [strain, stress] of a tension test}",
+        "stress",
+        default=0.0,
+    )
+    back_stresses: list[BackStress] | None = key(
+        "back stresses of kinematic hardening (Armstrong and Frederick): up to three [modulus, rate of recovery]",
+        default=None,
+        other=[[20000.0, 100.0]],
+        min_length=1,
+        max_length=3,
+    )
     E: Positive = key("Young's modulus", "stress", example=210000.0)
     nu: Ratio = key("Poisson's ratio", example=0.3)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _table(cls, data: Any) -> Any:
+        return with_yield_stress(data)
 
     @model_validator(mode="after")
     def _plasticity(self):
         require(self.yield_stress is not None or self.hardening == 0, "hardening", "needs a yield_stress")
+        require(self.yield_stress is not None or not self.back_stresses, "back_stresses", "need a yield_stress")
+        require(all(C > 0 for C, _ in self.back_stresses or ()), "back_stresses", "must have positive moduli")
+        if self.yield_stress is not None and self.E is not None:
+            none = np.zeros(1)
+            try:
+                first, rise = (float(np.max(value)) for value in (self.law.stress(none), self.law.slope(none)))
+            except ValueError as error:
+                raise ValueError(f"hardening|is no hardening law: {error}") from None
+            said = f"must begin at yield_stress ({self.yield_stress:g})"
+            require(math.isclose(first, self.yield_stress, rel_tol=1e-9), "hardening", said)
+            require(rise >= 0, "hardening", "must not soften: saturation must be at least yield_stress")
         return self
 
+    @property
+    def perfectly_plastic(self) -> bool:
+        """Whether the yield stress is a constant."""
+        return self.hardening == 0 and not self.back_stresses
+
+    @property
+    def law(self) -> Hardening:
+        """The isotropic hardening of a solid with a yield stress."""
+        return hardening_law(self.yield_stress or 0.0, self.hardening, self.E)
+
     def material(self, plane: Plane) -> Material:
-        """The constitutive law: `Elastic`, or `J2Material` if there is a yield stress."""
+        """The constitutive law: `Elastic` without a yield stress, `KinematicMaterial` with back stresses, `J2Material`
+        else."""
         if self.yield_stress is None:
             return Elastic(self.E, self.nu, plane)
+        if self.back_stresses:
+            from archord.materials.kinematic import KinematicMaterial
+
+            return KinematicMaterial(
+                self.E, self.nu, plane, self.law, tuple((C, gamma) for C, gamma in self.back_stresses)
+            )
         from archord.materials.j2 import J2Material
 
-        return J2Material(self.E, self.nu, plane, LinearHardening(self.yield_stress, self.hardening))
+        return J2Material(self.E, self.nu, plane, self.law)
 
 
 class Pin(Solid):
@@ -69,7 +119,7 @@ class Pin(Solid):
 
     @model_validator(mode="after")
     def _rigid_or_solid(self) -> Pin:
-        for name in ("yield_stress", "hardening", "E", "nu"):
+        for name in ("yield_stress", "hardening", "back_stresses", "E", "nu"):
             given = name in self.model_fields_set and getattr(self, name)
             require(not (self.rigid and given), name, "is not for a rigid pin")
         for name in ("E", "nu"):

@@ -70,9 +70,10 @@ def check_compatible(runs: list[RunCurve]) -> None:
                 f'{run.name}: joint.model = "{run.scene.joint.model}" has no law to fit; only "block" has.'
             )
         for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
-            if solid.hardening > 0:
-                raise InputError(f"{run.name}: {body}.hardening = {solid.hardening:g} does not fit: the law is for "
-                                 "perfect plasticity, hardening = 0.")  # fmt: skip
+            if not solid.perfectly_plastic:
+                said = f" = {solid.hardening:g}" if isinstance(solid.hardening, float) and solid.hardening else ""
+                raise InputError(f"{run.name}: {body}.hardening{said} does not fit: the law is for perfect plasticity, "
+                                 "hardening = 0.")  # fmt: skip
     first = runs[0]
     for run in runs[1:]:
         own, wanted = (LawJoint.from_scene(each.scene) for each in (run, first))

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from archord.materials.elasticity import von_mises
-from archord.materials.hardening import LinearHardening
+from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
 from archord.materials.j2 import J2Material
 from archord.materials.return_map import PlasticState, return_map
 from tests.materials.test_elasticity import NU, E, hooke, turned
-from tests.materials.test_voce import Voce
 
 SIGY = 250.0
 YIELD_STRAIN = SIGY / E
@@ -23,7 +22,11 @@ HARDENINGS = {
     "H = 0": LinearHardening(SIGY),
     "H = 0.02 E": LinearHardening(SIGY, 0.02 * E),
     "H = E": LinearHardening(SIGY, E),
-    "Voce": Voce(SIGY, 2 * SIGY, 5 * YIELD_STRAIN),
+    "Voce": VoceHardening(SIGY, 2 * SIGY, 0.2 / YIELD_STRAIN),
+    "Swift": SwiftHardening(SIGY / YIELD_STRAIN**0.2, YIELD_STRAIN, 0.2),
+    "plateau": TabularHardening(
+        ((0, SIGY), (4 * YIELD_STRAIN, SIGY), (5 * YIELD_STRAIN, 2 * SIGY), (90 * YIELD_STRAIN, 2.5 * SIGY))
+    ),
 }
 MATERIALS = [
     pytest.param(J2Material(E, NU, plane, hardening), id=f"plane {plane}, {name}")
@@ -257,9 +260,10 @@ def test_points_do_not_know_of_each_other(m, rng):
 
 def _in_pascal(hardening):
     """The same law with stresses in Pa instead of MPa."""
-    if hardening.linear is None:
-        return replace(hardening, start=1e6 * hardening.start, end=1e6 * hardening.end)
-    return LinearHardening(*(1e6 * value for value in hardening.linear))
+    if isinstance(hardening, TabularHardening):
+        return TabularHardening(tuple((peeq, 1e6 * stress) for peeq, stress in hardening.points))
+    stresses = {"yield_stress", "modulus", "saturation", "strength"} & set(vars(hardening))
+    return replace(hardening, **{name: 1e6 * getattr(hardening, name) for name in stresses})
 
 
 @every_material
@@ -341,3 +345,31 @@ def test_elastic_energy_is_half_stress_times_elastic_strain(m, rng):
     """Of the whole stress, in three dimensions."""
     stress = SIGY * rng.normal(size=(N, 4))
     np.testing.assert_allclose(m.energy(stress), 0.5 * (stress * hooke(stress)).sum(axis=1), rtol=1e-12)
+
+
+SMOOTH = pytest.mark.parametrize("name", ["H = 0.02 E", "Voce", "Swift", "plateau"])
+
+
+@SMOOTH
+def test_slope_is_the_derivative_and_work_the_integral_of_the_yield_stress(name):
+    """By differences, away from the kinks of a table and beyond its end."""
+    hardening, h = HARDENINGS[name], 1e-4 * YIELD_STRAIN
+    peeq = YIELD_STRAIN * np.array([0.5, 3.0, 4.5, 20.0, 100.0])
+    for function, derivative in ((hardening.stress, hardening.slope), (hardening.work, hardening.stress)):
+        found = (function(peeq + h) - function(peeq - h)) / (2 * h)
+        assert found == pytest.approx(derivative(peeq), rel=1e-6, abs=1e-6 * SIGY)
+    assert hardening.work(np.zeros(1))[0] == pytest.approx(0.0, abs=1e-12 * SIGY)
+
+
+def test_a_tension_test_becomes_a_table_of_true_stress():
+    """Strain 10 % at 400 MPa: true stress 440 MPa, PEEQ ln 1.1 - 440 / E."""
+    table = TabularHardening.from_engineering([(SIGY / E, SIGY), (0.1, 400.0)], E)
+    (start, first), (end, last) = table.points
+    assert (start, first) == (0.0, pytest.approx(SIGY * (1 + SIGY / E)))
+    assert (end, last) == (pytest.approx(np.log(1.1) - 440 / E), pytest.approx(440.0))
+
+
+@pytest.mark.parametrize("points", [(), ((0.1, 1.0),), ((0, 2.0), (0.1, 1.0)), ((0, 1.0), (0, 2.0)), ((0, 0.0),)])
+def test_a_table_that_is_no_hardening_law_is_refused(points):
+    with pytest.raises(ValueError, match="must"):
+        TabularHardening(points)

@@ -34,6 +34,7 @@ CASES = {
     "plane stress, hardening": (scene(0.2, 3, **PLASTIC, pin={"hardening": 0.1}, analysis={"plane": "stress"}), 1),
     "rigid pin": (scene(0.2, 4, **PLASTIC, pin={"rigid": True}), 2),
     "one side": (scene(0.2, 3, **PLASTIC, analysis={"integration": "block"}), 2),
+    "back stresses": (scene(0.2, **PLASTIC, block={"back_stresses": [[0.5, 100.0], [0.01, 0.0]]}, load=UP_DOWN_UP), 4),
     "unloading": (scene(0.2, **PLASTIC, load=UP_DOWN_UP), 4),
     "turning": (scene(0.2, **PLASTIC, load=UP_DOWN_UP), 3),
     "force": (loaded({"relative_force": [0.004, 0.002], "steps": 3}, element_size=0.2, **PLASTIC), 4),

@@ -143,6 +143,17 @@ def test_materials_and_elements_of_the_plane(plane, family):
     assert elastic == [[[data.pin.E, 0.3]], [[data.block.E, 0.3]]]
 
 
+def test_a_table_of_hardening_is_that_of_the_deck():
+    """Stress before PEEQ; a law is a table that straight lines follow to 0.1 % up to PEEQ 1."""
+    data = scene(None, pin={"hardening": [[0, 0.002], [0.1, 0.003]]},
+                 block={"yield_stress": 0.002, "hardening": {"offset": 0.01, "exponent": 0.2}})  # fmt: skip
+    found = read(deck(data, deck_mesh(data, "linear"))).blocks
+    pin, block = (np.array(rows, float) for keyword, _, rows in found if keyword == "*PLASTIC")
+    assert pin.tolist() == [[0.002, 0], [0.003, 0.1]]
+    peeq = np.linspace(0, 1, 10000)
+    assert np.interp(peeq, block[:, 1], block[:, 0]) == pytest.approx(data.block.law.stress(peeq), rel=1e-3)
+
+
 def test_a_rigid_pin_moves_as_a_whole():
     """All its nodes held sideways and pushed down."""
     data = scene(None, pin={"rigid": True})
@@ -172,6 +183,8 @@ def test_the_command_writes_a_deck_and_nothing_over_what_is_there(tmp_path, monk
     text = (tmp_path / "joint.inp").read_text()
     assert (text.count("*STEP"), text.count("TYPE=CPE3")) == (2, 2)
     assert refused(["export-deck", "joint.toml"]).startswith("joint.inp: is there already; choose another file")
+    cyclic = ["--set=block.yield_stress=300", "--set=block.back_stresses=[[1000, 10]]", "--force"]
+    assert "block.back_stresses cannot be exported" in refused(["export-deck", "joint.toml", *cyclic])
     (tmp_path / "path.csv").write_text("displacement\n0.01\n")
     with_path = [f"--set=load.{key}=" for key in ("displacement", "relative_displacement")] + [
         "--set=load.path=path.csv"

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
 from archord.scene.reference import example, reference
@@ -40,6 +41,20 @@ def basic() -> dict:
         ("block", "nu", 0.5, "scene: block.nu = 0.5 must be at most 0.499999."),
         ("block", "rigid", True, "is not a known key"),
         ("block", "hardening", 1.0, "needs a yield_stress."),
+        ("block", "hardening", "x", "must be a number."),
+        ("block", "hardening", [], "must have 1 or more entries."),
+        ("block", "hardening", [[0, 1, 2]], "entry 1 must have at most 2 entries."),
+        ("block", "hardening", [[0, 2], [0.1, 1]], "is no hardening law: yield stresses must be positive and must not"),
+        ("block", "hardening", [[0.1, 2]], "is no hardening law: PEEQ must begin at 0"),
+        ("block", "hardening", {"rate": 20.0}, "block.hardening must have rate and saturation (Voce); or exponent and"),
+        (
+            "block",
+            "hardening",
+            {"rate": -1.0, "saturation": 9.0},
+            "block.hardening.rate = -1.0 must be greater than 0.",
+        ),
+        ("block", "hardening", {"rat": 1.0}, "block.hardening.rat = 1.0 is not a known key; did you mean rate?"),
+        ("block", "back_stresses", [[1.0, 1.0]], "need a yield_stress."),
         ("block", "yield_stress", 0.0, "must be greater than 0."),
         ("block", "yield_stress", 1e-30, "must be at least 1e-07 times block.E."),
         ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
@@ -112,6 +127,31 @@ def test_overrides_replace_values_and_alternatives(tmp_path):
     for malformed in ("radius=3", "joint.radius", "joint=3", "a.b.c=1"):
         with pytest.raises(InputError, match=r"must read section\.key=value"):
             load_scene(path, [malformed])
+
+
+@pytest.mark.parametrize(
+    ("hardening", "law"),
+    [
+        (2.0, LinearHardening(3.0, 2.0)),
+        ([[0, 3.0], [0.1, 3.0], [0.2, 4.0]], TabularHardening(((0.0, 3.0), (0.1, 3.0), (0.2, 4.0)))),
+        ({"saturation": 5.0, "rate": 20.0}, VoceHardening(3.0, 5.0, 20.0)),
+        ({"offset": 0.01, "exponent": 0.5}, SwiftHardening(30.0, 0.01, 0.5)),
+        ({"engineering": [[0.5, 2.0]]}, TabularHardening(((0.0, 3.0),))),
+    ],
+)
+def test_hardening_is_a_number_a_table_or_a_law(hardening, law):
+    """The material has it, and the resolved scene says it; tables say the yield stress themselves, and nothing else."""
+    solid = basic()["block"] | {"E": 1000.0, "hardening": hardening}
+    table = isinstance(law, TabularHardening)
+    data = basic() | {"block": solid if table else solid | {"yield_stress": 3.0}}
+    block = parse_scene(data).block
+    assert block.material("strain").hardening == law
+    assert parse_scene(tomllib.loads(resolved(parse_scene(data)))).block == block
+    kinematic = parse_scene(data | {"block": data["block"] | {"back_stresses": [[50.0, 2.0]]}}).block.material("stress")
+    assert (kinematic.hardening, kinematic.back_stresses) == (law, ((50.0, 2.0),))
+    if table or isinstance(law, VoceHardening):
+        with pytest.raises(InputError, match=r"block\.hardening.* must (begin at yield_stress|not soften)"):
+            parse_scene(data | {"block": solid | {"yield_stress": 6.0}})
 
 
 def test_the_resolved_scene_is_the_same_scene():

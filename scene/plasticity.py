@@ -1,0 +1,71 @@
+"""How a body hardens, in the words of a scene: a number, a table, a named law."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Annotated, Any
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from archord.materials.hardening import Hardening, LinearHardening, SwiftHardening, TabularHardening, VoceHardening
+from archord.scene.keys import Positive, Section, key
+
+_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+_LAWS = {"Voce": {"saturation", "rate"}, "Swift": {"offset", "exponent"}, "a tension test": {"engineering"}}
+
+
+class HardeningLaw(Section):
+    """Parameters of one law: ``saturation`` and ``rate`` (Voce), ``offset`` and ``exponent`` (Swift), or
+    ``engineering``, the points (strain, stress) of a tension test from first yield on."""
+
+    saturation: Positive | None = key("Voce: yield stress at large PEEQ", "stress", default=None)
+    rate: Positive | None = key("Voce: how fast it gets there", default=None)
+    offset: Positive | None = key("Swift: PEEQ by which the power law is shifted", default=None)
+    exponent: Annotated[float, Field(gt=0, le=1)] | None = key("Swift: exponent of the power law", default=None)
+    engineering: list[_Pair] | None = key("points [strain, stress] of a tension test", default=None, min_length=1)
+
+    @model_validator(mode="after")
+    def _one_law(self) -> HardeningLaw:
+        given = set(self.model_dump(exclude_none=True))
+        if given not in _LAWS.values():
+            laws = "; or ".join(f"{' and '.join(sorted(keys))} ({law})" for law, keys in _LAWS.items())
+            raise ValueError(f"|must have {laws}")
+        return self
+
+
+def _kind(value: Any) -> str:
+    return "list" if isinstance(value, list) else "law" if isinstance(value, dict | HardeningLaw) else "number"
+
+
+HardeningKey = Annotated[
+    Annotated[float, Field(ge=0), Tag("number")]
+    | Annotated[list[_Pair], Field(min_length=1), Tag("list")]
+    | Annotated[HardeningLaw, Tag("law")],
+    Discriminator(_kind),
+]
+
+
+def with_yield_stress(data: Any) -> Any:
+    """The keys ``data`` of a solid with the yield stress that its table or tension test says, unless they have one."""
+    hardening = data.get("hardening") if isinstance(data, dict) else None
+    with suppress(TypeError, ValueError, IndexError, KeyError):  # what is no table is refused later
+        if isinstance(hardening, dict):
+            strain, stress = hardening["engineering"][0]
+            data = {"yield_stress": stress * (1 + strain)} | data
+        elif hardening is not None:
+            data = {"yield_stress": hardening[0][1]} | data
+    return data
+
+
+def hardening_law(yield_stress: float, hardening: Any, E: float) -> Hardening:
+    """The hardening of a body with this yield stress and Young's modulus. Raises ValueError for what is no such law."""
+    if isinstance(hardening, list):
+        return TabularHardening(tuple(map(tuple, hardening)))
+    if not isinstance(hardening, HardeningLaw):
+        return LinearHardening(yield_stress, hardening)
+    if hardening.engineering is not None:
+        return TabularHardening.from_engineering(hardening.engineering, E)
+    if hardening.rate is not None and hardening.saturation is not None:
+        return VoceHardening(yield_stress, hardening.saturation, hardening.rate)
+    offset, exponent = hardening.offset or 0.0, hardening.exponent or 0.0
+    return SwiftHardening(yield_stress / offset**exponent, offset, exponent)
