@@ -63,7 +63,10 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
     else:
         if error["type"] == "extra_forbidden":
             context |= _known_keys(model, place)
-        said = _PHRASES.get(error["type"], error["msg"]).format(**context, name=place[-1])
+        empty = context.get("min_length") == 1
+        said = _PHRASES.get("string_too_short" if empty else error["type"], error["msg"]).format(
+            **context, name=place[-1]
+        )
     value: Any = data
     for part in place:
         value = value.get(part) if isinstance(value, dict) else None

@@ -42,7 +42,7 @@ def basic() -> dict:
         ("block", "rigid", True, "is not a known key"),
         ("block", "hardening", 1.0, "needs a yield_stress."),
         ("block", "hardening", "x", "must be a number."),
-        ("block", "hardening", [], "must have 1 or more entries."),
+        ("block", "hardening", [], "= [] must not be empty."),
         ("block", "hardening", [[0, 1, 2]], "entry 1 must have at most 2 entries."),
         ("block", "hardening", [[0, 2], [0.1, 1]], "is no hardening law: yield stresses must be positive and must not"),
         ("block", "hardening", [[0.1, 2]], "is no hardening law: PEEQ must begin at 0"),
