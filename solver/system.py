@@ -48,6 +48,7 @@ class System:
             self.contact = Contact(self.V, list(map(Interface, problem.interactions, surfaces)))
             self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
             self.solver = Recovery(NewtonSolver(self.equilibrium))
+        self._path: LoadPath | None = None
 
     def _surface(self, given: str | Rigid, interaction: str) -> Surface | RigidSurface:
         if isinstance(given, Rigid):
@@ -62,8 +63,10 @@ class System:
         return np.unique(self.V.dofmap.list[self.problem.mesh.cells.find(tag)])
 
     def solve(self, loads: Sequence[float], rules: StepRules | None = None) -> None:
-        """Follow the path of the ``loads`` from the beginning. Raises `StepFailure`."""
-        march(self.load_path(), loads, rules=rules)
+        """Follow the path of the ``loads``, from where the last call has ended. Raises `StepFailure`."""
+        self._path = self._path or self.load_path()
+        self._path.at.targets_done = 0
+        march(self._path, loads, rules=rules)
 
     def load_path(self, at: Position | None = None, coarse: CoarseStart | None = None) -> LoadPath:
         """The path of the problem's loads, from the position ``at`` or the beginning."""

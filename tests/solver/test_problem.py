@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
 from archord.solver.problem import Body, Guess, Interaction, Load, Problem, Support
+from archord.solver.stepping import StepRules
 from archord.solver.system import System
 from tests.solver.parts import ELASTIC, HARDENING, NU, E, blocks, coordinates, solve
 
@@ -42,6 +43,16 @@ def test_half_a_problem_with_symmetry_two_is_the_whole(control):
     ]
     assert found[0] == pytest.approx(found[1], rel=1e-8, abs=1e-14)
     assert systems[0].peeq()[1] > 0
+
+
+def test_a_second_call_goes_on_from_the_first():
+    """Steps in between lie between the two loads: a little unloading in four steps is elastic."""
+    system = solve(columns(), [DEPTH])
+    peeq = system.peeq()
+    assert peeq[0] > 0
+    system.solve([0.99 * DEPTH], StepRules(initial=0.25, growth=1.0))
+    assert system.peeq() == peeq
+    assert system.equilibrium.load == 0.99 * DEPTH
 
 
 def test_force_control_finds_the_load_factor_of_its_force():
