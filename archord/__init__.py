@@ -18,7 +18,7 @@ __version__ = VERSION
 
 if TYPE_CHECKING:
     from archord.api import InputError, Run, Scene, Sweep, load, load_scene, solve
-    from archord.geometry.fenicsx import gmsh_to_mesh
+    from archord.geometry.meshes.fenicsx import gmsh_to_mesh
     from archord.materials.elasticity import Elastic
     from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
     from archord.materials.j2 import J2Material
@@ -33,7 +33,7 @@ __all__ = [
     "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
-    "gmsh_to_mesh": "archord.geometry.fenicsx",
+    "gmsh_to_mesh": "archord.geometry.meshes.fenicsx",
     "Elastic": "archord.materials.elasticity",
     "J2Material": "archord.materials.j2",
     "KinematicMaterial": "archord.materials.kinematic",

@@ -12,7 +12,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import lagrange
-from archord.geometry.plane_mesh import distinct_edges
+from archord.geometry.meshes.plane_mesh import distinct_edges
 from archord.output.disk import replace_file
 from archord.output.step_file import StepFile, step_name
 from archord.solver.mesh_order import MeshOrder

@@ -18,8 +18,8 @@ from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.joint_mesh import Cells, Facets
-from archord.geometry.quarter_joint import quarter_joint
+from archord.geometry.shapes.joint_mesh import Cells, Facets
+from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.scene.scene import Scene
 
 Ints = npt.NDArray[np.int64]

@@ -11,10 +11,10 @@ import ufl
 from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
-from archord.geometry.half_ring import half_ring
-from archord.geometry.joint_mesh import refinements
-from archord.geometry.quarter_joint import quarter_joint
-from archord.geometry.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.half_ring import half_ring
+from archord.geometry.shapes.joint_mesh import refinements
+from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.presets.arc import SYMMETRY
 from archord.scene.scene import Scene
 from archord.solver.problem import Body, Guess, Interaction, Load, Problem, Rigid, Support

@@ -11,7 +11,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.geometry.fenicsx import create_vector
+from archord.geometry.meshes.fenicsx import create_vector
 from archord.solver.linear.bordered import Bordered
 from archord.solver.linear.strategy import Strategy
 from archord.solver.tangent import TangentMatrix

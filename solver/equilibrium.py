@@ -19,7 +19,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.geometry.fenicsx import create_vector
+from archord.geometry.meshes.fenicsx import create_vector
 from archord.materials.material import Points
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.geometry.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.solver.contact.interaction import Interaction, Rigid
 
 __all__ = ["Body", "Guess", "Interaction", "Load", "Problem", "Rigid", "Support"]

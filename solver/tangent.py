@@ -7,7 +7,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.geometry.fenicsx import create_vector
+from archord.geometry.meshes.fenicsx import create_vector
 from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact.contact import Contact
 from archord.solver.linear.condensed import Condensed, filled

@@ -16,6 +16,8 @@ ROOMS = [
     "kernels",
     "materials",
     "geometry",
+    "geometry.meshes",
+    "geometry.shapes",
     "scene",
     "solver.contact",
     "solver.linear",

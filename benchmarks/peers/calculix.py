@@ -11,7 +11,7 @@ import numpy as np
 
 from archord.benchmarks.timing import Failure, Process
 from archord.geometry.basis import Array
-from archord.geometry.joint_mesh import Facets
+from archord.geometry.shapes.joint_mesh import Facets
 from archord.postprocess.deck import PlaneMesh, deck, loaded_nodes, thickness
 from archord.scene.scene import Scene
 

@@ -12,7 +12,7 @@ from archord.benchmarks.case import Case, paper_joint
 from archord.benchmarks.peers import calculix
 from archord.benchmarks.peers.calculix import areas, axis_pressure, peeq_integral, read_printed, step_forces
 from archord.benchmarks.timing import run_once
-from archord.geometry.joint_mesh import Facets
+from archord.geometry.shapes.joint_mesh import Facets
 from archord.postprocess.deck import contact_stiffness, deck_mesh
 
 # Written by CalculiX 2.20 for this scene, quadratic elements; the .frd from its displacements on.

@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis, lagrange_triangle, strain, strain_matrix
-from archord.geometry.quarter_joint import quarter_joint
+from archord.geometry.shapes.quarter_joint import quarter_joint
 
 
 def mesh_and_basis(X):

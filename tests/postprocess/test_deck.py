@@ -11,7 +11,7 @@ import pytest
 from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.calculix import areas
 from archord.cli import run
-from archord.geometry.joint_mesh import Cells, Facets
+from archord.geometry.shapes.joint_mesh import Cells, Facets
 from archord.postprocess.deck import contact_stiffness, deck, deck_mesh
 from archord.scene.file import resolved
 

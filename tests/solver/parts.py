@@ -14,10 +14,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.curve import RigidCircle
-from archord.geometry.fenicsx import create_vector, gmsh_to_mesh
-from archord.geometry.joint_mesh import Cells, Facets, on_circle
-from archord.geometry.quarter_joint import quarter_joint
-from archord.geometry.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.fenicsx import create_vector, gmsh_to_mesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.joint_mesh import Cells, Facets, on_circle
+from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material

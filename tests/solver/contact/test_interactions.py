@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
-from archord.geometry.joint_mesh import Facets
+from archord.geometry.shapes.joint_mesh import Facets
 from archord.materials.elasticity import contact_modulus
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface

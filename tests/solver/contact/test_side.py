@@ -9,7 +9,7 @@ import pytest
 from dolfinx.mesh import compute_midpoints, meshtags
 
 from archord.geometry.basis import bulk_quadrature, cell_basis, strain
-from archord.geometry.joint_mesh import Facets
+from archord.geometry.shapes.joint_mesh import Facets
 from archord.solver.contact.surface import Surface, _chain
 from tests.solver.parts import DR, ELASTIC, PERFECT, PLANE_STRESS, R, coordinates, joint_parts
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from archord.geometry.joint_mesh import Cells
+from archord.geometry.shapes.joint_mesh import Cells
 from archord.solver.contact.tangent import trial_rate
 from tests.solver.parts import (
     DR,

@@ -12,8 +12,8 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.fenicsx import gmsh_to_mesh
-from archord.geometry.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 
 class _Set(IntEnum):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from dolfinx.mesh import entities_to_geometry
 
-from archord.geometry.fenicsx import sectors
-from archord.geometry.half_ring import half_ring
-from archord.geometry.joint_mesh import Facets
-from archord.geometry.quarter_joint import quarter_joint
+from archord.geometry.meshes.fenicsx import sectors
+from archord.geometry.shapes.half_ring import half_ring
+from archord.geometry.shapes.joint_mesh import Facets
+from archord.geometry.shapes.quarter_joint import quarter_joint
 
 
 @pytest.mark.parametrize("n_parts", [1, 2, 3, 64])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from archord.geometry.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 
 
 def square(gmsh):

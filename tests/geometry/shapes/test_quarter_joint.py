@@ -8,9 +8,9 @@ from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis
-from archord.geometry.half_ring import half_ring
-from archord.geometry.joint_mesh import Cells, Facets
-from archord.geometry.quarter_joint import quarter_joint
+from archord.geometry.shapes.half_ring import half_ring
+from archord.geometry.shapes.joint_mesh import Cells, Facets
+from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.scene.geometry import JointGeometry
 
 R, DR, W = 1.0, 0.005, 10.0

@@ -10,8 +10,8 @@ import math
 
 from mpi4py import MPI
 
-from archord.geometry.joint_mesh import Cells, Drawing, Facets, mesh_joint
-from archord.geometry.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.joint_mesh import Cells, Drawing, Facets, mesh_joint
 
 _EDGE_GROWTH = 0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
 

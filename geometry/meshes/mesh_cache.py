@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from archord.geometry.plane_mesh import PlaneMesh
+from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.kernels.compiled import cache_folder
 
 _MOST = 100  # meshes kept
@@ -28,7 +28,7 @@ def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
         return make()
     gmsh = importlib.util.find_spec("gmsh")
     library = Path(gmsh.origin).stat().st_mtime_ns if gmsh and gmsh.origin else 0
-    sources = [source.read_bytes() for source in sorted(Path(__file__).parent.glob("*.py"))]
+    sources = [source.read_bytes() for source in sorted(Path(__file__).parents[1].rglob("*.py"))]
     digest = hashlib.sha256(b"".join([repr((key, library)).encode(), *sources])).hexdigest()
     folder = cache_folder() / "meshes"
     path = folder / f"{digest[:32]}.mesh"

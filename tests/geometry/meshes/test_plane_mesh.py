@@ -4,7 +4,7 @@ import gmsh
 import numpy as np
 import pytest
 
-from archord.geometry.plane_mesh import PlaneMesh
+from archord.geometry.meshes.plane_mesh import PlaneMesh
 
 
 @pytest.fixture

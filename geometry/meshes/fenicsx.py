@@ -17,9 +17,9 @@ from dolfinx.mesh import create_mesh, meshtags, meshtags_from_entities
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
-from archord.geometry.mesh_cache import kept_mesh
-from archord.geometry.plane_mesh import PlaneMesh
-from archord.geometry.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.mesh_cache import kept_mesh
+from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 try:
     from dolfinx.la.petsc import create_vector  # dolfinx >= 0.10

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from mpi4py import MPI
 
-from archord.geometry.joint_mesh import Cells, Drawing, Facets, mesh_joint
-from archord.geometry.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.joint_mesh import Cells, Drawing, Facets, mesh_joint
 
 
 def half_ring(

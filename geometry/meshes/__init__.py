@@ -1,0 +1,1 @@
+"""Meshes as arrays and on ranks, with named sets."""

@@ -1,0 +1,1 @@
+"""Shapes of joints, drawn and meshed by gmsh."""
