@@ -57,7 +57,7 @@ def core_peeq(joint: Joint) -> float:
     """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a block. Collective."""
     if not joint.problem.loads or joint.scene.pin.yield_stress is None:
         return 0.0
-    cells, points = joint.bulk.histories()[joint.problem.mesh.cell_tag("pin")]
+    cells, points = joint.bulk.histories()[min(joint.problem.mesh.cell_tags("pin"))]
     x = cell_basis(joint.V.mesh, joint.bulk.degree, cells, bulk_quadrature(joint.bulk.degree)[0]).point
     core = np.linalg.norm(x, axis=-1).ravel() < joint.scene.load.core_radius * joint.scene.joint.radius
     return joint.comm.allreduce(float(np.asarray(points.peeq)[core].max(initial=0.0)), op=MPI.MAX)

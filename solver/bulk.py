@@ -10,15 +10,17 @@ from collections.abc import Mapping, Sequence
 
 import basix.ufl
 import numpy as np
+import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
-from dolfinx.mesh import MeshTags
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array, bulk_quadrature, bulk_quadrature_degree, cell_basis, strain
 from archord.materials.elasticity import mean_stress, von_mises
 from archord.materials.material import Material, Points
+
+Index = npt.NDArray[np.integer]
 
 
 def _voigt(u):
@@ -94,18 +96,17 @@ def _check_elastic_tangent(material: Material) -> None:
 
 
 class Bulk:
-    """Internal forces of all bodies in the displacement space ``V`` (blocked, two components): those of the cells that
-    ``tags`` give the tags of ``materials``. ``elastic_forms``, one a body, span the pattern of the matrix."""
+    """Internal forces of all bodies in the displacement space ``V`` (blocked, two components), whose ``cells`` and
+    ``materials`` are given by their tags. ``elastic_forms``, one a body, span the pattern of the matrix."""
 
-    def __init__(self, V: fem.FunctionSpace, tags: MeshTags, materials: Mapping[int, Material]) -> None:
+    def __init__(self, V: fem.FunctionSpace, cells: Mapping[int, Index], materials: Mapping[int, Material]) -> None:
         self.V, self.materials = V, materials
         for material in materials.values():
             _check_elastic_tangent(material)
         self.degree = V.element.basix_element.degree
         rule = bulk_quadrature_degree(self.degree)
         n_owned = V.mesh.topology.index_map(2).size_local
-        cells = {tag: tags.find(tag) for tag in materials}
-        self.cells = {tag: c[c < n_owned] for tag, c in cells.items()}
+        self.cells = {tag: cells[tag][cells[tag] < n_owned] for tag in materials}
         u, v = _voigt(ufl.TrialFunction(V)), _voigt(ufl.TestFunction(V))
         self._plastic = {tag: _PlasticBody(V, self.cells[tag], m) for tag, m in materials.items() if m.yields}
         elastic = {}

@@ -40,12 +40,12 @@ class CoarseStart:
         self.path = coarse.load_path(coarse=coarse_start(coarse))
         self.iterations = 0  # of the last attempt, on all coarser meshes
         order = self._order = MeshOrder(coarse)
-        x, cells, body = fine.comm.bcast((order.coordinates, order.nodes_of_cell, order.bodies()))
+        x, cells, of_cells = fine.comm.bcast((order.coordinates, order.nodes_of_cell, order.bodies()))
         places = fine.V.tabulate_dof_coordinates()[:, :2]
         self._maps: list[tuple[np.ndarray, Interpolation]] = []  # nodes of a body on this rank, and their values
-        for tag in np.unique(body):
-            nodes = fine.nodes_of(tag)
-            onto = Interpolation(x[:, :2], cells[body == tag], fine.problem.degree, places[nodes])
+        for body in fine.problem.bodies:
+            nodes, on = fine.nodes_of(body), of_cells == coarse.problem.tag(body)
+            onto = Interpolation(x[:, :2], cells[on], fine.problem.degree, places[nodes])
             self._maps.append((nodes, onto))
         self._reached: float | None = None
 

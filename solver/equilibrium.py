@@ -28,7 +28,7 @@ from archord.solver.control import FactorControl, ForceControl
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.linear.choose import choose
 from archord.solver.linear.strategy import Facts
-from archord.solver.problem import Load, Problem
+from archord.solver.problem import Body, Load, Problem
 from archord.solver.tangent import TangentMatrix
 from archord.solver.timer import BEFORE_SOLVING, Timer
 
@@ -59,7 +59,7 @@ class Equilibrium:
         self._supported: list[tuple[str, int, np.ndarray]] = []  # name, axis and nodes of every support
         x = V.tabulate_dof_coordinates()[:, :2]
         for s in problem.supports:
-            nodes = fem.locate_dofs_topological(V, 1, problem.mesh.facets.find(problem.mesh.facet_tag(s.facets)))
+            nodes = problem.mesh.dofs_in(V, s.facets)
             self.fixed[nodes, s.axis] = True
             self.rate[nodes, s.axis] = s.rate(x[nodes]) if callable(s.rate) else s.rate
             self._supported.append((s.name, s.axis, nodes[nodes < self.n_owned]))
@@ -76,7 +76,7 @@ class Equilibrium:
             bulk.plastic,
             problem.control == "force",
             contact.gamma_factor if frictionless else None,
-            lambda: all(self._held(problem.tag(body)) for body in problem.bodies),
+            lambda: all(self._held(body) for body in problem.bodies),
         )
         self.choice = choose(facts)
         self._factoriser = partial(self.choice.factoriser, V)  # of tangents of all displacements
@@ -90,9 +90,9 @@ class Equilibrium:
                 self.control = ForceControl(self.tangent, rate, self._stiffest, self._factoriser)
             self._choose_linear()
 
-    def _held(self, tag: int) -> bool:
-        """Whether supports alone keep the body whose cells have this ``tag`` from moving rigidly. Collective."""
-        nodes = np.unique(self.V.dofmap.list[self.problem.mesh.cells.find(tag)])
+    def _held(self, body: Body) -> bool:
+        """Whether supports alone keep the ``body`` from moving rigidly. Collective."""
+        nodes = np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
         x = self.V.tabulate_dof_coordinates()[nodes, :2]
         x = x / self.comm.allreduce(np.abs(x).max(initial=0.0), op=MPI.MAX)
         one, none = np.ones(len(x)), np.zeros(len(x))
@@ -104,9 +104,9 @@ class Equilibrium:
     def _nodal_forces(self, load: Load) -> Array:
         """Forces ``(n_owned, 2)`` on the modelled part per unit of the load factor."""
         V, mesh, problem = self.V, self.V.mesh, self.problem
-        tag = problem.mesh.cell_tag(load.cells)
-        rule = {"quadrature_degree": _LOAD_DEGREE}
-        dx = ufl.Measure("dx", mesh, subdomain_data=problem.mesh.cells, metadata=rule)(tag)
+        cells = problem.mesh.cells_in(load.cells)
+        domain = [(1, cells[cells < mesh.topology.index_map(2).size_local])]
+        dx = ufl.Measure("dx", mesh, subdomain_data=domain, metadata={"quadrature_degree": _LOAD_DEGREE})(1)
         force = fem.Constant(mesh, np.array(load.force))
         density = fem.Constant(mesh, 1.0) if load.density is None else load.density(ufl.SpatialCoordinate(mesh))
         total = self.comm.allreduce(fem.assemble_scalar(fem.form(density * dx)))

@@ -68,10 +68,11 @@ class MeshOrder:
 
     def bodies(self) -> np.ndarray:
         """Tag of the body of every cell ``(n,)`` on rank 0, nothing elsewhere. Collective."""
-        tags, body = self.system.problem.mesh.cells, np.zeros(self.n_cells, dtype=np.int8)
-        own = tags.indices < self.n_cells
-        body[tags.indices[own]] = tags.values[own]
-        return self.cells(body)
+        problem, of_cells = self.system.problem, np.zeros(self.n_cells, dtype=np.int8)
+        for body in problem.bodies:
+            cells = problem.cells_of(body)
+            of_cells[cells[cells < self.n_cells]] = problem.tag(body)
+        return self.cells(of_cells)
 
     def collect(self, u: Array) -> Array:
         """Nodal values ``(n_local, k)`` of all ranks on rank 0, nothing elsewhere. Collective."""

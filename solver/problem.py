@@ -103,14 +103,18 @@ class Problem:
         if self.control == "force" and self.loads:
             raise ValueError('loads follow the load factor, which control = "force" does not know: use "factor"')
 
+    def cells_of(self, body: Body) -> np.ndarray:
+        """Cells ``(n,)`` of the body on this rank, ghosts included."""
+        return self.mesh.cells_in(body.cells or body.name)
+
     def tag(self, body: Body) -> int:
-        """Tag of the body's cells."""
-        return self.mesh.cell_tag(body.cells or body.name)
+        """The body's number: the lowest tag of its cells."""
+        return min(self.mesh.cell_tags(body.cells or body.name))
 
     def body_of(self, facets: str) -> Body:
         """The body that a facet set belongs to. Collective; raises ValueError if it is not one."""
         tags = self.mesh.tags_behind(facets)
-        found = [body for body in self.bodies if self.tag(body) in tags]
-        if len(found) != 1 or len(tags) != 1:
+        found = [body for body in self.bodies if tags & set(self.mesh.cell_tags(body.cells or body.name))]
+        if len(found) != 1 or not tags <= set(self.mesh.cell_tags(found[0].cells or found[0].name)):
             raise ValueError(f"the facet set {facets!r} belongs to {len(tags)} cell sets, a surface to one body")
         return found[0]

@@ -18,7 +18,7 @@ from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.equilibrium import Equilibrium
 from archord.solver.load_path import LoadPath, Position
 from archord.solver.newton import NewtonSolver
-from archord.solver.problem import Problem
+from archord.solver.problem import Body, Problem
 from archord.solver.recovery import Recovery
 from archord.solver.stepping import StepRules, march
 from archord.solver.timer import Timer
@@ -42,7 +42,8 @@ class System:
             element = basix.ufl.element("P", "triangle", problem.degree, shape=(2,), lagrange_variant=variant)
             self.V = fem.functionspace(problem.mesh.mesh, element)
             materials = {problem.tag(body): body.material for body in problem.bodies}
-            self.bulk = Bulk(self.V, problem.mesh.cells, materials)
+            cells = {problem.tag(body): problem.cells_of(body) for body in problem.bodies}
+            self.bulk = Bulk(self.V, cells, materials)
             self.sides: dict[str, Surface] = {}
             surfaces = [[self._surface(given, i.name) for given in i.surfaces] for i in problem.interactions]
             self.contact = Contact(self.V, list(map(Interface, problem.interactions, surfaces)))
@@ -55,12 +56,12 @@ class System:
             return RigidSurface(given.circle, given.rate)
         name = given if given not in self.sides else f"{given} ({interaction})"
         mesh, material = self.problem.mesh, self.problem.body_of(given).material
-        self.sides[name] = Surface(self.V, mesh.facets, mesh.facet_tag(given), material, name)
+        self.sides[name] = Surface(self.V, mesh.facets_in(given), material, name)
         return self.sides[name]
 
-    def nodes_of(self, tag: int) -> np.ndarray:
-        """Nodes ``(n,)`` of this rank, ghosts included, in the cells with this ``tag``."""
-        return np.unique(self.V.dofmap.list[self.problem.mesh.cells.find(tag)])
+    def nodes_of(self, body: Body) -> np.ndarray:
+        """Nodes ``(n,)`` of the ``body`` on this rank, ghosts included."""
+        return np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
 
     def solve(self, loads: Sequence[float], rules: StepRules | None = None) -> None:
         """Follow the path of the ``loads``, from where the last call has ended. Raises `StepFailure`."""
@@ -77,7 +78,7 @@ class System:
         guess = self.problem.guess(load)
         u = np.zeros((self.equilibrium.n_local, 2))
         for body in self.problem.bodies:
-            u[self.nodes_of(self.problem.tag(body))] = guess.moved.get(body.name, 0.0)
+            u[self.nodes_of(body)] = guess.moved.get(body.name, 0.0)
         return np.append(u, guess.factor)
 
     def reaction(self, name: str) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import basix
@@ -18,15 +19,15 @@ _ENDS = basix.topology(basix.CellType.triangle)[1]  # vertices of a triangle's e
 class PlaneMesh:
     """Nodes ``x`` ``(n, 2)``, ``cells`` ``(m, a)`` of the ``bodies`` ``(m,)`` and ``edges`` ``(k, b)`` of the curves
     ``tags`` ``(k,)``; the nodes of cells and edges come in basix' order. ``cell_sets`` and ``facet_sets`` name bodies
-    and tags."""
+    and tags, of which a set has several where sets overlap."""
 
     x: Array
     cells: np.ndarray
     bodies: np.ndarray
     edges: np.ndarray
     tags: np.ndarray
-    cell_sets: dict[str, int] = field(default_factory=dict)
-    facet_sets: dict[str, int] = field(default_factory=dict)
+    cell_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    facet_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     @classmethod
     def empty(cls, order: int) -> PlaneMesh:
@@ -66,15 +67,39 @@ def distinct_edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, which
 
 
-def _elements(gmsh, kind: CellType, dim: int) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
-    """gmsh's numbers of the nodes ``(n, a)`` of elements in physical groups of dimension ``dim``, the groups' tags
-    ``(n,)``, and the tags by their names, by their numbers where they have none."""
-    nodes, tags, names = [], [], {}
+def one_tag_each(
+    entity: np.ndarray, tags: np.ndarray, names: Mapping[str, int]
+) -> tuple[np.ndarray, np.ndarray, dict[str, tuple[int, ...]]]:
+    """Where each ``entity`` ``(k,)`` comes first, its tag, and all tags of the sets with these ``names``.
+
+    An entity with one of the ``tags`` ``(k,)`` keeps it; those of the same several sets share a new one.
+    """
+    _, first, which = np.unique(entity, return_index=True, return_inverse=True)
+    groups, group = np.unique(tags, return_inverse=True)
+    member = np.zeros((len(first), len(groups)), dtype=bool)
+    member[which, group] = True
+    one, several = tags[first].astype(np.int32), member.sum(axis=1) > 1
+    together, combination = np.unique(member[several], axis=0, return_inverse=True)
+    new = groups.max(initial=0) + 1 + np.arange(len(together))
+    one[several] = new[combination.ravel()]
+    tags_of = {int(tag): new[column].tolist() for tag, column in zip(groups, together.T, strict=True)}
+    alone = set(map(int, one))
+    sets = {name: tuple([tag] * (tag in alone) + tags_of.get(tag, [])) for name, tag in names.items()}
+    order = np.argsort(first)
+    return first[order], one[order], sets
+
+
+def _elements(gmsh, kind: CellType, dim: int) -> tuple[np.ndarray, np.ndarray, dict[str, tuple[int, ...]]]:
+    """gmsh's numbers of the nodes ``(n, a)`` of elements in physical groups of dimension ``dim``, their tags ``(n,)``,
+    and the tags of the groups by their names, by their numbers where they have none."""
+    nodes, numbers, tags, names = [], [], [], {}
     for _, tag in gmsh.model.getPhysicalGroups(dim):
         names[gmsh.model.getPhysicalName(dim, tag) or str(tag)] = tag
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
-            types, _, found = gmsh.model.mesh.getElements(dim, entity)
+            types, (found,), (of_found,) = gmsh.model.mesh.getElements(dim, entity)
             per_element = gmsh.model.mesh.getElementProperties(types[0])[3]
-            nodes.append(found[0].reshape(-1, per_element)[:, perm_gmsh(kind, per_element)])
-            tags.append(np.full(len(nodes[-1]), tag, dtype=np.int32))
-    return np.concatenate(nodes), np.concatenate(tags), names
+            nodes.append(of_found.reshape(-1, per_element)[:, perm_gmsh(kind, per_element)])
+            numbers.append(found)
+            tags.append(np.full(len(found), tag, dtype=np.int32))
+    first, one, sets = one_tag_each(np.concatenate(numbers), np.concatenate(tags), names)
+    return np.concatenate(nodes)[first], one, sets

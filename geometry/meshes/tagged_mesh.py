@@ -1,41 +1,93 @@
-"""A mesh with named sets of cells and facets: what a problem's bodies, surfaces and supports are found by."""
+"""A mesh with named sets of cells, facets and points: what a problem's bodies, surfaces and supports are found by."""
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from dolfinx import fem
 from dolfinx.mesh import Mesh, MeshTags, compute_incident_entities
+from mpi4py import MPI
+
+from archord.geometry.basis import Array
+
+_SAME_PLACE = 1e-8  # of the mesh's size
+
+Sets = Mapping[str, tuple[int, ...]]
 
 
 @dataclass(frozen=True)
 class TaggedMesh:
-    """A mesh of triangles, its ``cells`` and ``facets`` with tags, and the tags' names; all bodies live in one mesh."""
+    """A mesh of one kind of cells, its ``cells`` and ``facets`` with tags, and named sets; all bodies live in one mesh.
+
+    A set has several tags where sets overlap: cells (facets) of the same sets share a tag. ``point_sets`` are the
+    coordinates ``(k, 2)`` of single nodes.
+    """
 
     mesh: Mesh
     cells: MeshTags
     facets: MeshTags
-    cell_sets: Mapping[str, int]
-    facet_sets: Mapping[str, int]
+    cell_sets: Sets
+    facet_sets: Sets
+    point_sets: Mapping[str, Array] = field(default_factory=dict)
 
-    def cell_tag(self, name: str) -> int:
-        """Tag of the cell set ``name``. Raises ValueError."""
-        return _tag("cell", self.cell_sets, name)
+    def cell_tags(self, name: str) -> tuple[int, ...]:
+        """Tags of the cell set ``name``. Raises ValueError, also for a set without cells."""
+        return _tags("cell", self.cell_sets, name)
 
-    def facet_tag(self, name: str) -> int:
-        """Tag of the facet set ``name``. Raises ValueError."""
-        return _tag("facet", self.facet_sets, name)
+    def cells_in(self, name: str) -> np.ndarray:
+        """Cells ``(n,)`` of the cell set ``name`` on this rank, ghosts included. Raises ValueError."""
+        return self.cells.indices[np.isin(self.cells.values, self.cell_tags(name))]
+
+    def facets_in(self, name: str) -> np.ndarray:
+        """Facets ``(n,)`` of the facet set ``name`` on this rank, ghosts included. Raises ValueError."""
+        return self.facets.indices[np.isin(self.facets.values, _tags("facet", self.facet_sets, name))]
+
+    def dofs_in(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
+        """Block dofs ``(n,)`` of ``V`` on this rank, ghosts included, in the facet, point or cell set ``name``: the
+        first of these that there is. Collective; raises ValueError."""
+        if name in self.facet_sets:
+            return fem.locate_dofs_topological(V, 1, self.facets_in(name))
+        if name in self.point_sets:
+            return self._nodes_at(V, name)
+        if name in self.cell_sets:
+            self.mesh.topology.create_connectivity(2, 2)
+            return fem.locate_dofs_topological(V, 2, self.cells_in(name))
+        known = [*self.facet_sets, *self.point_sets, *self.cell_sets]
+        raise ValueError(unknown("facet, point or cell set", name, known))
+
+    def _nodes_at(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
+        points, x = self.point_sets[name], V.tabulate_dof_coordinates()[:, :2]
+        comm, n_owned = self.mesh.comm, V.dofmap.index_map.size_local
+        size = comm.allreduce(np.abs(self.mesh.geometry.x).max(initial=0.0), op=MPI.MAX)
+        here = np.abs(x[:, None] - points).max(axis=2) < _SAME_PLACE * size
+        alike = (np.abs(points[:, None] - points).max(axis=2) < _SAME_PLACE * size).sum(axis=0)
+        found = comm.allreduce(here[:n_owned].sum(axis=0))
+        for x, y in points[found != alike]:
+            raise ValueError(f"the point set {name!r} does not tell which node at ({x:g}, {y:g}) it means")
+        return np.flatnonzero(here.any(axis=1)).astype(np.int32)
 
     def tags_behind(self, name: str) -> set[int]:
         """Tags of the cells at the facets of the set ``name``, over all ranks. Collective."""
         self.mesh.topology.create_connectivity(1, 2)
-        cells = compute_incident_entities(self.mesh.topology, self.facets.find(self.facet_tag(name)), 1, 2)
+        cells = compute_incident_entities(self.mesh.topology, self.facets_in(name), 1, 2)
         here = np.unique(self.cells.values[np.isin(self.cells.indices, cells)]).tolist()
-        return set().union(*self.mesh.comm.allgather(here))
+        parts: list[list[int]] = self.mesh.comm.allgather(here)
+        return set().union(*parts)
 
 
-def _tag(kind: str, sets: Mapping[str, int], name: str) -> int:
+def unknown(kind: str, name: str, known: list[str]) -> str:
+    """What is said of the ``name`` of a ``kind`` that is not among those ``known``."""
+    near = difflib.get_close_matches(name, known, 1)
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    return f"there is no {kind} {name!r}{hint}; there are {', '.join(map(repr, known)) or 'none'}"
+
+
+def _tags(kind: str, sets: Sets, name: str) -> tuple[int, ...]:
     if name not in sets:
-        raise ValueError(f"there is no {kind} set {name!r}; there are {', '.join(map(repr, sets))}")
+        raise ValueError(unknown(f"{kind} set", name, list(sets)))
+    if not sets[name]:
+        raise ValueError(f"the {kind} set {name!r} is empty: the mesh has no {kind} of it")
     return sets[name]

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import basix
 import numpy as np
 from dolfinx import fem
-from dolfinx.mesh import MeshTags
 
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis, strain, strain_matrix
 from archord.geometry.curve import Curve, RigidCircle
@@ -20,7 +19,7 @@ from archord.materials.material import Material, Points
 
 
 class Surface:
-    """Facets tagged ``tag`` of the body with ``material`` in the displacement space ``V``.
+    """The boundary ``facets`` ``(n,)`` of the body with ``material`` in the displacement space ``V``.
 
     Arrays of this rank's ``n`` facets with ``q`` points each, in the order in which the curve runs: ``weight`` ``(n,
     q)`` (measure of the curved edge), ``point`` and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own
@@ -29,10 +28,10 @@ class Surface:
     ``curve``, its ``n_facets`` and ``curve_dofs``, the global dofs of its nodes, are those of all ranks.
     """
 
-    def __init__(self, V: fem.FunctionSpace, facets: MeshTags, tag: int, material: Material, name: str = "") -> None:
+    def __init__(self, V: fem.FunctionSpace, facets: np.ndarray, material: Material, name: str = "") -> None:
         self.V, self.comm, self.material, self.name = V, V.mesh.comm, material, name
         self.degree, index_map = V.element.basix_element.degree, V.dofmap.index_map
-        cells, local_facets = _owned_facets(V.mesh, facets.find(tag))
+        cells, local_facets = _owned_facets(V.mesh, facets)
         closure = [V.dofmap.dof_layout.entity_closure_dofs(1, k) for k in range(3)]
         # closure order is vertex, vertex, interior; along the facet the interior nodes come between the vertices
         along = [[c[0], *c[2:], c[1]] for c in closure]

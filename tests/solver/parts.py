@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.fenicsx import create_vector, gmsh_to_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Cells, Facets, on_circle
+from archord.geometry.shapes.joint_mesh import Cells, on_circle
 from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
@@ -137,13 +137,13 @@ def joint_parts(
     joint = quarter_joint(comm, R, DR, 4.0, size, 0.4, rigid_pin=pin is None, partitioner=partitioner)
     V = space(joint.mesh)
     materials = {Cells.BLOCK: block}
-    sides = [Surface(V, joint.facets, Facets.HOLE_ARC, block)]
+    sides = [Surface(V, joint.facets_in("hole"), block)]
     opposite = RigidSurface(RigidCircle(np.array([0.0, -DR]), R))
     if pin is not None:
         materials = {Cells.PIN: pin} | materials
-        opposite = Surface(V, joint.facets, Facets.PIN_ARC, pin)
+        opposite = Surface(V, joint.facets_in("pin"), pin)
         sides.insert(0, opposite)
-    bulk = Bulk(V, joint.cells, materials)
+    bulk = Bulk(V, {tag: joint.cells.find(tag) for tag in materials}, materials)
     return Parts(V, joint.cells, joint.facets, bulk, sides, interact([opposite, sides[-1]], **contact_options))
 
 

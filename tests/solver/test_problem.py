@@ -73,7 +73,7 @@ def test_a_column_under_its_weight_follows_the_closed_form(symmetry):
     system, weight = solve(problem, [0.01]), 0.01
     modulus, y = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU)), coordinates(system.V)[:, 1]
     u = system.equilibrium.displacement()
-    lower = system.nodes_of(problem.tag(bodies[0]))
+    lower = system.nodes_of(bodies[0])
     exact = -weight / symmetry / modulus * (1 - y[lower] ** 2) / 2
     np.testing.assert_allclose(u[lower, 1], exact, rtol=0, atol=1e-9 * weight)
     assert system.reaction("base")[1] == pytest.approx(weight, rel=1e-9)
@@ -137,7 +137,7 @@ class Stiffening(Elastic):
 REFUSED = {
     "must be symmetric": {"bodies": [Body("lower", Lopsided(E, NU, "strain"))]},
     "different names": {"bodies": [Body("lower", ELASTIC), Body("lower", ELASTIC, "upper")]},
-    "no facet set 'top'": {"supports": [Support("base", "top", 1)]},
+    "no facet, point or cell set 'top'": {"supports": [Support("base", "top", 1)]},
     "no cell set 'middle'": {"bodies": [Body("middle", ELASTIC)]},
     "'left' belongs to 2 cell sets": {"interactions": [Interaction("joint", ("left", "lower top"))]},
     "does not have the surface 'lid'": {

@@ -109,7 +109,7 @@ def test_every_rigid_disc_moves_by_itself():
     """One in the hole, one on the block's upper edge: forces follow the motion of each, and the load factor moves both
     by their rates."""
     parts = joint_parts(pin=None)
-    edge = Surface(parts.V, parts.facets, Facets.BLOCK_HELD, ELASTIC)
+    edge = Surface(parts.V, parts.facets.find(Facets.BLOCK_HELD), ELASTIC)
     pin = RigidSurface(RigidCircle(np.array([0.0, -DR]), R), (0.0, -1.0))
     disc = RigidSurface(RigidCircle(np.array([2.5, R]), R), (0.1, -2.0))
     sides = {"pin": [pin, parts.sides[0]], "disc": [disc, edge]}

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dolfinx.mesh import compute_midpoints, meshtags
+from dolfinx.mesh import compute_midpoints
 
 from archord.geometry.basis import bulk_quadrature, cell_basis, strain
 from archord.geometry.shapes.joint_mesh import Facets
@@ -157,9 +157,8 @@ def test_a_contact_edge_with_a_hole_in_it_is_an_error():
     hole = np.sort(parts.facets.find(Facets.HOLE_ARC))
     x = compute_midpoints(parts.V.mesh, 1, hole)
     torn = np.delete(hole, np.argmin(np.abs(np.arctan2(x[:, 0], -x[:, 1]) - np.pi / 4)))
-    tags = meshtags(parts.V.mesh, 1, torn.astype(np.int32), np.full(len(torn), Facets.HOLE_ARC, dtype=np.int32))
     with pytest.raises(ValueError, match="2 pieces"):
-        Surface(parts.V, tags, Facets.HOLE_ARC, ELASTIC)
+        Surface(parts.V, torn, ELASTIC)
 
 
 def test_facets_are_chained_end_to_start():
