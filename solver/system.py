@@ -66,7 +66,7 @@ class System:
     def solve(self, loads: Sequence[float], rules: StepRules | None = None) -> None:
         """Follow the path of the ``loads``, from where the last call has ended. Raises `StepFailure`."""
         self._path = self._path or self.load_path()
-        self._path.at.targets_done = 0
+        self._path.at.targets_done, self._path.at.size = 0, None
         march(self._path, loads, rules=rules)
 
     def load_path(self, at: Position | None = None, coarse: CoarseStart | None = None) -> LoadPath:

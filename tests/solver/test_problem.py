@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
+from archord.solver.load_path import LoadPath
 from archord.solver.problem import Body, Guess, Interaction, Load, Problem, Support
 from archord.solver.stepping import StepRules
 from archord.solver.system import System
@@ -45,12 +46,14 @@ def test_half_a_problem_with_symmetry_two_is_the_whole(control):
     assert systems[0].peeq()[1] > 0
 
 
-def test_a_second_call_goes_on_from_the_first():
-    """Steps in between lie between the two loads: a little unloading in four steps is elastic."""
-    system = solve(columns(), [DEPTH])
-    peeq = system.peeq()
+def test_a_second_call_goes_on_from_the_first(monkeypatch):
+    """By its own rules, through loads between the two: a little unloading in four steps is elastic."""
+    system, loads = solve(columns(), [DEPTH]), []
+    peeq, accept = system.peeq(), LoadPath.accept
     assert peeq[0] > 0
+    monkeypatch.setattr(LoadPath, "accept", lambda path, load: (loads.append(load), accept(path, load)))
     system.solve([0.99 * DEPTH], StepRules(initial=0.25, growth=1.0))
+    assert loads == pytest.approx([DEPTH * share for share in (0.9975, 0.995, 0.9925, 0.99)], rel=1e-12)
     assert system.peeq() == peeq
     assert system.equilibrium.load == 0.99 * DEPTH
 
