@@ -40,7 +40,7 @@ class KinematicState:
 @dataclass(frozen=True)
 class KinematicMaterial(Elastic):
     """Elastic-plastic solid with isotropic ``hardening`` and back stresses ``(C, gamma)``, moduli and rates of
-    recovery; ``gamma = 0`` is Prager's linear kinematic hardening. Its tangent is not symmetric.
+    recovery; ``gamma = 0`` is Prager's linear kinematic hardening. With recovery its tangent is not symmetric.
 
     Raises ValueError unless C is positive and gamma is not negative.
     """
@@ -74,16 +74,16 @@ class KinematicMaterial(Elastic):
         else:
             stress, tangent, new = self._plane_stress(whole, state)
             flows = new.peeq > state.peeq
-            normal = tangent[:, :, 2]
-            tangent = tangent - normal[:, :, None] * (tangent[:, 2] / tangent[:, 2, 2, None])[:, None, :]
-            stress[:, 2] = 0.0
+            ratio = tangent[:, :, 2] / tangent[:, 2, 2, None]
+            tangent = tangent - ratio[:, :, None] * tangent[:, 2, None]
+            stress = stress - ratio * stress[:, 2, None]  # all normal stresses share the pressure's round-off
         in_plane = np.tile(self.elastic_tangent, (len(strain), 1, 1))
         in_plane[flows] = tangent[flows][:, _PLANE[:, None], _PLANE]
         return stress, in_plane, new
 
     def _plane_stress(self, strain: Array, old: KinematicState) -> tuple[Array, Array, KinematicState]:
         """`_return` at the ``eps_zz`` at which ``s_zz`` vanishes, which increases with it."""
-        elastic = strain - old.plastic_strain * _TWICE
+        elastic, modulus = strain - old.plastic_strain * _TWICE, self.lame[0] + 2 * self.lame[1]
         strain[:, 2] = old.plastic_strain[:, 2] - self.nu / (1 - self.nu) * (elastic[:, 0] + elastic[:, 1])
         bounds: tuple[Array, Array] = np.full(len(strain), -np.inf), np.full(len(strain), np.inf)
         low, high = bounds
@@ -92,7 +92,8 @@ class KinematicMaterial(Elastic):
             off, z = stress[:, 2], strain[:, 2]
             low, high = np.where(off < 0, z, low), np.where(off > 0, z, high)
             step = off / tangent[:, 2, 2]
-            moving = ~(np.abs(off) <= 1e-13 * np.abs(stress).max(axis=1) + 1e-15 * self.E * np.abs(z))
+            strains = (np.abs(strain) + np.abs(old.plastic_strain)).sum(axis=1)
+            moving = ~(np.abs(off) <= 1e-13 * np.abs(stress).max(axis=1) + 4e-15 * modulus * strains)
             if not moving.any():
                 break
             z = np.where(moving, z - step, z)
@@ -153,6 +154,7 @@ class KinematicMaterial(Elastic):
         start: tuple[Array, Array] = np.zeros(len(trial)), np.zeros(len(trial))
         d_peeq, low = start
         high: Array = np.sqrt(1.5) * (_norm(trial) + _norm(back).sum(axis=1)) / (3 * mu)
+        close = 1e-14 * high
         for _ in range(_ITERATIONS):
             theta = 1 / (1 + gamma * d_peeq[:, None])
             eta = trial - np.einsum("nk,nki->ni", theta, back)
@@ -163,7 +165,7 @@ class KinematicMaterial(Elastic):
             fall = 3 * mu + (theta**2) @ C + slope - np.sqrt(1.5) * _dot(rate, eta) / length
             low, high = np.where(off > 0, d_peeq, low), np.where(off < 0, d_peeq, high)
             step = off / fall
-            moving = ~(np.abs(step) <= 1e-14 * (d_peeq + np.sqrt(1.5) * length / mu))
+            moving = ~(np.abs(step) <= close)
             if not moving.any():
                 return d_peeq, fall, theta, eta, rate
             d_peeq = np.where(moving, d_peeq + step, d_peeq)

@@ -15,10 +15,10 @@ def rng():
     return np.random.default_rng(1)
 
 
-def hooke(stress):
+def hooke(stress, nu=NU):
     """Strains [xx, yy, zz, gamma_xy] from Hooke's law in three dimensions."""
     xx, yy, zz, xy = stress.T
-    return np.stack([xx - NU * (yy + zz), yy - NU * (xx + zz), zz - NU * (xx + yy), 2 * (1 + NU) * xy], axis=1) / E
+    return np.stack([xx - nu * (yy + zz), yy - nu * (xx + zz), zz - nu * (xx + yy), 2 * (1 + nu) * xy], axis=1) / E
 
 
 def turned(xx, yy, xy):
