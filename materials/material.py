@@ -36,8 +36,10 @@ class Material(Protocol):
     def update(self, strain: Array, state: State) -> tuple[Array, Array, State]:
         """Stress ``(n, 4)``, consistent tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from ``state``.
 
-        The tangent is symmetric, and equals `elastic_tangent` to the bit at points that do not flow; it may be a view,
-        not to be written to. A stress that does not exist is not a number: the solver takes the step back.
+        The tangent equals `elastic_tangent` to the bit at points that do not flow; it may be a view, not to be written
+        to. If it is not symmetric, force control takes it as such in one place (`TangentMatrix.border`), which leaves the
+        equilibrium as it is and may take more iterations. A stress that does not exist is not a number: the solver
+        takes the step back.
         """
         ...
 

@@ -144,7 +144,7 @@ class TangentMatrix:
     def border(self, direction: fem.Function) -> tuple[Array, Array, float]:
         """Derivatives with respect to the load factor, which moves the bodies along ``direction``, ``(n_owned dofs,)``,
         those of the force on it, alike, and that of the force on it with respect to it, of all ranks. The bulk's of
-        both are the same, for its tangent is symmetric."""
+        both are the same where its tangent is symmetric, as of all materials without recovery of back stresses."""
         b = create_vector(self.V.dofmap.index_map, 2)
         self.bulk.add_action(direction, b)
         d = float(b.array_r @ self._rate.ravel())
