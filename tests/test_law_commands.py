@@ -85,6 +85,24 @@ def test_a_small_block_is_told_with_the_size_of_its_effect(capsys, width, share)
     assert share is None or f"its P about {share} smaller than the law's" in err
 
 
+@pytest.mark.parametrize(
+    "sets",
+    ["hardening=1000.0", "hardening=[[0, 230.76923076923077], [1, 400.0]]", "back_stresses=[[20000.0, 100.0]]"],
+)
+def test_hardening_is_told_by_the_laws_that_yield(capsys, sets):
+    """Once each; the numbers stay those of perfect plasticity."""
+    words = ["law", "paper", "paper-plastic", "calibrated", "--scene", SCENE, "--points", "3"]
+    outs = []
+    for more in ([], ["--set", f"block.{sets}"]):
+        assert run([*words, *more]) == 0
+        outs.append(capsys.readouterr())
+    assert outs[0].out == outs[1].out
+    assert outs[0].err == ""
+    told = [line.split(":")[2:] for line in outs[1].err.splitlines()]
+    assert [name for name, _ in told] == [" paper-plastic", " calibrated"]
+    assert all("is a law of perfect plasticity" in said and "too low beyond yield" in said for _, said in told)
+
+
 def test_a_law_is_not_drawn_over_its_scene(tmp_path, capsys):
     """Whatever its name; over another picture it is."""
     scene, picture = (tmp_path / name for name in ("scene.svg", "old.png"))

@@ -29,7 +29,8 @@ class LawJoint:
     for like bodies. Only the calibrated law asks for the rest: ``plane`` ("strain" or "stress"), ``nu`` of the block,
     ``pin_nu`` of the pin (None: the block's, or rigid), and which bodies have the yield stress, ``yielding``: "both",
     "block", "pin", or "unlike" where each has its own. Laws of P(delta) are for a pin in a wide block, and say so of a
-    ``ring``, or where ``block_size`` (None: wide) is small. Raises ValueError for values that make no joint.
+    ``ring``, or where ``block_size`` (None: wide) is small; those with yielding say so where a body
+    ``hardens``. Raises ValueError for values that make no joint.
     """
 
     radius: float
@@ -47,6 +48,7 @@ class LawJoint:
     yielding: str = "both"
     ring: bool = False
     block_size: float | None = None
+    hardens: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -67,7 +69,7 @@ class LawJoint:
 
     @classmethod
     def from_scene(cls, scene: Scene) -> LawJoint:
-        """The joint of ``scene``; of two yield stresses the lower one, hardening is left out."""
+        """The joint of ``scene``; of two yield stresses the lower one, of hardening only whether there is any."""
         plane, pin, block = scene.analysis.plane, scene.solids.get("pin"), scene.block
         alpha, first, yields, second = 1.0, 0.0, [None, block.yield_stress], _transverse(block.nu, plane)
         if pin is not None:
@@ -87,6 +89,7 @@ class LawJoint:
             yielding=_yielding(*yields),
             ring=not scene.joint.is_block,
             block_size=scene.joint.W,
+            hardens=not all(solid.perfectly_plastic for solid in scene.solids.values()),
         )
 
     @property

@@ -53,6 +53,7 @@ class Law:
     unfit: Callable[[LawJoint], str] = lambda joint: ""  # why the law does not hold for the whole joint
     needs: tuple[str, ...] = ()
     gives: tuple[str, ...] = ("displacement", "pressure", "contact angle")
+    plastic: bool = False  # whether it knows yielding, without hardening
 
     @property
     def gives_displacement(self) -> bool:
@@ -111,7 +112,7 @@ class Law:
 
     def _check(self, joint: LawJoint) -> None:
         """Refuse a joint that lacks what the law needs; of laws with displacements also a ring, whose P(delta) is
-        another one, and warn of a small block, which is softer than the law's."""
+        another one, and warn of a small block, which is softer than the law's; of plastic laws warn of hardening."""
         for name in self.needs:
             if getattr(joint, name) is None:
                 raise ValueError(f"{self.name}: this law needs {name}.")
@@ -127,6 +128,9 @@ class Law:
                 f"{joint.block_size / joint.radius:.4g} R the joint is softer, and its P about {about:.1%} smaller "
                 f"than the law's (up to {most:.1%} with a rigid pin, or beyond yield)"
             )
+            warnings.warn(LawRangeWarning(said), stacklevel=4)
+        if joint.hardens and self.plastic:
+            said = f"{self.name}: is a law of perfect plasticity; of bodies that harden its P is too low beyond yield"
             warnings.warn(LawRangeWarning(said), stacklevel=4)
 
 
