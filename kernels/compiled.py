@@ -61,11 +61,18 @@ def pointer(array: npt.NDArray[Any]) -> Any:
 
 
 def cache_folder() -> Path:
-    """The user's folder for what is made once and used again; a new temporary one where that cannot be written."""
+    """The user's folder for what is made once and used again; a temporary one of this process where that cannot be
+    written."""
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "archord"
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-    return folder if os.access(folder, os.W_OK) else Path(tempfile.mkdtemp(prefix="archord-"))
+    return folder if os.access(folder, os.W_OK) else Path(_temporary().name)
+
+
+@cache
+def _temporary() -> tempfile.TemporaryDirectory[str]:
+    """A folder of this process, removed at its end."""
+    return tempfile.TemporaryDirectory(prefix="archord-", ignore_cleanup_errors=True)
 
 
 def _compile(command: list[str], source: Path, path: Path, libraries: tuple[str, ...]) -> None:

@@ -1,9 +1,13 @@
 """C kernels: compiled once, called with arrays that fit."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from archord.kernels.compiled import CompilerError, _loaded, library, pointer, structure
+from archord.kernels.compiled import CompilerError, _loaded, cache_folder, library, pointer, structure
 
 
 @pytest.fixture
@@ -44,6 +48,12 @@ def test_a_cache_that_cannot_be_written_is_no_hindrance(source, monkeypatch):
     source.write_text("double twice(double x) { return 2 * x; }\n")
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/nowhere")
     assert library(source).twice(2.0) == 4.0
+    assert cache_folder() == cache_folder()
+    assert list(cache_folder().glob("doubling-*.so"))
+    code = "from archord.kernels.compiled import cache_folder; print(cache_folder())"
+    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    assert Path(other).name.startswith("archord-")
+    assert not Path(other).exists()
 
 
 def test_a_structure_has_numbers_and_pointers(source):
