@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,6 +17,10 @@ ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
     "load": [(*LOADS, "path")],
 }
+_LARGEST_FILE = 10**6  # bytes
+_DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}")
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
@@ -73,7 +78,11 @@ def read_targets(data: dict[str, Any], scene: Path) -> None:
 def read_text(path: str | Path) -> str:
     """The text of the file ``path``. Raises `InputError`."""
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
+        with Path(path).open("rb") as file:
+            raw = file.read(_LARGEST_FILE + 1)
+        if len(raw) > _LARGEST_FILE:
+            raise OSError(None, f"it is larger than {_LARGEST_FILE // 10**6} MB")
+        return raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: cannot be read: it is not UTF-8 text.") from None
     except (OSError, ValueError) as error:
@@ -83,11 +92,18 @@ def read_text(path: str | Path) -> str:
 def read_toml(path: str | Path) -> dict[str, Any]:
     """What the TOML file ``path`` holds. Raises `InputError`."""
     try:
-        return tomllib.loads(read_text(path))
+        return _parsed(read_text(path))
     except InputError:
         raise
     except (ValueError, RecursionError) as error:  # also whole numbers of thousands of digits, dates like 0000-00-00
         raise InputError(f"{path}: is not valid TOML: {shortened(str(error))}.") from None
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    """What the TOML ``text`` says. Raises ValueError, RecursionError."""
+    if _LONG_KEY.search(text):
+        raise ValueError(f"a key has more than {_DEEPEST} dotted parts")
+    return tomllib.loads(text)
 
 
 def override_key(data: dict[str, Any], override: str) -> str:
@@ -119,7 +135,7 @@ def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) ->
 
 def _value(text: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return _parsed(f"value = {text}")["value"]
     except (ValueError, RecursionError):
         try:
             return float(text)

@@ -119,7 +119,7 @@ class Pin(Solid):
 
     @model_validator(mode="after")
     def _rigid_or_solid(self) -> Pin:
-        for name in ("yield_stress", "hardening", "back_stresses", "E", "nu"):
+        for name in ("hardening", "yield_stress", "back_stresses", "E", "nu"):  # a table brings the yield stress
             given = name in self.model_fields_set and getattr(self, name)
             require(not (self.rigid and given), name, "is not for a rigid pin")
         for name in ("E", "nu"):

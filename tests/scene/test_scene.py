@@ -59,6 +59,12 @@ def basic() -> dict:
         ("block", "yield_stress", 1e-30, "must be at least 1e-07 times block.E."),
         ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
         ("pin", "rigid", True, "is not for a rigid pin."),
+        (
+            "pin",
+            None,
+            {"rigid": True, "hardening": [[0, 2], [0.1, 3]]},
+            "pin.hardening = [[0, 2], [0.1, 3]] is not for a",
+        ),
         ("load", "steps", 2.5, "must be a whole number."),
         ("load", "steps", 0, "must be at least 1."),
         ("load", "steps", [4, "x"], '= [4, "x"]: entry 2 must be a whole number.'),
@@ -69,7 +75,7 @@ def basic() -> dict:
 def test_a_bad_value_is_refused_in_one_sentence(section, key, value, said):
     """File, key, value and what is allowed."""
     data = basic()
-    data[section][key] = value
+    data = data | {section: value} if key is None else data | {section: data[section] | {key: value}}
     with pytest.raises(InputError) as caught:
         parse_scene(data)
     sentence = str(caught.value)
@@ -94,12 +100,29 @@ def test_a_missing_section_is_named(section):
         (b"x = " + b"9" * 5000, "is not valid TOML"),
         (b"x = " + b"[" * 20000, "is not valid TOML"),
         (b"date = 0000-00-00", "is not valid TOML"),
-        (b"a." * 3000 + b"b = 1", "tables are nested too deeply"),
+        (b"a." * 20 + b"b = 1", "a key has more than 20 dotted parts"),
+        (b"['a'" + b" . 'a'" * 60000 + b"]", "a key has more than 20 dotted parts"),
+        (b"x" * 999999, "is not valid TOML"),
+        (b"# " + b"x" * 999999, "it is larger than 1 MB"),
         (b"".join(b"k%d = 1\n" % i for i in range(3000)), "k0 = 1 is not a known key"),
         (b"x" * 5000 + b" = 1", "is not a known key"),
         (b'"a\\nb" = 1', r'"a\\nb" = 1 is not a known key'),
     ],
-    ids=["folder", "binary", "section", "digits", "brackets", "date", "dots", "keys", "long key", "two-line key"],
+    ids=[
+        "folder",
+        "binary",
+        "section",
+        "digits",
+        "brackets",
+        "date",
+        "dots",
+        "quoted",
+        "word",
+        "large",
+        "keys",
+        "long key",
+        "two-line key",
+    ],
 )
 def test_files_that_are_no_scenes_are_refused_briefly(tmp_path, content, said):
     """In sentences that name the file."""
@@ -111,6 +134,15 @@ def test_files_that_are_no_scenes_are_refused_briefly(tmp_path, content, said):
     lines = str(caught.value).splitlines()
     assert len(lines) <= 20
     assert all(line.startswith(str(path)) and len(line) < 400 for line in lines)
+
+
+def test_what_never_ends_or_takes_forever_is_refused(tmp_path):
+    """A device without an end; a long key in the value of --set, which stays text then."""
+    with pytest.raises(InputError, match="/dev/zero: cannot be read: it is larger than 1 MB"):
+        load_scene("/dev/zero")
+    (tmp_path / "scene.toml").write_text(resolved(parse_scene(basic())))
+    with pytest.raises(InputError, match=r"joint\.radius must be a number"):
+        load_scene(tmp_path / "scene.toml", ["joint.radius={" + "a." * 60000 + "b = 1}"])
 
 
 def test_overrides_replace_values_and_alternatives(tmp_path):
