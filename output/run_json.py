@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+import resource
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -25,6 +26,7 @@ from archord.report.version import VERSION
 from archord.solver.stepping import Step
 from archord.solver.timer import BEFORE_SOLVING
 
+_KILOBYTES = 1 if sys.platform == "darwin" else 1024  # unit of ru_maxrss in bytes
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")
 
 
@@ -130,9 +132,15 @@ class Report:
 
 
 def peak_memory() -> int:
-    """The largest resident set of this process so far, in bytes, as Linux tells it (kB)."""
-    _, _, after = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").partition("VmHWM:")
-    return 1024 * int(after.split()[0])
+    """The largest resident set of this process so far, in bytes.
+
+    Linux hands ``ru_maxrss`` down to the programs that a process starts; its own file of the process starts at zero.
+    """
+    try:
+        _, _, after = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").partition("VmHWM:")
+        return 1024 * int(after.split()[0])
+    except (OSError, IndexError, ValueError):
+        return _KILOBYTES * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _finite(value: dict[str, Any]) -> dict[str, Any]:

@@ -141,7 +141,7 @@ CHANGES = [("all", "all", 1e-12), ("one", "all", 1e-8), ("all", "one", 1e-8)]
 
 @pytest.mark.mpi
 @pytest.mark.parametrize(("before", "after", "tolerance"), CHANGES if SEVERAL else CHANGES[:1])
-@pytest.mark.parametrize("name", ["plastic", "rigid pin", "force"] if SEVERAL else ["force"])
+@pytest.mark.parametrize("name", ["plastic", "rigid pin", "force", "back stresses"] if SEVERAL else ["force"])
 def test_ranks_may_change(tmp_path_factory, comm, name, before, after, tolerance):
     """Halted on all ranks or one, continued on one or all.
 

@@ -1,6 +1,9 @@
 """What a run leaves on disk."""
 
 import json
+import os
+import time
+from pathlib import Path
 
 import h5py
 import meshio
@@ -13,6 +16,7 @@ from archord.output.folder import APART, CHECKPOINT, FILES, PICTURE, claim_folde
 from archord.output.history import read_history
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
+from archord.output.run_json import peak_memory
 from archord.output.stale_jit import without_stale_forms
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
@@ -230,7 +234,8 @@ def test_arcs_too_rough_for_the_clearance_are_named(tmp_path):
 
 
 def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(tmp_path):
-    """ffcx waits for a file that nobody will write, and names it: it is removed. Another error is raised."""
+    """ffcx waits for a file that nobody will write, and names it: it is removed, if it is nobody's work any more.
+    Another error is raised."""
     half, tried = tmp_path / "libffcx_forms_0.c", []
     half.touch()
 
@@ -240,10 +245,21 @@ def test_a_form_that_a_kill_left_half_compiled_is_compiled_again(tmp_path):
             raise TimeoutError(f"JIT compilation timed out, probably ... (e.g. remove {half}) or increase timeout.")
         return "made"
 
+    with pytest.raises(TimeoutError, match="timed out"):
+        without_stale_forms(make)
+    assert tried == [True, True, True]
+    os.utime(half, (time.time() - 1000,) * 2)
     assert without_stale_forms(make) == "made"
-    assert tried == [True, False]
+    assert tried == [True, True, True, True, False]
     with pytest.raises(TimeoutError, match="another"):
         without_stale_forms(lambda: exec('raise TimeoutError("another")'))
+
+
+def test_memory_is_known_where_there_is_no_proc(monkeypatch):
+    """What the process asks of the kernel is about what its file there says."""
+    told = peak_memory()
+    monkeypatch.setattr(Path, "read_text", lambda *_, **__: "")
+    assert peak_memory() == pytest.approx(told, rel=0.2)
 
 
 def test_a_new_run_removes_the_picture_of_the_old_one(tmp_path):
