@@ -1,4 +1,4 @@
-"""Lagrange bases and their physical gradients at points of curved triangles, as arrays."""
+"""Lagrange bases and their physical gradients at points of curved triangles and quadrilaterals, as arrays."""
 
 from __future__ import annotations
 
@@ -18,13 +18,21 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.floating]
 
 CONTACT_POINTS = 4  # Gauss points a contact facet
+TRIANGLE, QUADRILATERAL = basix.CellType.triangle, basix.CellType.quadrilateral
 
 
-def lagrange_triangle(degree: int) -> basix.finite_element.FiniteElement:
-    """Lagrange element on the reference triangle, with equispaced nodes as in gmsh's curved meshes."""
-    return basix.create_element(
-        basix.ElementFamily.P, basix.CellType.triangle, degree, basix.LagrangeVariant.equispaced
-    )
+def lagrange_element(cell: basix.CellType, degree: int) -> basix.finite_element.FiniteElement:
+    """Lagrange element on the reference ``cell``, with equispaced nodes as in gmsh's curved meshes."""
+    return basix.create_element(basix.ElementFamily.P, cell, degree, basix.LagrangeVariant.equispaced)
+
+
+def cell_kind(nodes: int) -> tuple[basix.CellType, int]:
+    """Kind and order of a cell of Lagrange's with so many ``nodes``. Raises ValueError."""
+    for order in (1, 2, 3):
+        for cell, needs in ((TRIANGLE, (order + 1) * (order + 2) // 2), (QUADRILATERAL, (order + 1) ** 2)):
+            if nodes == needs:
+                return cell, order
+    raise ValueError(f"cells of {nodes} nodes are not known: triangles have 3, 6 or 10, quadrilaterals 4, 9 or 16")
 
 
 @dataclass(frozen=True)
@@ -45,8 +53,8 @@ class CellBasis:
 
 def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) -> CellBasis:
     """Basis of the given ``degree`` at the reference points ``X`` ``(q, 2)`` of ``cells``, or ``(n, q, 2)`` of each."""
-    geometry = _tabulate(mesh.geometry.cmap.degree, X)
-    table = _tabulate(degree, X)
+    geometry = tabulate(mesh.basix_cell(), mesh.geometry.cmap.degree, X)
+    table = tabulate(mesh.basix_cell(), degree, X)
     nodes = mesh.geometry.x[mesh.geometry.dofmap[cells], :2]
     at = "qa" if X.ndim == 2 else "nqa"
     point = np.einsum(f"{at},nai->nqi", geometry[0], nodes)
@@ -59,20 +67,29 @@ def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) 
     return CellBasis(table[0], np.ascontiguousarray(gradient), point, J, det)
 
 
-def _tabulate(degree: int, X: Array) -> Array:
+def tabulate(cell: basix.CellType, degree: int, X: Array) -> Array:
     """Values and two derivatives ``(3, ..., a)`` of the basis at ``X`` ``(..., 2)``."""
-    table = lagrange_triangle(degree).tabulate(1, X.reshape(-1, 2))[..., 0]
+    element = lagrange_element(cell, degree)
+    if not X.size:  # basix ends the process
+        return np.zeros((3, *X.shape[:-1], element.dim))
+    table = element.tabulate(1, X.reshape(-1, 2))[..., 0]
     return table.reshape(3, *X.shape[:-1], table.shape[-1])
 
 
-def bulk_quadrature_degree(degree: int) -> int:
-    """Degree of the bulk rule for displacements of the given ``degree``: full rank, and no volumetric locking."""
-    return 2 * degree - 2
+def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
+    """Degree of the bulk rule for displacements of the given ``degree``: full rank, and no volumetric locking.
+
+    Plastic flow in plane strain keeps the volume at every point. A quadrilateral of degree p adds ``2 p^2`` dofs to a
+    mesh; its divergence spans ``(p + 1)^2 - 1`` functions, which are as many conditions at the ``(p + 1)^2`` points of
+    Gauss taken here: 8 for p = 2, no more than there are dofs, as Nagtegaal, Parks and Rice (1974) ask. With ``p^2``
+    points the divergence is freer, but the strains of three deformations vanish at all of them.
+    """
+    return 2 * degree - 2 if cell == TRIANGLE else 2 * degree
 
 
-def bulk_quadrature(degree: int) -> tuple[Array, Array]:
-    """Points ``(q, 2)`` and weights ``(q,)`` of the bulk rule on the reference triangle."""
-    return basix.make_quadrature(basix.CellType.triangle, bulk_quadrature_degree(degree))
+def bulk_quadrature(cell: basix.CellType, degree: int) -> tuple[Array, Array]:
+    """Points ``(q, 2)`` and weights ``(q,)`` of the bulk rule on the reference ``cell``."""
+    return basix.make_quadrature(cell, bulk_quadrature_degree(cell, degree))
 
 
 def strain_matrix(gradient: Array) -> Array:

@@ -1,36 +1,42 @@
-"""Values at points from nodal values of another mesh of curved triangles."""
+"""Values at points from nodal values of another mesh of curved cells."""
 
 from __future__ import annotations
 
+import basix
 import basix.ufl
 import numpy as np
 from dolfinx.geometry import bb_tree, compute_closest_entity, compute_collisions_points, create_midpoint_tree
 from dolfinx.mesh import create_mesh
 from mpi4py import MPI
 
-from archord.geometry.basis import Array, lagrange_triangle
+from archord.geometry.basis import TRIANGLE, Array, cell_kind, tabulate
 
-_NEWTON = 4  # iterations for the reference point: the cells are nearly straight
+_NEWTON = 8  # iterations for the reference point: the cells are nearly straight
 _STRAIGHT = 1e-9  # last step in a reference cell
 
 
 class Interpolation:
-    """From the nodes ``x`` ``(n, 2)`` of ``cells`` ``(m, a)``, of the given ``degree``, to points ``to`` ``(k, 2)``.
+    """From the nodes ``x`` ``(n, 2)`` of ``cells`` ``(m, a)`` to points ``to`` ``(k, 2)``.
 
     A point outside of all cells, as between a curved edge and its coarser image, gets the continuation of a cell next
     to it.
     """
 
-    def __init__(self, x: Array, cells: np.ndarray, degree: int, to: Array) -> None:
-        element, (cell, X) = lagrange_triangle(degree), _located(x, cells[:, :3], to)
+    def __init__(self, x: Array, cells: np.ndarray, to: Array) -> None:
+        kind, degree = cell_kind(cells.shape[1])
+        halves = np.array([[0, 1, 2]] if kind == TRIANGLE else [[0, 1, 2], [3, 2, 1]])  # in basix' order of corners
+        triangle, X = _located(x, cells[:, halves].reshape(-1, 3), to)
+        cell, half = np.divmod(triangle, len(halves))
+        weights = np.column_stack([1 - X.sum(axis=1), X])
+        X = np.einsum("ki,kij->kj", weights, basix.geometry(kind)[halves[half]])
         self._nodes, moving = cells[cell], np.arange(len(to))
-        for _ in range(_NEWTON if degree > 1 else 0):
-            table, nodes = element.tabulate(1, X[moving])[..., 0], x[self._nodes[moving]]
+        for _ in range(0 if cells.shape[1] == 3 else _NEWTON):
+            table, nodes = tabulate(kind, degree, X[moving]), x[self._nodes[moving]]
             misfit = to[moving] - np.einsum("na,nai->ni", table[0], nodes)
             step = np.linalg.solve(np.einsum("jna,nai->nij", table[1:], nodes), misfit[..., None])[..., 0]
             X[moving] += step
             moving = moving[np.abs(step).max(axis=1) > _STRAIGHT]
-        self._weights = element.tabulate(0, X)[0, ..., 0]
+        self._weights = tabulate(kind, degree, X)[0]
 
     def __call__(self, values: Array) -> Array:
         """Values ``(k, c)`` at the points from those ``(n, c)`` at the nodes."""

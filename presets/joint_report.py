@@ -58,7 +58,8 @@ def core_peeq(joint: Joint) -> float:
     if not joint.problem.loads or joint.scene.pin.yield_stress is None:
         return 0.0
     cells, points = joint.bulk.histories()[min(joint.problem.mesh.cell_tags("pin"))]
-    x = cell_basis(joint.V.mesh, joint.bulk.degree, cells, bulk_quadrature(joint.bulk.degree)[0]).point
+    X, _ = bulk_quadrature(joint.V.mesh.basix_cell(), joint.bulk.degree)
+    x = cell_basis(joint.V.mesh, joint.bulk.degree, cells, X).point
     core = np.linalg.norm(x, axis=-1).ravel() < joint.scene.load.core_radius * joint.scene.joint.radius
     return joint.comm.allreduce(float(np.asarray(points.peeq)[core].max(initial=0.0)), op=MPI.MAX)
 

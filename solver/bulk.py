@@ -73,7 +73,7 @@ class _PlasticBody:
 
     def __init__(self, V: fem.FunctionSpace, cells: np.ndarray, material) -> None:
         degree = V.element.basix_element.degree
-        X, w = bulk_quadrature(degree)
+        X, w = bulk_quadrature(V.mesh.basix_cell(), degree)
         basis = cell_basis(V.mesh, degree, cells, X)
         self.cells = cells
         self.dofs = V.dofmap.list[cells]
@@ -104,7 +104,7 @@ class Bulk:
         for material in materials.values():
             _check_elastic_tangent(material)
         self.degree = V.element.basix_element.degree
-        rule = bulk_quadrature_degree(self.degree)
+        rule = bulk_quadrature_degree(V.mesh.basix_cell(), self.degree)
         n_owned = V.mesh.topology.index_map(2).size_local
         self.cells = {tag: cells[tag][cells[tag] < n_owned] for tag in materials}
         u, v = _voigt(ufl.TrialFunction(V)), _voigt(ufl.TestFunction(V))
@@ -219,7 +219,7 @@ class Bulk:
     def cell_fields(self, u: Array) -> dict[str, Array]:
         """Means over each cell of this rank ``(n_cells,)`` at ``u`` ``(n_nodes, 2)``: "von_mises", "mean_stress" and,
         where a body can yield, "peeq"."""
-        X, w = bulk_quadrature(self.degree)
+        X, w = bulk_quadrature(self.V.mesh.basix_cell(), self.degree)
         fields: dict[str, Array] = {}
         for tag, cells in self.cells.items():
             if tag in self._plastic:

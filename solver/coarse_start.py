@@ -45,7 +45,7 @@ class CoarseStart:
         self._maps: list[tuple[np.ndarray, Interpolation]] = []  # nodes of a body on this rank, and their values
         for body in fine.problem.bodies:
             nodes, on = fine.nodes_of(body), of_cells == coarse.problem.tag(body)
-            onto = Interpolation(x[:, :2], cells[on], fine.problem.degree, places[nodes])
+            onto = Interpolation(x[:, :2], cells[on], places[nodes])
             self._maps.append((nodes, onto))
         self._reached: float | None = None
 

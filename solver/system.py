@@ -39,8 +39,9 @@ class System:
         self.comm = problem.mesh.mesh.comm
         with self.timer("setup"):
             variant = basix.LagrangeVariant.equispaced
-            element = basix.ufl.element("P", "triangle", problem.degree, shape=(2,), lagrange_variant=variant)
-            self.V = fem.functionspace(problem.mesh.mesh, element)
+            mesh, degree = problem.mesh.mesh, problem.degree
+            element = basix.ufl.element("P", mesh.basix_cell(), degree, shape=(2,), lagrange_variant=variant)
+            self.V = fem.functionspace(mesh, element)
             materials = {problem.tag(body): body.material for body in problem.bodies}
             cells = {problem.tag(body): problem.cells_of(body) for body in problem.bodies}
             self.bulk = Bulk(self.V, cells, materials)
@@ -125,5 +126,5 @@ class System:
 
     @property
     def n_cells(self) -> int:
-        """Number of triangles."""
+        """Number of cells."""
         return self.problem.mesh.mesh.topology.index_map(2).size_global

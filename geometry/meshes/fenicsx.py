@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from types import ModuleType
 
 import basix
 import basix.ufl
@@ -16,7 +17,7 @@ from dolfinx.io import distribute_entity_data
 from dolfinx.mesh import create_mesh, meshtags, meshtags_from_entities
 from mpi4py import MPI
 
-from archord.geometry.basis import Array
+from archord.geometry.basis import Array, cell_kind
 from archord.geometry.meshes.mesh_cache import kept_mesh
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
@@ -26,8 +27,10 @@ try:
 except ImportError:
     from dolfinx.la import create_petsc_vector as create_vector
 
-__all__ = ["create_vector", "gmsh_to_mesh"]
+__all__ = ["create_vector", "distribute", "gmsh_to_mesh"]
 
+
+_ALL_QUADS = 3  # gmsh's number of the recombination that leaves no triangles; it halves the edges of all lines
 
 with suppress(TypeError, ValueError):  # a handler of another language, or not the main thread
     # Python's own again, which raises BrokenPipeError: dolfinx starts PETSc, whose handler ends the process with a page
@@ -36,34 +39,47 @@ with suppress(TypeError, ValueError):  # a handler of another language, or not t
 
 def gmsh_to_mesh(
     comm: MPI.Comm,
-    build: Callable,
+    build: Callable | ModuleType,
     adjust: Callable[[Array, int], Array] | None = None,
     *,
     order: int = 2,
     refinements: int = 0,
+    quads: bool = False,
     partitioner=None,
     key: tuple = (),
 ) -> TaggedMesh:
-    """Mesh what ``build(gmsh)`` describes, in triangles of the given ``order``, and distribute it over ``comm``.
+    """Mesh what ``build(gmsh)`` describes, in triangles or ``quads`` of the given ``order``, and distribute it over
+    ``comm``.
 
-    The triangles are cut in four ``refinements`` times before they get nodes of higher order.
+    The cells are cut in four ``refinements`` times before they get nodes of higher order.
     ``adjust(x, tag)`` moves the nodes ``x`` ``(n, 2)`` of the physical curve ``tag``; without it, second-order edges
     are straight. An error on rank 0 is raised on every rank. The sets have the names of gmsh's physical groups.
     ``partitioner`` replaces `sectors`. A mesh whose ``key`` says all that enters it is kept (`kept_mesh`).
+
+    ``build`` may be the module gmsh itself: then its current model on rank 0 is taken. A mesh that is there already
+    stays as it is, else the model is meshed, with edges that follow its curves.
     """
-    made, failure = PlaneMesh.empty(order), None
+    made, failure = None, None
     if comm.rank == 0:
-        make = partial(_made, build, adjust, order, refinements)
+        make = partial(_made, build, adjust, order, refinements, quads)
         try:
-            made = kept_mesh((*key, order, refinements), make) if key else make()
+            made = kept_mesh((*key, order, refinements, quads), make) if key else make()
         except Exception as error:  # raised on all ranks below
             failure = f"gmsh could not mesh the problem: {error}"
     if failure := comm.bcast(failure):
         raise RuntimeError(failure)
-    return _distribute(comm, made, order, partitioner)
+    return distribute(comm, made, partitioner)
 
 
-def _made(build: Callable, adjust: Callable[[Array, int], Array] | None, order: int, refinements: int) -> PlaneMesh:
+def _made(
+    build: Callable | ModuleType,
+    adjust: Callable[[Array, int], Array] | None,
+    order: int,
+    refinements: int,
+    quads: bool,
+) -> PlaneMesh:
+    if isinstance(build, ModuleType):
+        return _meshed(build, adjust, order, refinements, quads, curved=True)
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -73,33 +89,49 @@ def _made(build: Callable, adjust: Callable[[Array, int], Array] | None, order: 
         for name, value in (("General.Terminal", 0), ("Mesh.Algorithm", 6), ("Mesh.HighOrderOptimize", 0)):
             gmsh.option.setNumber(name, value)
         build(gmsh)
-        gmsh.model.mesh.generate(2)
-        for _ in range(refinements):
-            gmsh.model.mesh.refine()
-        if order > 2:
-            gmsh.model.mesh.setOrder(order)
-        mesh = PlaneMesh.from_gmsh(gmsh)
+        return _meshed(gmsh, adjust, order, refinements, quads, curved=False)
     finally:
         with suppress(Exception):
             gmsh.finalize()  # or the next mesh would start from what is left of this one
-    if order == 2:  # in much less time than gmsh's setOrder
+
+
+def _meshed(gmsh, adjust, order: int, refinements: int, quads: bool, curved: bool) -> PlaneMesh:
+    """The mesh of gmsh's current model, made if there is none; with edges along its curves if ``curved``."""
+    there = len(gmsh.model.mesh.getElementTypes(2)) > 0
+    if not there:
+        if quads:
+            gmsh.option.setNumber("Mesh.RecombineAll", 1)
+            gmsh.option.setNumber("Mesh.RecombinationAlgorithm", _ALL_QUADS)
+        gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 0)
+        gmsh.model.mesh.generate(2)
+        for _ in range(refinements):
+            gmsh.model.mesh.refine()
+        if order > 2 or curved:
+            gmsh.model.mesh.setOrder(order)
+    mesh = PlaneMesh.from_gmsh(gmsh)
+    if order == 2 and not there and not curved:  # in much less time than gmsh's setOrder
         mesh = mesh.second_order()
     if adjust is not None:
-        for tag in np.unique(mesh.tags):
-            nodes = np.unique(mesh.edges[mesh.tags == tag])
+        for _, tag in gmsh.model.getPhysicalGroups(1):
+            found = np.isin(mesh.tags, mesh.facet_sets[gmsh.model.getPhysicalName(1, tag) or str(tag)])
+            nodes = np.unique(mesh.edges[found])
             mesh.x[nodes] = adjust(mesh.x[nodes], int(tag))
+        mesh.centre()
     return mesh
 
 
-def _distribute(comm: MPI.Comm, made: PlaneMesh, order: int, partitioner) -> TaggedMesh:
-    """The mesh that rank 0 ``made`` and its sets, on all ranks."""
+def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None) -> TaggedMesh:
+    """The mesh that rank 0 ``made`` and its sets, on all ranks, whose own one is None. Collective."""
+    nodes = comm.bcast(made and made.cells.shape[1])
+    made, (cell, order) = made or PlaneMesh.empty(nodes), cell_kind(nodes)
 
     def in_sectors(comm, n_parts: int, cell_types, cells) -> AdjacencyList_int32:
-        return AdjacencyList_int32(sectors(made.x, cells[0].reshape(-1, 3), n_parts).reshape(-1, 1))
+        vertices = cells[0].reshape(-1, len(basix.topology(cell)[0]))
+        return AdjacencyList_int32(sectors(made.x, vertices, n_parts).reshape(-1, 1))
 
     partitioner = partitioner or (in_sectors if comm.size > 1 else None)
     equispaced = basix.LagrangeVariant.equispaced
-    element = basix.ufl.element("P", "triangle", order, lagrange_variant=equispaced, shape=(2,))
+    element = basix.ufl.element("P", cell, order, lagrange_variant=equispaced, shape=(2,))
     mesh = create_mesh(comm, cells=made.cells, x=made.x, e=element, partitioner=partitioner)
     number = np.asarray(mesh.topology.original_cell_index)
     cells = meshtags(mesh, 2, np.arange(len(number), dtype=np.int32), comm.bcast(made.bodies)[number])

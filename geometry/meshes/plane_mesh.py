@@ -1,4 +1,5 @@
-"""A mesh of curved triangles as arrays, as the mesh generator made it and before dolfinx distributes it."""
+"""A mesh of curved triangles or quadrilaterals as arrays, as the mesh generator made it and before dolfinx distributes
+it."""
 
 from __future__ import annotations
 
@@ -8,11 +9,9 @@ from dataclasses import dataclass, field, replace
 import basix
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
-from dolfinx.mesh import CellType
+from dolfinx.mesh import CellType, to_type
 
-from archord.geometry.basis import Array
-
-_ENDS = basix.topology(basix.CellType.triangle)[1]  # vertices of a triangle's edges
+from archord.geometry.basis import Array, cell_kind
 
 
 @dataclass(frozen=True)
@@ -30,32 +29,56 @@ class PlaneMesh:
     facet_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     @classmethod
-    def empty(cls, order: int) -> PlaneMesh:
-        """No cells of this order: what the ranks have that did not make the mesh."""
-        nodes, none = (order + 1) * (order + 2) // 2, np.zeros(0, dtype=np.int32)
+    def empty(cls, nodes: int) -> PlaneMesh:
+        """No cells of so many ``nodes``: what the ranks have that did not make the mesh."""
+        none, order = np.zeros(0, dtype=np.int32), cell_kind(nodes)[1]
         cells, edges = (np.zeros((0, a), dtype=np.int64) for a in (nodes, order + 1))
         return cls(np.zeros((0, 2)), cells, none, edges, none)
 
     @classmethod
     def from_gmsh(cls, gmsh) -> PlaneMesh:
-        """What gmsh's model has in physical groups."""
+        """What gmsh's model has in physical groups. Raises ValueError if that is not one kind of cells."""
         numbers, x, _ = gmsh.model.mesh.getNodes()
-        cells, bodies, cell_sets = _elements(gmsh, CellType.triangle, 2)
-        edges, tags, facet_sets = _elements(gmsh, CellType.interval, 1)
+        cells, bodies, cell_sets = _elements(gmsh, 2)
+        edges, tags, facet_sets = _elements(gmsh, 1)
         used, of_cells = np.unique(cells, return_inverse=True)  # no centres of arcs, which dolfinx does not expect
         place = np.empty(int(numbers.max()) + 1, dtype=np.int64)
         place[numbers] = np.arange(len(numbers))
         nodes, cells = x.reshape(-1, 3)[place[used], :2], of_cells.reshape(cells.shape)
+        if cells.shape[1] == 8:
+            nodes, cells = with_middle_nodes(nodes, cells)
+        cell, order = cell_kind(cells.shape[1])
+        cells = cells[:, perm_gmsh(to_type(cell.name), cells.shape[1])]
+        edges = edges.reshape(-1, order + 1)[:, perm_gmsh(CellType.interval, order + 1)]
         return cls(nodes, cells, bodies, np.searchsorted(used, edges), tags, cell_sets, facet_sets)
 
     def second_order(self) -> PlaneMesh:
-        """This mesh of straight triangles with nodes on the middles of their edges, behind the others."""
-        ends = np.concatenate([self.cells[:, _ENDS].reshape(-1, 2), self.edges])
+        """This mesh of straight cells with nodes on the middles of edges and of quadrilaterals, behind the others."""
+        sides = basix.topology(cell_kind(self.cells.shape[1])[0])[1]
+        ends = np.concatenate([self.cells[:, sides].reshape(-1, 2), self.edges])
         first, which = distinct_edges(ends)
         x = np.concatenate([self.x, self.x[ends[first]].mean(axis=1)])
-        of_cells, of_edges = np.split(len(self.x) + which, [3 * len(self.cells)])
-        cells, edges = np.hstack([self.cells, of_cells.reshape(-1, 3)]), np.column_stack([self.edges, of_edges])
-        return replace(self, x=x, cells=cells, edges=edges)
+        of_cells, of_edges = np.split(len(self.x) + which, [len(sides) * len(self.cells)])
+        cells = np.hstack([self.cells, of_cells.reshape(len(self.cells), -1)])
+        if cells.shape[1] == 8:
+            x, cells = with_middle_nodes(x, cells)
+        return replace(self, x=x, cells=cells, edges=np.column_stack([self.edges, of_edges]))
+
+    def centre(self) -> None:
+        """Put the middle nodes of second-order quadrilaterals where their edges want them."""
+        if self.cells.shape[1] == 9:
+            self.x[self.cells[:, 8]] = _middles(self.x, self.cells)
+
+
+def with_middle_nodes(x: Array, cells: np.ndarray) -> tuple[Array, np.ndarray]:
+    """Nodes and cells ``(m, 9)`` of quadrilaterals ``cells`` ``(m, 8)``, four vertices before the middles of four edges
+    in any order, with nodes ``x`` ``(n, 2)``: a middle node each, behind the others, where its 8 nodes interpolate."""
+    middle = len(x) + np.arange(len(cells))
+    return np.concatenate([x, _middles(x, cells)]), np.column_stack([cells, middle])
+
+
+def _middles(x: Array, cells: np.ndarray) -> Array:
+    return x[cells[:, 4:8]].sum(axis=1) / 2 - x[cells[:, :4]].sum(axis=1) / 4
 
 
 def distinct_edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -89,17 +112,20 @@ def one_tag_each(
     return first[order], one[order], sets
 
 
-def _elements(gmsh, kind: CellType, dim: int) -> tuple[np.ndarray, np.ndarray, dict[str, tuple[int, ...]]]:
+def _elements(gmsh, dim: int) -> tuple[np.ndarray, np.ndarray, dict[str, tuple[int, ...]]]:
     """gmsh's numbers of the nodes ``(n, a)`` of elements in physical groups of dimension ``dim``, their tags ``(n,)``,
     and the tags of the groups by their names, by their numbers where they have none."""
-    nodes, numbers, tags, names = [], [], [], {}
+    nodes, numbers, tags, names = [], [np.zeros(0, dtype=np.uint64)], [np.zeros(0, dtype=np.int32)], {}
     for _, tag in gmsh.model.getPhysicalGroups(dim):
         names[gmsh.model.getPhysicalName(dim, tag) or str(tag)] = tag
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
-            types, (found,), (of_found,) = gmsh.model.mesh.getElements(dim, entity)
-            per_element = gmsh.model.mesh.getElementProperties(types[0])[3]
-            nodes.append(of_found.reshape(-1, per_element)[:, perm_gmsh(kind, per_element)])
-            numbers.append(found)
-            tags.append(np.full(len(found), tag, dtype=np.int32))
+            for _, found, of_found in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
+                nodes.append(of_found.reshape(len(found), -1))
+                numbers.append(found)
+                tags.append(np.full(len(found), tag, dtype=np.int32))
+    counts = sorted({part.shape[1] for part in nodes})
+    if len(counts) > 1 or (dim == 2 and not counts):
+        held = f"elements of {' and '.join(map(str, counts))} nodes" if counts else "no elements"
+        raise ValueError(f"the physical groups of dimension {dim} hold {held}, and must hold one kind")
     first, one, sets = one_tag_each(np.concatenate(numbers), np.concatenate(tags), names)
-    return np.concatenate(nodes)[first], one, sets
+    return np.concatenate(nodes or [np.zeros((0, 0), dtype=np.uint64)])[first], one, sets

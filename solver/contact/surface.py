@@ -32,21 +32,23 @@ class Surface:
         self.V, self.comm, self.material, self.name = V, V.mesh.comm, material, name
         self.degree, index_map = V.element.basix_element.degree, V.dofmap.index_map
         cells, local_facets = _owned_facets(V.mesh, facets)
-        closure = [V.dofmap.dof_layout.entity_closure_dofs(1, k) for k in range(3)]
+        kind = V.mesh.basix_cell()
+        corners, edges = basix.geometry(kind), np.array(basix.topology(kind)[1])
+        closure = [V.dofmap.dof_layout.entity_closure_dofs(1, k) for k in range(len(edges))]
         # closure order is vertex, vertex, interior; along the facet the interior nodes come between the vertices
         along = [[c[0], *c[2:], c[1]] for c in closure]
         trace = np.array([along[k] for k in local_facets], dtype=np.int64).reshape(-1, self.degree + 1)
-        corners = basix.geometry(basix.CellType.triangle)
-        ends = corners[np.array(basix.topology(basix.CellType.triangle)[1])[local_facets]]
-        # the second of basix' edges runs clockwise, the others do not, and a mirrored cell turns all of them
-        mirrored = cell_basis(V.mesh, self.degree, cells, corners.mean(axis=0)[None]).determinant[:, 0] < 0
-        clockwise = (local_facets == 1) != mirrored
+        ends, middle = corners[edges[local_facets]], corners.mean(axis=0)
+        # some of basix' edges run clockwise, and a mirrored cell turns all of them
+        clockwise = np.linalg.det(ends - middle) < 0
+        clockwise ^= cell_basis(V.mesh, self.degree, cells, middle[None]).determinant[:, 0] < 0
         trace[clockwise], ends[clockwise] = trace[clockwise, ::-1], ends[clockwise, ::-1]
 
         cell_dofs = V.dofmap.list[cells]
         global_dofs = index_map.local_to_global(cell_dofs.ravel()).reshape(cell_dofs.shape)
         on_facet = np.take_along_axis(cell_dofs, trace, axis=1)
-        x = V.tabulate_dof_coordinates()[on_facet, :2]
+        nodes = V.tabulate_dof_coordinates()[:, :2]
+        x = nodes[on_facet]
         gathered = self.comm.allgather((np.take_along_axis(global_dofs, trace, axis=1), x))
         chain_dofs, chain_x = (np.concatenate(parts) for parts in zip(*gathered, strict=True))
         order = _chain(chain_dofs[:, 0], chain_dofs[:, -1])
@@ -56,7 +58,7 @@ class Surface:
         facet = np.argsort(order)[start : start + len(cells)]
         sort = np.argsort(facet)
         self.facet, self.cells = facet[sort], cells[sort]
-        self.cell_dofs, self.cell_global = cell_dofs[sort], global_dofs[sort]
+        self.cell_dofs, self.cell_global, self._nodes = cell_dofs[sort], global_dofs[sort], nodes[cell_dofs[sort]]
         self.trace, self._ends = trace[sort].astype(np.int32), ends[sort]
         owned = self.curve_dofs - index_map.local_range[0]
         self._owned = np.flatnonzero((owned >= 0) & (owned < index_map.size_local))
@@ -80,6 +82,8 @@ class Surface:
         self.weight = length * w[self.facet]
         self.outward = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
         self.point, self.gradient, self.shape = basis.point, basis.gradient, np.ascontiguousarray(basis.shape)
+        if self.V.mesh.geometry.cmap.degree > self.degree:
+            self.point = self.shape @ self._nodes  # on the curve
         on_facet = np.broadcast_to(self.trace[:, None, :], (*self.weight.shape, self.trace.shape[1]))
         self.trace_shape = np.take_along_axis(self.shape, on_facet, axis=2)
         self.points = Points(self.material, self.weight.size)
@@ -92,7 +96,7 @@ class Surface:
         each contact cell is solved, with its curved geometry and its elastic moduli. Unit: stress / length.
         """
         C = self.material.elastic_tangent
-        X, w = bulk_quadrature(self.degree)
+        X, w = bulk_quadrature(self.V.mesh.basix_cell(), self.degree)
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
         B = strain_matrix(basis.gradient)
         energy = np.einsum("nq,nqia,ij,nqjb->nab", basis.measure * w, B, C, B, optimize=True)
@@ -169,7 +173,8 @@ def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray]:
     cells = np.array([to_cell.links(f)[0] for f in facets], dtype=np.int32).reshape(-1)
     keep = cells < mesh.topology.index_map(2).size_local
     cells, facets = cells[keep], np.asarray(facets)[keep]
-    return cells, np.nonzero(to_facet.array.reshape(-1, 3)[cells] == facets[:, None])[1]
+    n = mesh.ufl_cell().num_facets()
+    return cells, np.nonzero(to_facet.array.reshape(-1, n)[cells] == facets[:, None])[1]
 
 
 def _chain(start: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import cffi
 import numpy as np
 from dolfinx import fem
 
-from archord.geometry.basis import lagrange_triangle
+from archord.geometry.basis import lagrange_element
 
 _PROTOTYPES = """
 int METIS_NodeND(int32_t *n, int32_t *offsets, int32_t *neighbours, int32_t *weights, int32_t *options, int32_t *order,
@@ -33,22 +33,23 @@ def metis() -> tuple[cffi.FFI, Any]:
 
 
 def corners(V: fem.FunctionSpace) -> np.ndarray:
-    """The nodes ``(n_owned, 3)``, in global numbers, at the corners of the edge or the triangle that each of this
-    rank's nodes of ``V`` lies on; those at corners are their own."""
-    x, y = lagrange_triangle(V.element.basix_element.degree).points.T
-    weight = np.stack([1 - x - y, x, y], axis=1)  # of the triangle's corners, its first three nodes
-    ends = np.where(weight > 1e-9, np.arange(3), weight.argmax(axis=1)[:, None])
+    """The nodes ``(n_owned, k)``, in global numbers, at the corners of the edge or the cell that each of this rank's
+    nodes of ``V`` lies on; those at corners are their own."""
+    element = V.element.basix_element
+    weight = lagrange_element(element.cell_type, 1).tabulate(0, element.points)[0, ..., 0]
+    k = weight.shape[1]
+    ends = np.where(weight > 1e-9, np.arange(k), weight.argmax(axis=1)[:, None])
     index_map = V.dofmap.index_map
-    found = np.zeros((index_map.size_local + index_map.num_ghosts, 3), dtype=np.int32)
+    found = np.zeros((index_map.size_local + index_map.num_ghosts, k), dtype=np.int32)
     found[V.dofmap.list] = V.dofmap.list[:, ends]
-    return index_map.local_to_global(found[: index_map.size_local].ravel()).reshape(-1, 3)
+    return index_map.local_to_global(found[: index_map.size_local].ravel()).reshape(-1, k)
 
 
 def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.ndarray) -> np.ndarray:
     """As `nested_dissection`, quicker: only unknowns at corners are ordered by METIS, the others come right before the
-    first one of their corners ``(n, 3)``, -1 where that is none of the unknowns.
+    first one of their corners ``(n, k)``, -1 where that is none of the unknowns.
 
-    That keeps what separates parts: of the nodes of an edge or a triangle none is in a part without its corners.
+    That keeps what separates parts: of the nodes of an edge or a cell none is in a part without its corners.
     """
     alone = corner[:, 0] == np.arange(n)
     number = np.cumsum(alone) - 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.basis import bulk_quadrature, cell_basis, lagrange_triangle, strain, strain_matrix
+from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, lagrange_element, strain, strain_matrix
 from archord.geometry.shapes.quarter_joint import quarter_joint
 
 
@@ -24,7 +24,7 @@ def cell_by_cell(u):
 
 def test_gradients_of_linear_fields_are_exact_on_curved_cells():
     """The isoparametric basis reproduces a displacement linear in x and y; rigid motions do not strain."""
-    nodes, basis = mesh_and_basis(bulk_quadrature(2)[0])
+    nodes, basis = mesh_and_basis(bulk_quadrature(TRIANGLE, 2)[0])
     for A, tolerance in (np.array([[0.1, -0.4], [0.3, 0.2]]), 1e-13), (np.array([[0.0, -1.0], [1.0, 0.0]]), 1e-12):
         u = nodes @ A.T + [1.0, 2.0]
         gradient = np.einsum("nqaj,nai->nqij", basis.gradient, u)
@@ -41,13 +41,13 @@ def test_gradients_are_the_derivatives_of_the_shape_functions():
     _, basis = mesh_and_basis(X)
     chain = np.einsum("nqai,nqij->nqaj", basis.gradient, basis.jacobian)
     for j in range(2):
-        up, down = (lagrange_triangle(2).tabulate(0, X + s * h * np.eye(2)[j])[0, :, :, 0] for s in (1, -1))
+        up, down = (lagrange_element(TRIANGLE, 2).tabulate(0, X + s * h * np.eye(2)[j])[0, :, :, 0] for s in (1, -1))
         np.testing.assert_allclose(chain[..., j], np.broadcast_to((up - down) / (2 * h), chain.shape[:3]), atol=1e-9)
 
 
 def test_strain_matrix_times_displacement_is_the_strain():
     """Both ways to the strain agree for any nodal displacement."""
-    nodes, basis = mesh_and_basis(bulk_quadrature(2)[0])
+    nodes, basis = mesh_and_basis(bulk_quadrature(TRIANGLE, 2)[0])
     u = np.random.default_rng(0).normal(size=nodes.shape)
     expected = np.einsum("nqia,na->nqi", strain_matrix(basis.gradient), u.reshape(len(u), 12))
     found = strain(basis.gradient, *cell_by_cell(u))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.output import checkpoint
 from archord.presets.joint import Joint
 from archord.presets.measures import Work
@@ -37,7 +37,7 @@ def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
             x = joint.sides[name].point
         else:
             cells = joint.bulk.histories()[int(name)][0]
-            x = cell_basis(joint.V.mesh, 2, cells, bulk_quadrature(2)[0]).point
+            x = cell_basis(joint.V.mesh, 2, cells, bulk_quadrature(TRIANGLE, 2)[0]).point
         here[place] = number, x.reshape(-1, 2)
     parts = joint.comm.allgather(here)
     together = {place: [np.concatenate([p[place][i] for p in parts]) for i in (0, 1)] for place in here}

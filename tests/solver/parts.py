@@ -156,7 +156,7 @@ def interact(surfaces, *, kinematics="current", integrated=None, **options) -> C
     )
 
 
-def blocks(comm: MPI.Comm, *edges: int, width: float = 1.0) -> TaggedMesh:
+def blocks(comm: MPI.Comm, *edges: int, width: float = 1.0, **options) -> TaggedMesh:
     """Rectangles of a ``width`` and height 1 on top of each other from y = -1, with so many ``edges`` on their sides.
 
     Sets are "lower", "middle" (of three) and "upper", their tops and bottoms, all "left" and all "right" sides; "base"
@@ -180,7 +180,7 @@ def blocks(comm: MPI.Comm, *edges: int, width: float = 1.0) -> TaggedMesh:
         for name, lines in walls.items():
             gmsh.model.addPhysicalGroup(1, lines, name=name)
 
-    mesh = gmsh_to_mesh(comm, build)
+    mesh = gmsh_to_mesh(comm, build, **options)
     sets = mesh.facet_sets
     return replace(mesh, facet_sets={**sets, "base": sets["lower bottom"], "lid": sets["upper top"]})
 
@@ -188,7 +188,7 @@ def blocks(comm: MPI.Comm, *edges: int, width: float = 1.0) -> TaggedMesh:
 INNER, OUTER, ON_X, ON_Y = range(1, 5)
 
 
-def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> TaggedMesh:
+def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float, **options) -> TaggedMesh:
     """A quarter of a "ring" between the radii ``a`` and ``b``, with edges "inner", "outer", "x" and "y"."""
 
     def build(gmsh) -> None:
@@ -210,7 +210,7 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float) -> TaggedMe
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
     radii = {INNER: a, OUTER: b}
-    return gmsh_to_mesh(comm, build, lambda x, tag: on_circle(x, 0.0, radii[tag]) if tag in radii else x)
+    return gmsh_to_mesh(comm, build, lambda x, tag: on_circle(x, 0.0, radii[tag]) if tag in radii else x, **options)
 
 
 def solve(problem: Problem, loads) -> System:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.solver.problem import Body, Problem, Support
@@ -55,7 +55,7 @@ class Cylinder:
 
     def yielded_radius(self) -> float:
         """Radius of the disc whose area inside the wall has yielded."""
-        X, w = bulk_quadrature(2)
+        X, w = bulk_quadrature(TRIANGLE, 2)
         weight = cell_basis(self.V.mesh, 2, self.cells.indices, X).measure * w
         area = weight.ravel() @ (self.problem.plastic_points()[0].state.peeq > 0)
         return np.sqrt(A**2 + 4 * area / np.pi)

@@ -7,7 +7,7 @@ import pytest
 from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 
-from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.geometry.shapes.half_ring import half_ring
 from archord.geometry.shapes.joint_mesh import Cells, Facets
 from archord.geometry.shapes.quarter_joint import quarter_joint
@@ -44,7 +44,7 @@ def edge_lengths(joint, tag):
 def area(joint, tag, comm=MPI.COMM_SELF):
     n_owned = joint.mesh.topology.index_map(2).size_local
     cells = joint.cells.find(tag)
-    X, w = bulk_quadrature(2)
+    X, w = bulk_quadrature(TRIANGLE, 2)
     return comm.allreduce(float((cell_basis(joint.mesh, 2, cells[cells < n_owned], X).measure @ w).sum()))
 
 

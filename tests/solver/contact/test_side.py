@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from dolfinx.mesh import compute_midpoints
 
-from archord.geometry.basis import bulk_quadrature, cell_basis, strain
+from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, strain
 from archord.geometry.shapes.joint_mesh import Facets
 from archord.solver.contact.surface import Surface, _chain
 from tests.solver.parts import DR, ELASTIC, PERFECT, PLANE_STRESS, R, coordinates, joint_parts
@@ -25,7 +25,7 @@ def trace_forms(side):
 
     The integral over the facet of sigma_n^2, and twice the elastic energy of the cell under the bulk's rule.
     """
-    X, w = bulk_quadrature(2)
+    X, w = bulk_quadrature(TRIANGLE, 2)
     basis = cell_basis(side.V.mesh, 2, side.cells, X)
     C = side.material.elastic_tangent
     units = np.eye(12).reshape(12, 6, 2)
