@@ -17,19 +17,21 @@ from archord.report.version import VERSION
 __version__ = VERSION
 
 if TYPE_CHECKING:
-    from archord.api import InputError, Run, Scene, Sweep, load, load_scene, solve
+    from archord.api import InputError, Run, Sweep, load, load_scene, solve
     from archord.geometry.meshes.fenicsx import gmsh_to_mesh
     from archord.materials.elasticity import Elastic
     from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
     from archord.materials.j2 import J2Material
     from archord.materials.kinematic import KinematicMaterial
+    from archord.scene.problem import ProblemScene
+    from archord.scene.scene import Scene
     from archord.solver.problem import Body, Interaction, Load, Problem, Support
     from archord.solver.system import System
 
 
 __all__ = [
     "Body", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LinearHardening", "Load",
-    "Problem", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System", "TabularHardening", "VoceHardening",
+    "Problem", "ProblemScene", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System", "TabularHardening", "VoceHardening",
     "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
@@ -41,6 +43,8 @@ _HOME = {
     **dict.fromkeys(
         ("LinearHardening", "SwiftHardening", "TabularHardening", "VoceHardening"), "archord.materials.hardening"
     ),
+    "Scene": "archord.scene.scene",
+    "ProblemScene": "archord.scene.problem",
     **dict.fromkeys(("Body", "Interaction", "Load", "Problem", "Support"), "archord.solver.problem"),
 }
 

@@ -12,9 +12,10 @@ from archord.output.folder import is_sweep
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.scene.errors import InputError
+from archord.scene.file import AnyScene
 from archord.scene.file import load_scene as load_scene_file
 from archord.scene.keys import toml_value
-from archord.scene.scene import Scene, plain
+from archord.scene.scene import plain
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -30,7 +31,7 @@ def load(folder: str | Path) -> Any:
     return Sweep(folder) if is_sweep(folder) else Run(folder)
 
 
-def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> Scene:
+def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> AnyScene:
     """Read and check a scene file, with ``changes`` like ``{"joint.clearance": 0.01}``; None drops a key.
 
     Raises `InputError` with one sentence per fault.
@@ -40,7 +41,7 @@ def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> Sc
 
 
 def solve(
-    scene: Scene | str | Path,
+    scene: AnyScene | str | Path,
     folder: str | Path,
     *,
     force: bool = False,
@@ -63,8 +64,8 @@ def solve(
 
     comm = MPI.COMM_WORLD if comm is None else comm
 
-    def checked() -> Scene:
-        return scene if isinstance(scene, Scene) else load_scene(scene)
+    def checked() -> AnyScene:
+        return load_scene(scene) if isinstance(scene, (str, Path)) else scene
 
     _, outcome = solve_and_report(checked, Path(folder), comm, force=force, silent=not progress)
     if outcome.status == "interrupted":

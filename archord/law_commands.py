@@ -108,9 +108,9 @@ def _joint(scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any]
     if "nu" in values:
         values["pin_nu"] = None  # one for both
     if scene is not None:
-        from archord.scene.file import load_scene
+        from archord.scene.file import load_joint
 
-        loaded = load_scene(scene, overrides)
+        loaded = load_joint(scene, overrides)
         units = {"length": loaded.units.length, "stress": loaded.units.stress, "force": loaded.units.force}
         return dataclasses.replace(LawJoint.from_scene(loaded), **values), units
     if overrides:

@@ -114,9 +114,9 @@ def export_deck(scene: Path, output: Path | None, elements: Elements, overrides:
     """Write a scene as an input deck for CalculiX or Abaqus."""
     from archord.output.user_file import check_target, writing
     from archord.postprocess.deck import deck, deck_mesh
-    from archord.scene.file import files_read, load_scene
+    from archord.scene.file import files_read, load_joint
 
-    checked = load_scene(scene, overrides)
+    checked = load_joint(scene, overrides)
     if not checked.joint.is_block:
         raise InputError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
     for name, body in checked.solids.items():

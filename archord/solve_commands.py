@@ -13,7 +13,7 @@ import click
 from archord.options import SCENE, flag, output, overrides, quiet
 
 if TYPE_CHECKING:
-    from archord.scene.scene import Scene
+    from archord.scene.file import AnyScene
 
 
 @click.command()
@@ -62,7 +62,7 @@ def solve(
     return _solve(lambda: planned.scene, folder, begun, quiet, force=True, start=planned.start)
 
 
-def _solve(load: Callable[[], Scene], folder: Path, begun: float, quiet: bool, **options: Any) -> int:
+def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, quiet: bool, **options: Any) -> int:
     """Solve the scene that ``load`` gives rank 0 into ``folder`` on all ranks and report; returns the exit code.
     ``options`` as for `solve_and_report`."""
     from mpi4py import MPI
@@ -82,7 +82,7 @@ def _solve(load: Callable[[], Scene], folder: Path, begun: float, quiet: bool, *
     elif comm.rank == 0 and not quiet:
         said = f"{len(outcome.steps)} steps in {perf_counter() - begun:.1f} s"
         if outcome.accuracy is not None and outcome.accuracy.estimated is not None:
-            name, asked = "delta" if scene.force_controlled else "P", outcome.accuracy.asked
+            name, asked = scene.accurate, outcome.accuracy.asked
             said += f", estimated error of {name} {outcome.accuracy.estimated:.1e} (asked {asked:g})"
         print(f"{said}, results in {folder}")
     return {"done": 0, "stopped": 3, "interrupted": 128 + outcome.signal}[outcome.status]

@@ -20,7 +20,7 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.output.disk import replace_file
 from archord.output.step_file import all_arrays, hdf5_in_memory, image, put
-from archord.presets.measures import Measures, Work
+from archord.presets.measures import Work
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.solver.load_path import Position
@@ -46,7 +46,7 @@ class Checkpoint:
     arrays: Arrays
 
 
-def halt(order: MeshOrder, scene: str, m: Measures, step: Step, position: Position, work: Work) -> Checkpoint:
+def halt(order: MeshOrder, scene: str, m: Any, step: Step, position: Position, work: Work) -> Checkpoint:
     """The checkpoint (on rank 0) of a run of ``scene`` after the step ``m``, reached as ``step`` says, from which
     `resume` goes on. Collective."""
     system, state, increment = order.system, order.system.equilibrium.state(), position.increment
@@ -67,9 +67,9 @@ def halt(order: MeshOrder, scene: str, m: Measures, step: Step, position: Positi
     return Checkpoint(m.step, scene, mesh, scalars, arrays)
 
 
-def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple[Measures, Step, Position, Work]:
+def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple[dict[str, Any], Step, Position, Work]:
     """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``); returns what `halt` was
-    given. Collective.
+    given, the record of the step as a dictionary. Collective.
 
     Raises `InputError` on every rank if it is of another mesh.
     """
@@ -90,7 +90,7 @@ def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple
     order.system.equilibrium.resume(position.load, state("fields/displacement", "level"), scalars["largest_reaction"])
     step = Step(**scalars["step"])
     step.attempts = [_newton(attempt) for attempt in scalars["step"]["attempts"]]
-    return Measures(**scalars["measures"]), step, position, Work(**scalars["work"])
+    return scalars["measures"], step, position, Work(**scalars["work"])
 
 
 def _newton(attempt: dict[str, Any]) -> Newton:

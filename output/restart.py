@@ -13,13 +13,12 @@ import numpy as np
 from archord.output import checkpoint as checkpoints
 from archord.output.checkpoint import Checkpoint
 from archord.output.folder import CHECKPOINT
-from archord.presets.measures import Measures
+from archord.presets.account import record_type
 from archord.scene.errors import InputError
-from archord.scene.file import load_scene, parse_scene, scene_keys
+from archord.scene.file import AnyScene, load_scene, parse_any, scene_keys
 from archord.scene.keys import toml_value
-from archord.scene.scene import Scene
 
-_TARGETS = ("load.displacement", "load.relative_force", "load.force", "load.steps")
+_TARGETS = ("load.displacement", "load.relative_force", "load.force", "load.steps", "path.steps")
 _MAY_DIFFER = ("stepping.", "analysis.max_iterations", *_TARGETS)
 _SAME = 1e-9  # relative difference up to which two targets are one
 
@@ -30,7 +29,7 @@ class Start:
 
     checkpoint: Checkpoint
     report: dict[str, Any]
-    done: list[Measures]
+    done: list[Any]
 
 
 @dataclass
@@ -40,13 +39,13 @@ class Plan:
     ``said`` is a sentence for the user.
     """
 
-    scene: Scene
+    scene: AnyScene
     start: Start | None
     said: str
     finished: bool = False
 
 
-def plan_restart(folder: Path, scene: Scene | None = None, *, extend: bool = False) -> Plan:
+def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = False) -> Plan:
     """How to continue the run in ``folder`` with ``scene``, by default the run's own; to ``extend`` it, that must go
     further than the run did.
 
@@ -60,30 +59,29 @@ def plan_restart(folder: Path, scene: Scene | None = None, *, extend: bool = Fal
     start = _start(folder, scene)
     step, total = start.checkpoint.step, len(scene.targets)
     if extend and step == total:
-        raise InputError(f"{folder}: ends at {scene.targets[-1]:g} already; load.{scene.load.name} goes no further.")
+        raise InputError(f"{folder}: ends at {scene.targets[-1]:g} already; {scene.loading} goes no further.")
     if step == total and start.report["status"] == "done":
         return Plan(scene, None, f"the run in {folder} is finished: nothing to do", finished=True)
     return Plan(scene, start, f"{'extending' if extend else 'continuing'} {folder} after step {step} of {total}")
 
 
-def _start(folder: Path, scene: Scene) -> Start:
+def _start(folder: Path, scene: AnyScene) -> Start:
     """Read what the run left. Raises `InputError` if that is not the first steps of ``scene``."""
     path = folder / CHECKPOINT
     checkpoint = checkpoints.read(path)
-    before = parse_scene(tomllib.loads(checkpoint.scene), str(path))
+    before = parse_any(tomllib.loads(checkpoint.scene), str(path))
     _same_but_for_the_load(folder, before, scene)
     n = checkpoint.step
-    reached, wanted = np.array(before.targets[:n]), np.array(scene.targets[:n])
-    if len(wanted) < n or np.abs(wanted - reached).max() > _SAME * np.abs(reached).max():
-        raise InputError(
-            f"{path}: its {n} steps are not the first ones of the scene's path; load.{scene.load.name} and load.steps "
-            f"must begin as those of the run, {before.load.legs} and {before.load.leg_steps}."
-        )
+    reached, wanted = np.array(before.travelled[:n]), np.array(scene.travelled[:n])
+    if len(wanted) < n or (np.abs(wanted - reached).max(0) > _SAME * np.abs(reached).max(0)).any():
+        said = f"{scene.loading} and its steps must begin as those of the run, {before.loads_said}"
+        raise InputError(f"{path}: its {n} steps are not the first ones of the scene's path; {said}.")
     path = folder / "run.json"
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
-        names = [field.name for field in fields(Measures)]
-        done = [Measures(**{name: step[name] for name in names}) for step in report["steps"][: n - 1]]
+        record = record_type(scene)
+        names = [field.name for field in fields(record)]
+        done = [record(**{name: step[name] for name in names}) for step in report["steps"][: n - 1]]
         if len(done) < n - 1 or not {"status", "started", "command", "warnings"} <= report.keys():
             raise KeyError("steps")
     except (OSError, ValueError, KeyError, TypeError):
@@ -91,13 +89,13 @@ def _start(folder: Path, scene: Scene) -> Start:
     return Start(checkpoint, report, done)
 
 
-def _same_but_for_the_load(folder: Path, own: Scene, scene: Scene) -> None:
+def _same_but_for_the_load(folder: Path, own: AnyScene, scene: AnyScene) -> None:
     """Raise `InputError` naming a key that differs between the run's ``own`` scene and ``scene``, unless it may."""
-    if own.force_controlled != scene.force_controlled:
-        raise InputError(f"{folder}: was loaded by load.{own.load.name}; load.{scene.load.name} cannot continue it.")
+    if own.loaded_by != scene.loaded_by:
+        raise InputError(f"{folder}: was loaded by {own.loading}; {scene.loading} cannot continue it.")
     a, b = scene_keys(own), scene_keys(scene)
     for key in sorted({*a, *b}):
-        if a.get(key) != b.get(key) and not key.startswith(_MAY_DIFFER):
+        if a.get(key) != b.get(key) and key != "load" and not key.startswith(_MAY_DIFFER):
             there, here = (toml_value(keys[key]) if key in keys else "absent" for keys in (a, b))
             raise InputError(
                 f"{folder}: was solved with {key} = {there}, the scene says {here}; only [stepping], "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, nullcontext
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -22,17 +22,16 @@ from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
 from archord.output.stale_jit import without_stale_forms
 from archord.output.step_file import StepFile
-from archord.presets.arc import FIXED, PER_STEP, ArcProfile, arc_profiles
-from archord.presets.joint import Joint
-from archord.presets.joint_report import APART, UNSEEN, step_warnings
-from archord.presets.measures import Measures, Work, measure
-from archord.scene.file import resolved
-from archord.scene.scene import Scene
+from archord.presets.account import Account, account_of
+from archord.presets.edge import PER_STEP, EdgeProfile
+from archord.presets.measures import Work
+from archord.scene.file import AnyScene, resolved
 from archord.solver.coarse_start import coarse_start
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.load_path import Position
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.stepping import Step, StepFailure, StepRules, march
+from archord.solver.system import System
 from archord.solver.timer import Timer
 
 
@@ -47,22 +46,22 @@ class Outcome:
     folder: Path
     status: str
     message: str
-    steps: list[Measures]
+    steps: list[Any]
     warnings: list[str]
     signal: int = 0
     accuracy: Any = None
 
 
 def solve_scene(
-    scene: Scene,
+    scene: AnyScene,
     folder: Path,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
     start: Start | None = None,
     timer: Timer | None = None,
     interrupt: Interrupt | None = None,
-    on_start: Callable[[Joint], None] = lambda joint: None,
-    on_step: Callable[[Measures], None] = lambda measures: None,
+    on_start: Callable[[System], None] = lambda system: None,
+    on_step: Callable[[Any], None] = lambda record: None,
     on_attempt: Callable[[float, int], None] = lambda load, iterations: None,
 ) -> Outcome:
     """Solve ``scene`` and write everything to the existing ``folder`` (see `folder.claim_folder`). Collective.
@@ -78,21 +77,22 @@ def solve_scene(
     begun = perf_counter() - sum(timer.seconds.values())
     with ExitStack() as stack:
         agreed(comm, lambda: bool(stack.enter_context(occupied(folder))))
-        joint = without_stale_forms(lambda: Joint(scene, comm, timer=timer))
-        on_start(joint)
-        output = _Output(folder, joint, begun, start)
+        account = without_stale_forms(lambda: account_of(scene, comm, timer))
+        system = account.system
+        on_start(system)
+        output = _Output(folder, account, begun, start)
         status, message, received = "done", "", 0
         failed: dict[str, Any] = {}
         try:
-            with nullcontext(interrupt) if interrupt else Interrupt() as joint.equilibrium.interrupt:
+            with nullcontext(interrupt) if interrupt else Interrupt() as system.equilibrium.interrupt:
                 position, work = output.begin()
                 # what a coarse mesh went through before a halt is not kept
-                coarse = coarse_start(joint) if position is None else None
+                coarse = coarse_start(system) if position is None else None
                 march(
-                    joint.load_path(position, coarse),
+                    system.load_path(position, coarse),
                     scene.targets,
                     rules=StepRules(**scene.stepping.model_dump()),
-                    substep_done=lambda load: work.add(joint.delta(), joint.driving_force()),
+                    substep_done=lambda load: work.add(*account.driven()),
                     target_done=lambda step, position: on_step(output.add(step, position, work)),
                     attempted=on_attempt,
                 )
@@ -103,11 +103,12 @@ def solve_scene(
         except Interrupted as interrupted:
             status, message = "interrupted", f"{interrupted} after step {len(output.steps)}"
             received = interrupted.number
-        apart = status == "done" and not any(m.contact_area for m in output.steps)
-        if apart and any(m.delta > 0 for m in output.steps):  # pressed together, but no contact point noticed
-            status, message, apart = "stopped", UNSEEN, False
+        told: list[str] = []
+        if status == "done":
+            message, told = account.ending(output.steps)
+            status = "stopped" if message else status
         try:
-            warnings = output.finish([APART] if apart else [], status=status, message=message, **failed)
+            warnings = output.finish(told, status=status, message=message, **failed)
         except WriteError as error:
             status, message, warnings = "stopped", message if status == "stopped" else str(error), []
         return Outcome(folder, status, message, output.steps, warnings, received)
@@ -119,56 +120,58 @@ class _Output:
     A step counts once the checkpoint has it: the other files follow, and a run that goes on writes what they lack.
     """
 
-    def __init__(self, folder: Path, joint: Joint, begun: float, start: Start | None) -> None:
-        self.folder, self.joint, self._start, comm = folder, joint, start, joint.comm
+    def __init__(self, folder: Path, account: Account, begun: float, start: Start | None) -> None:
+        self.folder, self.account, self.system, self._start = folder, account, account.system, start
+        comm = self.system.comm
         self._on_root = partial(agreed, comm)
-        self._scene, self._last = resolved(joint.scene), perf_counter()
-        self.steps: list[Measures] = comm.bcast(start.done if start else [])
-        with joint.timer("output"):
-            self._order = MeshOrder(joint)
+        self._scene, self._last = resolved(account.scene), perf_counter()
+        self.steps: list[Any] = comm.bcast(start.done if start else [])
+        with self.system.timer("output"):
+            self._order = MeshOrder(self.system)
             self._bodies = self._order.bodies()
         self._fields: Any = None  # a `FieldWriter` with the first step, on rank 0
         self._contact: StepFile | None = None
         if comm.rank == 0:
-            self._report = Report(folder / "run.json", joint, begun, self.steps, start.report if start else {})
+            self._report = Report(folder / "run.json", account, begun, self.steps, start.report if start else {})
 
     def begin(self) -> tuple[Position | None, Work]:
         """Make the files, or write the step that the run goes on from, and give its state to the joint. Collective."""
-        joint = self.joint
-        if not joint.comm.bcast(self._start is not None):
+        system = self.system
+        if not system.comm.bcast(self._start is not None):
             self._on_root(self._make)
             return None, Work()
-        with joint.timer("checkpoint"):
+        with system.timer("checkpoint"):
             checkpoint = self._start.checkpoint if self._start else None
-            m, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
-        self._write(m, step, arc_profiles(joint))
+            known, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
+        self._write(self.account.record(**known), step, self.account.profiles())
         self._on_root(lambda: replace_file(self.folder / "scene.toml", self._scene))
         return position, work
 
     def _make(self) -> None:
         clear(self.folder)
         replace_file(self.folder / "scene.toml", self._scene)
-        write_history(self.folder / "history.csv", self.joint.scene, [])
+        write_history(self.folder / "history.csv", self.account.columns(), [])
         self._report.write()
 
-    def add(self, step: Step, position: Position, work: Work) -> Measures:
-        """Write an accepted output step, and return its measures. Collective."""
-        joint = self.joint
-        with joint.timer("output"):
-            profiles = arc_profiles(joint)
+    def add(self, step: Step, position: Position, work: Work) -> Any:
+        """Write an accepted output step, and return its record. Collective."""
+        account = self.account
+        with self.system.timer("output"):
+            profiles = account.profiles()
             seconds, self._last = perf_counter() - self._last, perf_counter()
-            m = measure(joint, self.steps, step, profiles.values(), work, seconds)
-        with joint.timer("checkpoint"):
+            m = account.step(self.steps, step, profiles, work.total, seconds)
+        with self.system.timer("checkpoint"):
             checkpoint = halt(self._order, self._scene, m, step, position, work)
             self._on_root(lambda: write_checkpoint(self.folder / CHECKPOINT, checkpoint))
         self._write(m, step, profiles)
         return m
 
-    def _write(self, m: Measures, step: Step, profiles: dict[str, ArcProfile]) -> None:
+    def _write(self, m: Any, step: Step, profiles: Mapping[str, EdgeProfile]) -> None:
         """Make ``m`` the last step of all files but the checkpoint. Collective."""
-        scene, after = self.joint.scene, len(self.steps)
-        with self.joint.timer("output"):
-            warnings = step_warnings(self.joint, profiles, m, step.residual)
+        account, after = self.account, len(self.steps)
+        scene = account.scene
+        with self.system.timer("output"):
+            warnings = account.step_warnings(m, profiles, step.residual)
             if scene.output.fields:
                 from archord.output.fields import FieldWriter, collect_fields
 
@@ -176,14 +179,13 @@ class _Output:
 
             def write() -> None:
                 if scene.output.fields:
-                    numbered = scene.force_controlled or not scene.monotonic
                     if not self._fields:
-                        self._fields = FieldWriter(self.folder, self._order, self._bodies, after, numbered)
-                    self._fields.write(m.delta, fields)
+                        self._fields = FieldWriter(self.folder, self._order, self._bodies, after, scene.steps_numbered)
+                    self._fields.write(m.at, fields)
                 if not self._contact:
-                    self._contact = StepFile(self.folder / "contact.h5", _arrays(profiles, FIXED), after)
-                self._contact.write(m.delta, _arrays(profiles, PER_STEP))
-                write_history(self.folder / "history.csv", scene, self.steps)
+                    self._contact = StepFile(self.folder / "contact.h5", _arrays(profiles, account.fixed), after)
+                self._contact.write(m.at, _arrays(profiles, PER_STEP))
+                write_history(self.folder / "history.csv", account.columns(), self.steps)
                 self._report.add(step, warnings)
 
             self.steps.append(m)
@@ -191,11 +193,11 @@ class _Output:
 
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
         """Note how the run ended, with ``warnings`` beside those of the steps; returns all on rank 0. Collective."""
-        ending["peak_memory"] = self.joint.comm.gather(peak_memory())
+        ending["peak_memory"] = self.system.comm.gather(peak_memory())
         found = self._on_root(lambda: self._report.finish(warnings, **ending))
-        return found if self.joint.comm.rank == 0 else []
+        return found if self.system.comm.rank == 0 else []
 
 
-def _arrays(profiles: dict[str, ArcProfile], names: tuple[str, ...]) -> dict[str, Any]:
+def _arrays(profiles: Mapping[str, EdgeProfile], names: tuple[str, ...]) -> dict[str, Any]:
     """The arrays of all ``profiles`` that have these ``names``, as contact.h5 names them."""
     return {f"{side}/{name}": getattr(profile, name) for side, profile in profiles.items() for name in names}

@@ -19,9 +19,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.output.disk import replace_file
-from archord.presets.joint import Joint
-from archord.presets.joint_report import APART, facts, rough_arcs
-from archord.presets.measures import Measures, energy_balance
+from archord.presets.account import Account
+from archord.presets.joint_report import APART
 from archord.report.version import VERSION
 from archord.solver.stepping import Step
 from archord.solver.timer import BEFORE_SOLVING
@@ -31,18 +30,19 @@ _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk",
 
 
 class Report:
-    """run.json of ``joint``; ``begun`` is the ``perf_counter`` from which the seconds count.
+    """run.json of an ``account``; ``begun`` is the ``perf_counter`` from which the seconds count.
 
     ``steps`` are those of the run, also of the run that it goes on from, with the run.json ``before``; whoever appends
     one to them calls `add`.
     """
 
-    def __init__(self, path: Path, joint: Joint, begun: float, steps: list[Measures], before: dict[str, Any]) -> None:
-        self.path, self.joint, self.begun, self.steps, self._before = path, joint, begun, steps, before
-        now, n, comm = datetime.now(UTC).isoformat(timespec="seconds"), len(steps), joint.comm
+    def __init__(self, path: Path, account: Account, begun: float, steps: list[Any], before: dict[str, Any]) -> None:
+        self.path, self.account, self.begun, self.steps, self._before = path, account, begun, steps, before
+        self.system = account.system
+        now, n, comm = datetime.now(UTC).isoformat(timespec="seconds"), len(steps), self.system.comm
         restart = {"when": now, "after_step": n + 1, "ranks": comm.size, "command": sys.argv}
         restarts = [*before.get("restarts", []), *([restart] if before else [])]
-        warnings = before.get("warnings", rough_arcs(joint))
+        warnings = before.get("warnings", account.warnings())
         self.content: dict[str, Any] = {
             "status": "running",
             "message": "",
@@ -58,8 +58,11 @@ class Report:
             },
             "ranks": comm.size,
             "peak_memory": [],
-            **facts(joint),
-            "tolerances": {"newton": joint.problem.tolerance, "gamma_factor": joint.scene.analysis.gamma_factor},
+            **account.facts(),
+            "tolerances": {
+                "newton": self.system.problem.tolerance,
+                "gamma_factor": account.scene.analysis.gamma_factor,
+            },
             "restarts": restarts,
             # the step after those done is noted once more
             "warnings": [w for w in warnings if not w.startswith(f"step {n + 1}:") and w != APART],
@@ -90,7 +93,7 @@ class Report:
     def write(self) -> None:
         """Replace run.json in one move, with a line for each of its keys. Raises `OSError`."""
         content = self.content | {
-            "linear_solver": self.joint.equilibrium.choice.words(),  # a matrix may decide otherwise later
+            "linear_solver": self.system.equilibrium.choice.words(),  # a matrix may decide otherwise later
             "totals": self._totals(),
             "seconds": self._seconds(),
             "error_estimates": self._errors(),
@@ -99,17 +102,17 @@ class Report:
         replace_file(self.path, "{\n" + ",\n".join(lines) + "\n}\n")
 
     def _totals(self) -> dict[str, int]:
-        counts, before = self.joint.timer.counts, self._before.get("totals", {})
+        counts, before = self.system.timer.counts, self._before.get("totals", {})
         return {
             "newton_iterations": sum(m.iterations for m in self.steps),
             "cutbacks": sum(m.cutbacks for m in self.steps),
-            "factorisations": self.joint.factorisations + before.get("factorisations", 0),
+            "factorisations": self.system.factorisations + before.get("factorisations", 0),
             "residual_evaluations": counts.get("return mapping", 0) + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.steps),
         }
 
     def _seconds(self) -> dict[str, float]:
-        s = dict(self.joint.timer.seconds)
+        s = dict(self.system.timer.seconds)
         before = s.pop(BEFORE_SOLVING, 0.0)
         s["setup"] -= before
         s["linear solve"] = before
@@ -126,7 +129,7 @@ class Report:
         touching = [step["residuals"] for step in self.content["steps"] if step["contact_area"]]
         return {
             "force_balance": max(m.force_balance for m in self.steps),
-            "energy_balance": energy_balance(self.steps, press_fit=self.joint.scene.joint.dR < 0),
+            "energy_balance": self.account.energy_balance(self.steps),
             "newton_residual": max((r[-1][-1] for r in touching if r and r[-1]), default=0.0),
         }
 

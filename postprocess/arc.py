@@ -8,7 +8,8 @@ import numpy as np
 from archord.materials.material import Array
 from archord.output.step_file import step_name
 from archord.postprocess.curve import RunCurve
-from archord.presets.arc import PER_STEP, ArcProfile
+from archord.presets.arc import ArcProfile
+from archord.presets.edge import PER_STEP
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
@@ -29,7 +30,7 @@ def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
             for side in (side for side in radius if side in file):
                 arrays = {name: file[f"{side}/{name}"][()] for name in ("s", "weight")}
                 arrays |= {name: file[f"{side}/{name}/{step_name(step)}"][()] for name in PER_STEP}
-                found[side] = ArcProfile(radius[side], **arrays)
+                found[side] = ArcProfile(**arrays, radius=radius[side])
     except (OSError, KeyError, RuntimeError, TypeError, ValueError):
         raise InputError(f"{path}: cannot be read as the contact of a run.") from None
     return found

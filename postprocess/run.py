@@ -20,7 +20,6 @@ from archord.postprocess.fields import Fields, read_fields
 from archord.presets.arc import ArcProfile
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
-from archord.scene.scene import Scene
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,7 +48,7 @@ class Run:
                     is_no_run = f"is a sweep, not a run; its runs are the folders in {self.folder / 'cases'}"
                 raise InputError(f"{self.folder}: {is_no_run}.")
         self.columns = _read_columns(self.folder / "history.csv")
-        self.scene: Scene = load_scene(self.folder / "scene.toml")
+        self.scene: Any = load_scene(self.folder / "scene.toml")
         self.summary: dict[str, Any] = _read_report(self.folder / "run.json")
         self.status, self.message, self.warnings = (self.summary[key] for key in ("status", "message", "warnings"))
         self.steps = len(self.columns["step"])

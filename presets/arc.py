@@ -12,50 +12,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from archord.materials.material import Array
+from archord.presets.edge import EdgeProfile, surface_profiles
 
 if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
     from archord.presets.joint import Joint
 
 SYMMETRY = 2.0  # the half that is modelled makes up a joint so many times
-FIXED, PER_STEP = ("s", "angle", "weight"), ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
 _PEAK_FRACTION = 0.25  # part of the contact angle over which the parabola of the peak is fitted
 _EDGE_FACETS = 4  # facets whose forces give the edge of the contact
 
 
 @dataclass(frozen=True)
-class ArcProfile:
-    """One side's contact state at ``q`` points of its ``n`` facets, ordered from the contact axis, on every rank.
+class ArcProfile(EdgeProfile):
+    """One side's contact state on an arc of ``radius``, its facets ordered from the contact axis.
 
     Of a joint cut in half. In the facet at the edge of the contact the line of `pressure` may dip below zero.
     """
 
     radius: float
-    s: Array  # (n, q) arc length from the contact axis
-    weight: Array  # (n, q) measure
-    coordinates: Array  # (n, q, 2) deformed
-    pressure: Array  # (n, q) positive in compression; projected: linear on each facet, with the facet's force
-    raw_pressure: Array  # (n, q) as integrated by the solver
-    gap: Array  # (n, q) positive when open
-
-    @property
-    def width(self) -> Array:
-        """Length ``(n,)`` of each facet."""
-        return self.weight.sum(axis=1)
-
-    @property
-    def facet_force(self) -> Array:
-        """Integral of the pressure over each facet ``(n,)``."""
-        return (self.weight * self.raw_pressure).sum(axis=1)
 
     @property
     def angle(self) -> Array:
         """Angle ``(n, q)`` from the contact axis."""
         return np.divide(self.s, self.radius)
-
-    @property
-    def in_contact(self) -> Array:
-        """Share ``(n,)`` of each facet that carries pressure."""
-        return (self.weight * (self.raw_pressure > 0)).sum(axis=1) / self.width
 
     def facet_means(self) -> tuple[Array, Array]:
         """Angle ``(n,)`` and pressure ``(n,)`` of the facets: their means, which do not scatter where it yields."""
@@ -65,33 +44,14 @@ class ArcProfile:
 
 def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
     """Contact state along the integrated arcs, by side, at the last evaluation. Collective."""
-    g, u = joint.scene.joint, joint.equilibrium.displacement()
+    g, found = joint.scene.joint, {}
     radius = {"pin": g.radius, "hole": g.radius + g.dR}
-    found = {}
-    for name, side in joint.sides.items():
-        pair = joint.contact.pair_of(side)
-        if pair is None:  # its edge is not integrated
-            continue
-        displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
-        local = np.zeros((side.n_facets, side.weight.shape[1], 5))
-        at_points = (side.weight, displaced[..., 0], displaced[..., 1], pair.pressure, pair.distance)
-        local[side.facet] = np.stack(at_points, axis=-1)
-        whole, s = side.sum_over_ranks(local), side.arc_position(np.array([0.0, -radius["hole"]]))
+    for name, edge in surface_profiles(joint).items():
+        s = joint.sides[name].arc_position(np.array([0.0, -radius["hole"]]))
         order, along = np.argsort(s[:, 0]), slice(None, None, -1 if s[0, 0] > s[0, -1] else 1)
-        whole, s = whole[order, along], s[order, along]
-        weight, raw = whole[..., 0], whole[..., 3]
-        pressure = project(raw, s, weight)
-        found[name] = ArcProfile(radius[name], s, weight, whole[..., 1:3], pressure, raw, whole[..., 4])
+        arrays = {key: value[order, along] for key, value in (vars(edge) | {"s": s}).items() if key != "X"}
+        found[name] = ArcProfile(**arrays, radius=radius[name])
     return found
-
-
-def project(pressure: Array, s: Array, weight: Array) -> Array:
-    """L2 projection ``(n, q)`` of ``pressure`` onto one linear function a facet; facet integrals are kept exactly."""
-    total = weight.sum(axis=1, keepdims=True)
-    mean = (weight * pressure).sum(axis=1, keepdims=True) / total
-    lever = s - (weight * s).sum(axis=1, keepdims=True) / total
-    slope = (weight * lever * pressure).sum(axis=1, keepdims=True) / (weight * lever**2).sum(axis=1, keepdims=True)
-    return mean + slope * lever
 
 
 def semi_angle(profile: ArcProfile) -> float:

@@ -35,10 +35,11 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     scene.require_mesh()
     g, analysis, by_force = scene.joint, scene.analysis, scene.force_controlled
     ring, rigid = g.is_ring, scene.pin.rigid
+    stiffness = scene.E_star * scene.thickness if by_force else 1.0  # by which a load is about a displacement
     supports = [Support("axis", "symmetry", 0), *(Support("block", "block held", axis) for axis in (0, 1))]
     if not rigid and not ring:
         supports.append(Support("pin", "pin top", 1, -1.0))
-    travel = abs(g.dR) + max(map(abs, scene.targets)) / (scene.E_star if by_force else 1.0)
+    travel = abs(g.dR) + max(map(abs, scene.targets)) / stiffness
     contact = Interaction(
         "contact",
         (Rigid(RigidCircle(np.array([0.0, -g.dR]), g.radius), (0.0, -1.0)) if rigid else "pin", "hole"),
@@ -53,7 +54,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
 
     def guess(load: float) -> Guess:
         """The pin moved down by the load, or by about what a force would press it, the block at rest."""
-        shift = (load / scene.E_star if by_force else load) + (max(g.dR, 0.0) if ring else 0.0)
+        shift = load / stiffness + (max(g.dR, 0.0) if ring else 0.0)
         return Guess(shift, {"pin": (0.0, -shift)})
 
     return Problem(
@@ -64,7 +65,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         [Load("pin", (0.0, -1.0), core)] if ring else [],
         control="force" if by_force and not ring else "factor",
         degree=analysis.degree,
-        symmetry=SYMMETRY,
+        symmetry=SYMMETRY * scene.thickness,
         load_name="P" if by_force else "delta",
         travel=travel,
         tolerance=analysis.tolerance,

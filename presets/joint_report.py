@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from functools import partial
+from operator import attrgetter
+from typing import Any, ClassVar
 
 import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis
-from archord.presets.arc import ArcProfile
+from archord.presets.arc import ArcProfile, arc_profiles
 from archord.presets.joint import Joint
-from archord.presets.measures import Measures
+from archord.presets.measures import Measures, energy_balance, measure
+from archord.solver.stepping import Step
+from archord.solver.system import System
 
 _FEW_FACETS = 5
 _ROUGH = 0.01  # of the clearance
@@ -24,17 +30,90 @@ UNSEEN = (
 )
 
 
-def facts(joint: Joint) -> dict[str, dict[str, Any]]:
-    """Sizes of the mesh, and what was made of the scene."""
-    lengths = {name: side.facet_lengths() for name, side in joint.sides.items()}
-    mesh = {
-        "cells": joint.n_cells,
-        "dofs": joint.n_dofs,
+class JointAccount:
+    """The account of a ``system`` that is a joint (see `Account`)."""
+
+    record: ClassVar[type] = Measures
+    fixed: ClassVar[tuple[str, ...]] = ("s", "angle", "weight")
+
+    def __init__(self, system: Joint) -> None:
+        self.system, self.scene = system, system.scene
+
+    def columns(self) -> list[tuple[str, Callable[[Measures], float | int]]]:
+        """Every measure in the scene's units, and dimensionless beside it."""
+        scene, R, dR, E = self.scene, self.scene.joint.radius, self.scene.joint.dR, self.scene.E_star
+        length, t = scene.units.length, scene.thickness
+        force, energy = (unit(scene.analysis.thickness) for unit in (scene.units.force_of, scene.units.energy_of))
+        scales = {
+            "delta": ("dR", dR, length),
+            "P": ("(E* R)", E * R * t, force),
+            "p0": ("E*", E, scene.units.stress),
+            "eps": ("", 1.0, "rad"),
+            "contact_area": ("R", R, length),
+            "peeq_integral": ("R2", R * R * t, f"{length}2"),
+            **dict.fromkeys(("elastic_energy", "plastic_dissipation", "work"), ("(E* R2)", E * R * R * t, energy)),
+            "seconds": ("", 1.0, "s"),
+        }
+
+        columns: list[tuple[str, Callable[[Measures], float | int]]] = []
+        for field in fields(Measures):
+            scale, divisor, unit = scales.get(field.name, ("", 1.0, ""))
+            columns.append((f"{field.name} [{unit}]" if unit else field.name, attrgetter(field.name)))
+            if scale:
+                columns.append((f"{field.name}/{scale}", partial(_over, field.name, divisor)))
+        return columns
+
+    def driven(self) -> tuple[float, float]:
+        """delta and P. Collective."""
+        return self.system.delta(), self.system.driving_force()
+
+    def profiles(self) -> dict[str, ArcProfile]:
+        """The contact along the arcs, by side. Collective."""
+        return arc_profiles(self.system)
+
+    def step(
+        self, before: Sequence[Measures], step: Step, profiles: Mapping[str, ArcProfile], work: float, seconds: float
+    ) -> Measures:
+        """The measures of the last accepted state. Collective."""
+        return measure(self.system, before, step, profiles.values(), work, seconds)
+
+    def facts(self) -> dict[str, dict[str, Any]]:
+        """Sizes of the mesh, and what was made of the scene."""
+        shares = [pair.share for pair in self.system.contact.pairs]
+        return {"mesh": sizes(self.system), "model": {"E_star": self.scene.E_star, "contact_shares": shares}}
+
+    def warnings(self) -> list[str]:
+        """What to warn of before the first step."""
+        return rough_arcs(self.system)
+
+    def step_warnings(self, m: Measures, profiles: Mapping[str, ArcProfile], residual: float) -> list[str]:
+        """What to warn of after the step ``m``. Collective."""
+        return step_warnings(self.system, profiles, m, residual)
+
+    def ending(self, steps: Sequence[Measures]) -> tuple[str, list[str]]:
+        """Pressed together, but no contact point noticed: not done. Never pressed together: a warning."""
+        if any(m.contact_area for m in steps):
+            return "", []
+        return (UNSEEN, []) if any(m.delta > 0 for m in steps) else ("", [APART])
+
+    def energy_balance(self, steps: Sequence[Measures]) -> float | None:
+        """See `energy_balance`."""
+        return energy_balance(steps, press_fit=self.scene.joint.dR < 0)
+
+
+def _over(name: str, divisor: float, m: Measures) -> float:
+    return getattr(m, name) / divisor
+
+
+def sizes(system: System) -> dict[str, Any]:
+    """Sizes of the mesh for run.json."""
+    lengths = {name: side.facet_lengths() for name, side in system.sides.items()}
+    return {
+        "cells": system.n_cells,
+        "dofs": system.n_dofs,
         "contact_facets": {name: len(length) for name, length in lengths.items()},
         "element_size_on_arc": {name: [float(length.min()), float(length.max())] for name, length in lengths.items()},
     }
-    model = {"E_star": joint.scene.E_star, "contact_shares": [pair.share for pair in joint.contact.pairs]}
-    return {"mesh": mesh, "model": model}
 
 
 def rough_arcs(joint: Joint) -> list[str]:
@@ -64,7 +143,7 @@ def core_peeq(joint: Joint) -> float:
     return joint.comm.allreduce(float(np.asarray(points.peeq)[core].max(initial=0.0)), op=MPI.MAX)
 
 
-def step_warnings(joint: Joint, profiles: dict[str, ArcProfile], m: Measures, residual: float) -> list[str]:
+def step_warnings(joint: Joint, profiles: Mapping[str, ArcProfile], m: Measures, residual: float) -> list[str]:
     """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
     said, squashed = [], core_peeq(joint)
     if joint.scene.joint.arc_end < np.pi and any(p.in_contact[-1] > 0 for p in profiles.values()):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from archord.presets.arc import ArcProfile, peak_pressure, semi_angle
+from archord.presets.arc import SYMMETRY, ArcProfile, peak_pressure, semi_angle
 from archord.presets.joint import Joint
 from archord.solver.stepping import Step
 
@@ -39,32 +40,39 @@ class Measures:
     cutbacks: int
     seconds: float
 
+    @property
+    def at(self) -> float:
+        """The load that the files of fields and contact name."""
+        return self.delta
+
 
 @dataclass
 class Work:
-    """``total`` work of the load: the trapezoidal rule over every accepted step, the last of them at ``delta`` under
-    ``force``."""
+    """``total`` work of the loads: the trapezoidal rule over every accepted step, the last of them at the displacement
+    ``delta`` under ``force``, a number or one for every load."""
 
-    delta: float = 0.0
-    force: float = 0.0
+    delta: Any = 0.0
+    force: Any = 0.0
     total: float = 0.0
 
-    def add(self, delta: float, force: float) -> None:
+    def add(self, delta: Any, force: Any) -> None:
         """Add the step from the last ``delta`` to this one, where the load is ``force``."""
-        self.total += 0.5 * (force + self.force) * (delta - self.delta)
-        self.delta, self.force = delta, force
+        self.total += float(np.sum(0.5 * np.add(force, self.force) * np.subtract(delta, self.delta)))
+        self.delta, self.force = (np.asarray(value).tolist() for value in (delta, force))
 
 
 def measure(
-    joint: Joint, before: Sequence[Measures], step: Step, arcs: Collection[ArcProfile], work: Work, seconds: float
+    joint: Joint, before: Sequence[Measures], step: Step, arcs: Collection[ArcProfile], work: float, seconds: float
 ) -> Measures:
     """Sum up the last accepted state of ``joint``, which follows the steps ``before``. Collective."""
     peeq, peeq_integral = joint.peeq()
     stored, dissipated = joint.energies()
     forces, delta = joint.forces(), joint.delta()
     P = forces["pin"]
-    area = joint.problem.symmetry * float(np.mean([(p.in_contact * p.width).sum() for p in arcs]))
-    scale = max(abs(P), *(abs(m.P) for m in before), 0.0 if area else joint.scene.E_star * abs(delta))
+    area = SYMMETRY * float(np.mean([(p.in_contact * p.width).sum() for p in arcs]))
+    scale = max(
+        abs(P), *(abs(m.P) for m in before), 0.0 if area else joint.scene.E_star * joint.scene.thickness * abs(delta)
+    )
     eps = float(np.mean([semi_angle(p) for p in arcs]))
     return Measures(
         step=len(before) + 1,
@@ -77,7 +85,7 @@ def measure(
         peeq_integral=peeq_integral,
         elastic_energy=stored,
         plastic_dissipation=dissipated,
-        work=work.total,
+        work=work,
         force_balance=max(abs(f - P) for f in forces.values()) / scale if scale else 0.0,
         iterations=step.iterations,
         cutbacks=step.cutbacks,

@@ -7,9 +7,10 @@ import json
 import re
 from typing import Any, get_args
 
-from archord.scene.keys import Section, toml_value
+from archord.scene.keys import SEPARATOR, Section, toml_value
 
 _MOST_SENTENCES = 20
+_KINDS = ("number", "list", "law", "float", "int")  # of values that a key may have
 _PHRASES = {
     "missing": "is missing",
     "extra_forbidden": "is not a known key; {hint}{kind} are {known}",
@@ -26,6 +27,7 @@ _PHRASES = {
     "less_than": "must be less than {lt:g}",
     "less_than_equal": "must be at most {le:g}",
     "literal_error": "must be {expected}",
+    "list_type": "must be a list",
     "too_short": "must have {min_length} or more entries",
     "too_long": "must have at most {max_length} entries",
 }
@@ -53,16 +55,32 @@ def _of_given_kind(location: tuple, data: dict[str, Any]) -> bool:
     return str(kind).startswith("list") == isinstance(data[section][key], list)
 
 
+def _in_table(location: tuple, data: dict[str, Any]) -> tuple[tuple, dict[str, Any]]:
+    """A ``location`` in ``data`` whose section is a list of tables as one whose section is that table."""
+    if len(location) < 2 or not isinstance(location[1], int):
+        return location, data
+    table = data[location[0]][location[1]]
+    named = table.get("name") if isinstance(table, dict) else None
+    label = f"{location[0]} {json.dumps(named or location[1] + 1, ensure_ascii=True)}"
+    return (label, *location[2:]), {label: table}
+
+
 def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]) -> str:
-    place, inner = list(error["loc"][:2]), error["loc"][2:]  # section and key, and where in its value
-    place += [part for part in inner[1:] if isinstance(part, str)]  # keys of a table; the first is its kind
-    context = dict(error.get("ctx", {}))
+    location, context = error["loc"], dict(error.get("ctx", {}))
     if error["type"] == "value_error":
         name, said = str(context["error"]).split("|", 1)
-        place += filter(None, name.split("."))
-    else:
+        parts = name.split(SEPARATOR)
+        if len(parts) > 1:  # of a table, by its name
+            location = parts[0], [table["name"] for table in data[parts[0]]].index(parts[1]), *parts[2:]
+        else:
+            location = *location, *filter(None, name.split("."))
+    field = location[:1]
+    location, data = _in_table(location, data)
+    place, inner = list(location[:2]), location[2:]  # section and key, and where in its value
+    place += [part for part in inner if isinstance(part, str) and part not in _KINDS and "[" not in part]
+    if error["type"] != "value_error":
         if error["type"] == "extra_forbidden":
-            context |= _known_keys(model, place)
+            context |= _known_keys(model, [*field, *place[1:]])
         empty = context.get("min_length") == 1
         said = _PHRASES.get("string_too_short" if empty else error["type"], error["msg"]).format(
             **context, name=place[-1]
@@ -70,7 +88,8 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
     value: Any = data
     for part in place:
         value = value.get(part) if isinstance(value, dict) else None
-    key = ".".join(map(_key_shown, place))
+    key = ".".join(map(_key_shown, place[1:] if " " in place[0] else place))
+    key = f"{place[0]}{'.' if key else ''}{key}" if " " in place[0] else key
     where = next((by for name, by in origin.items() if f"{name}.".startswith(f"{key}.")), source)
     shown = "" if value is None or isinstance(value, dict) or where != source else f" = {shortened(toml_value(value))}"
     entry = f": entry {inner[-1] + 1}" if inner and isinstance(inner[-1], int) else ""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from archord.scene.errors import InputError
 from archord.scene.faults import shortened
-from archord.scene.scene import CHOSEN, Scene, parse_scene
+from archord.scene.problem import ProblemScene, is_problem
+from archord.scene.scene import CHOSEN, Scene
 from archord.scene.sections import LOADS
 
 ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
@@ -23,10 +24,34 @@ _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}")
 
 
-def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
+AnyScene = Scene | ProblemScene
+
+
+def parse_scene(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> Scene:
+    """The joint of ``data`` read from ``source``, or as ``origin`` says of its keys, elsewhere. Raises `InputError`."""
+    scene: Any = Scene
+    return scene(source, origin, **data)
+
+
+def parse_any(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> AnyScene:
+    """As `parse_scene`, of a joint or a general scene."""
+    scene: Any = ProblemScene if is_problem(data) else Scene
+    return scene(source, origin, **data)
+
+
+def load_joint(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
+    """As `load_scene`, of a scene that must be that of a joint."""
+    scene = load_scene(path, overrides)
+    if not isinstance(scene, Scene):
+        raise InputError(f"{path}: must be the scene of a [joint]; this is a general one.")
+    return scene
+
+
+def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     """Read and check the scene file ``path``, with ``overrides`` like ``"joint.clearance=0.01"`` on top.
 
-    Raises `InputError` with one sentence per fault: file, key, value, and what is allowed.
+    A mesh file is looked for beside it. Raises `InputError` with one sentence per fault: file, key, value, and what is
+    allowed.
     """
     data = read_toml(path)
     if "base" in data and "joint" not in data:
@@ -34,7 +59,10 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     _give_way(data, overrides)
     origin = {override_key(data, override): f"--set {override}" for override in overrides}
     read_targets(data, Path(path))
-    return parse_scene(data, str(path), origin)
+    mesh = data.get("mesh")
+    if isinstance(mesh, dict) and isinstance(mesh.get("file"), str):
+        mesh["file"] = str((Path(path).parent / mesh["file"]).absolute())
+    return parse_any(data, str(path), origin)
 
 
 def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
@@ -143,11 +171,13 @@ def _value(text: str) -> Any:
             return text
 
 
-def resolved(scene: Scene) -> str:
+def resolved(scene: AnyScene) -> str:
     """The scene as TOML, with every default filled in but for what an accuracy chooses; it loads as the same scene."""
     import tomli_w
 
     data = scene.model_dump(exclude_none=True)
+    if isinstance(scene, ProblemScene):
+        return tomli_w.dumps(data)
     joint = data["joint"]
     joint["block_size"] = scene.joint.W
     if scene.analysis.accuracy is not None:
@@ -160,7 +190,7 @@ def resolved(scene: Scene) -> str:
     return tomli_w.dumps(data)
 
 
-def scene_keys(scene: Scene) -> dict[str, Any]:
+def scene_keys(scene: AnyScene) -> dict[str, Any]:
     """Every key of the resolved scene by its dotted name."""
     found: dict[str, Any] = {}
     for section, keys in tomllib.loads(resolved(scene)).items():

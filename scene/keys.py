@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 LINE = r"^[^\x00-\x1f]*$"  # a pattern: text on one line
+SEPARATOR = "\0"  # of the parts of a key
 Positive = Annotated[float, Field(gt=0)]
 
 
@@ -21,10 +22,11 @@ def key(
     return Field(default, description=description, json_schema_extra=extra, **limits)
 
 
-def require(holds: bool, name: str, said: str) -> None:
-    """Raise ValueError unless it ``holds`` what is ``said`` of the key ``name``."""
+def require(holds: bool, name: str | tuple[str, ...], said: str) -> None:
+    """Raise ValueError unless it ``holds`` what is ``said`` of the key ``name``: "section.key", or the section, the
+    name of one of its tables and the key there."""
     if not holds:
-        raise ValueError(f"{name}|{said}")
+        raise ValueError(f"{name if isinstance(name, str) else SEPARATOR.join(name)}|{said}")
 
 
 def toml_value(value: Any) -> str:

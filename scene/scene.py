@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
@@ -27,7 +27,28 @@ _WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but rou
 CHOSEN = ("joint.element_size", "joint.relative_element_size", "joint.growth", "stepping.initial", "stepping.maximum")
 
 
-class Scene(Section):
+class Checked(Section):
+    """A scene, checked: sections given as tables or as their classes; `newest` is the version of its format."""
+
+    newest: ClassVar[int] = FORMAT
+
+    def __init__(self, source: str = "scene", origin: Mapping[str, str] | None = None, /, **sections: Any) -> None:
+        """Check ``sections`` as read from ``source``; ``origin`` names another source of some keys."""
+        try:
+            data = plain(sections)
+        except RecursionError:
+            raise InputError(f"{source}: is not a scene: its tables are nested too deeply.") from None
+        version = data.get("format", self.newest)
+        if isinstance(version, int) and version > self.newest:  # it may hold anything else that is unknown here
+            said = f"is for a newer archord; this one reads format {self.newest}"
+            raise InputError(f"{source}: format = {version} {said}.")
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise InputError(in_sentences(error.errors(), data, type(self), source, dict(origin or {}))) from None
+
+
+class Scene(Checked):
     """A pin joint and how to load it.
 
     ``Scene(joint={"radius": 10.0, "clearance": 0.05}, ...)`` makes one from sections: tables or their classes, whose
@@ -43,20 +64,6 @@ class Scene(Section):
     load: Load = Field(description="loading")
     stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
     output: Output = Field(default_factory=Output, description="what is written")
-
-    def __init__(self, source: str = "scene", origin: Mapping[str, str] | None = None, /, **sections: Any) -> None:
-        """Check ``sections`` as read from ``source``; ``origin`` names another source of some keys."""
-        try:
-            data = plain(sections)
-        except RecursionError:
-            raise InputError(f"{source}: is not a scene: its tables are nested too deeply.") from None
-        version = data.get("format", FORMAT)
-        if isinstance(version, int) and version > FORMAT:  # it may hold anything else that is unknown here
-            raise InputError(f"{source}: format = {version} is for a newer archord; this one reads format {FORMAT}.")
-        try:
-            super().__init__(**data)
-        except ValidationError as error:
-            raise InputError(in_sentences(error.errors(), data, Scene, source, dict(origin or {}))) from None
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
@@ -82,7 +89,7 @@ class Scene(Section):
             said = 'does not load a joint whose model is "ring"; give force or relative_force'
             require(self.force_controlled, load, said)
             require(not pin.rigid, "pin.rigid", 'must be false where joint.model is "ring"')
-        scale = self.E_star if self.force_controlled else 1.0
+        scale = self.E_star * self.thickness if self.force_controlled else 1.0
         largest, most = max(map(abs, self.targets)), 0.5 * scale * joint.radius
         what = "E* R" if self.force_controlled else "the radius"
         require(largest <= most, load, f"must not exceed half {what} ({most:g})")
@@ -101,7 +108,7 @@ class Scene(Section):
     @property
     def load_unit(self) -> float:
         """What the targets of the section load are multiplied by."""
-        scale = {"displacement": self.joint.dR, "relative_force": self.E_star * self.joint.radius}
+        scale = {"displacement": self.joint.dR, "relative_force": self.E_star * self.joint.radius * self.thickness}
         return scale.get(self.load.name, 1.0)
 
     @property
@@ -115,14 +122,44 @@ class Scene(Section):
         return out
 
     @property
-    def monotonic(self) -> bool:
-        """Whether the load only grows."""
-        return all(a < b for a, b in pairwise([0.0, *self.targets]))
+    def steps_numbered(self) -> bool:
+        """Whether results name steps by number, as the displacement does not grow or is not known before."""
+        return self.force_controlled or not all(a < b for a, b in pairwise([0.0, *self.targets]))
+
+    @property
+    def travelled(self) -> list[list[float]]:
+        """The load at every output step: what two scenes share as far as they agree."""
+        return [[target] for target in self.targets]
+
+    @property
+    def loaded_by(self) -> Any:
+        """What a run must be loaded by to be continued with this scene."""
+        return self.force_controlled
+
+    @property
+    def accurate(self) -> str:
+        """Name of what an accuracy is asked of."""
+        return "delta" if self.force_controlled else "P"
+
+    @property
+    def loading(self) -> str:
+        """The load in words."""
+        return f"load.{self.load.name}"
+
+    @property
+    def loads_said(self) -> str:
+        """Targets and steps in words."""
+        return f"{self.load.legs} and {self.load.leg_steps}"
 
     @property
     def E_star(self) -> float:
         """Contact modulus of the pair, ``1/E* = sum over deformable bodies of 1/E*_i`` (Johnson 1985, eq. 4.20)."""
         return 1 / sum(1 / contact_modulus(s.E, s.nu, self.analysis.plane) for s in self.solids.values())
+
+    @property
+    def thickness(self) -> float:
+        """Thickness, 1 if forces are per unit thickness."""
+        return self.analysis.thickness or 1.0
 
     @property
     def plastic(self) -> bool:
@@ -133,11 +170,6 @@ class Scene(Section):
     def solids(self) -> dict[str, Solid]:
         """The deformable bodies by name."""
         return {"block": self.block} if self.pin.rigid else {"pin": self.pin, "block": self.block}
-
-
-def parse_scene(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> Scene:
-    """The scene of ``data`` read from ``source``, or as ``origin`` says of its keys, elsewhere. Raises `InputError`."""
-    return Scene(source, origin, **data)
 
 
 def plain(value: Any) -> Any:

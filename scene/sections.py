@@ -19,9 +19,9 @@ LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
 # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
 Ratio = Annotated[float, Field(ge=-0.999, le=0.499999)]
 _FORCE = {("MPa", "mm"): "N/mm", ("Pa", "m"): "N/m"}
-_MOST = 10_000  # output steps
+MOST_STEPS = 10_000  # output steps
 Targets = float | Annotated[list[float], Field(min_length=1)]
-Steps = Annotated[int, Field(ge=1, le=_MOST)]
+Steps = Annotated[int, Field(ge=1, le=MOST_STEPS)]
 BackStress = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 
 
@@ -36,11 +36,17 @@ class Units(Section):
         """Unit of force per unit thickness."""
         return _FORCE.get((self.stress, self.length), f"{self.stress} {self.length}")
 
-    @property
-    def energy(self) -> str:
-        """Unit of energy per unit thickness."""
+    def force_of(self, thickness: float | None) -> str:
+        """Unit of force of a joint of this thickness, per unit thickness without."""
+        if thickness is None:
+            return self.force
         force = _FORCE.get((self.stress, self.length))
         return force.split("/")[0] if force else f"{self.stress} {self.length}2"
+
+    def energy_of(self, thickness: float | None) -> str:
+        """Unit of energy of a joint of this thickness, per unit thickness without."""
+        force = self.force_of(1.0)
+        return force if thickness is None else f"{force} {self.length}"
 
 
 class Solid(Section):
@@ -137,7 +143,10 @@ class Load(Section):
         "displacement delta of the pin, instead of displacement", "length", default=None, other=0.1
     )
     force: Targets | None = key(
-        "force P on the whole pin per unit thickness, instead of a displacement", "force", default=None, other=1000.0
+        "force P on the whole pin (per unit thickness without analysis.thickness), instead of a displacement",
+        "force",
+        default=None,
+        other=1000.0,
     )
     relative_force: Targets | None = key("P/(E* R), instead of force", default=None, other=0.01)
     path: str | None = key(
@@ -160,7 +169,7 @@ class Load(Section):
         require(self.path is None, "path", "is for scene files alone; give the list of its targets instead")
         each = f"must have one number for each of the {len(self.legs)} targets of {self.name}"
         require(len(self.leg_steps) == len(self.legs), "steps", each)
-        require(sum(self.leg_steps) <= _MOST, "steps", f"must not add up to more than {_MOST} steps")
+        require(sum(self.leg_steps) <= MOST_STEPS, "steps", f"must not add up to more than {MOST_STEPS} steps")
         return self
 
     @property
@@ -203,6 +212,12 @@ class Analysis(Section):
     degree: Literal[2, 3] = key("polynomial degree of displacements and of the curved geometry", default=2)
     coarse_start: bool = key(
         "on a fine mesh, take the guess for every step from a coarser one; false is for comparison", default=True
+    )
+    thickness: Positive | None = key(
+        "thickness, for forces and energies of the whole; they are per unit thickness if absent",
+        "length",
+        default=None,
+        other=10.0,
     )
     tolerance: float = key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
     max_iterations: int = key("Newton iterations before a step is cut", default=25, ge=2, le=1000)

@@ -23,11 +23,12 @@ from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
 from archord.postprocess.convergence import Curve, mesh_error, step_error
-from archord.presets.joint import Joint
 from archord.presets.joint_report import UNSEEN
 from archord.scene.errors import InputError
+from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupt, Interrupted
+from archord.solver.system import System
 from archord.studies.mesh_family import RATIO, MeshFamily
 
 MOST_SUBSTEPS = 64
@@ -66,11 +67,13 @@ class Accuracy:
 
 
 def solve_as_asked(
-    scene: Scene, folder: Path, comm: MPI.Comm, *, start: Start | None = None, **options: Any
+    scene: AnyScene, folder: Path, comm: MPI.Comm, *, start: Start | None = None, **options: Any
 ) -> Outcome:
     """`solve_to_accuracy` where ``scene`` asks for an accuracy and no run goes on, else `solve_scene`. Collective."""
     if scene.analysis.accuracy is None or start is not None:
         return solve_scene(scene, folder, comm, start=start, **options)
+    if not isinstance(scene, Scene):
+        raise InputError("analysis.accuracy: is for a [joint] as yet.")
     return solve_to_accuracy(scene, folder, comm, **options)
 
 
@@ -80,7 +83,7 @@ def solve_to_accuracy(
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
     interrupt: Interrupt | None = None,
-    on_start: Callable[[Joint], None] = lambda joint: None,
+    on_start: Callable[[System], None] = lambda system: None,
     on_level: Callable[[Level], None] = lambda level: None,
     **options: Any,
 ) -> Outcome:
@@ -111,7 +114,7 @@ class _Search:
         scene: Scene,
         folder: Path,
         comm: MPI.Comm,
-        on_start: Callable[[Joint], None],
+        on_start: Callable[[System], None],
         on_level: Callable[[Level], None],
         options: dict[str, Any],
     ) -> None:
@@ -196,9 +199,9 @@ class _Search:
         resolved = area / 2 / geometry.h / max(1.0, geometry.size_ratio) >= _FEWEST_FACETS
         return curve if resolved or max(m.delta for m in steps) <= 0 else None, level
 
-    def _started(self, joint: Joint) -> None:
-        self.dofs = joint.n_dofs
-        self.on_start(joint)
+    def _started(self, system: System) -> None:
+        self.dofs = system.n_dofs
+        self.on_start(system)
 
     def _tell(self, level: Level) -> None:
         self.levels.append(level)

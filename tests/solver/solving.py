@@ -36,7 +36,7 @@ def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Sol
     def target_done(step, position):
         profiles = arc_profiles(joint)
         solution.profiles.append(profiles)
-        solution.steps.append(measure(joint, solution.steps, step, profiles.values(), work, 0.0))
+        solution.steps.append(measure(joint, solution.steps, step, profiles.values(), work.total, 0.0))
 
     march(
         joint.load_path(coarse=coarse_start(joint)),

@@ -1,0 +1,101 @@
+"""The contact along the surfaces of a problem: points, pressure and gap, with the pressure projected facet by facet.
+
+The raw pressure at quadrature points scatters inside plastic facets, its integrals over facets do not: what is reported
+is built from them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from archord.materials.material import Array
+
+if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solver
+    from archord.solver.system import System
+
+PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
+
+
+@dataclass(frozen=True)
+class EdgeProfile:
+    """One surface's contact state at ``q`` points of its ``n`` facets, on every rank."""
+
+    s: Array  # (n, q) arc length along the curve
+    weight: Array  # (n, q) measure
+    coordinates: Array  # (n, q, 2) deformed
+    pressure: Array  # (n, q) positive in compression; projected: linear on each facet, with the facet's force
+    raw_pressure: Array  # (n, q) as integrated by the solver
+    gap: Array  # (n, q) positive when open
+
+    @property
+    def width(self) -> Array:
+        """Length ``(n,)`` of each facet."""
+        return self.weight.sum(axis=1)
+
+    @property
+    def facet_force(self) -> Array:
+        """Integral of the pressure over each facet ``(n,)``."""
+        return (self.weight * self.raw_pressure).sum(axis=1)
+
+    @property
+    def in_contact(self) -> Array:
+        """Share ``(n,)`` of each facet that carries pressure."""
+        return (self.weight * (self.raw_pressure > 0)).sum(axis=1) / self.width
+
+
+@dataclass(frozen=True)
+class SurfaceProfile(EdgeProfile):
+    """As `EdgeProfile`, with the undeformed points."""
+
+    X: Array  # (n, q, 2)
+
+    @property
+    def contact_length(self) -> float:
+        """Length of the surface under pressure."""
+        return float((self.in_contact * self.width).sum())
+
+    @property
+    def largest(self) -> tuple[float, Array]:
+        """Largest projected pressure, and the undeformed place ``(2,)`` where it is."""
+        at = np.unravel_index(np.argmax(np.where(self.raw_pressure > 0, self.pressure, 0.0)), self.pressure.shape)
+        return max(float(self.pressure[at]), 0.0), self.X[at]
+
+    @property
+    def n_arcs(self) -> int:
+        """Number of separate stretches under pressure."""
+        closed = self.in_contact > 0
+        apart = np.linalg.norm(self.X[1:, 0] - self.X[:-1, -1], axis=1) > self.width.max()  # between pieces
+        begins = np.append(closed[:1], closed[1:] & (~closed[:-1] | apart)).sum()
+        whole = np.linalg.norm(self.X[0, 0] - self.X[-1, -1]) < self.width.max()
+        return int(max(begins - (whole and closed[0] and closed[-1]), 0)) or int(closed.any())
+
+
+def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
+    """Contact state along the integrated surfaces, by name, at the last evaluation. Collective."""
+    u, found = system.equilibrium.displacement(), {}
+    for name, side in system.sides.items():
+        pair = system.contact.pair_of(side)
+        if pair is None:  # it is not integrated
+            continue
+        displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
+        local = np.zeros((side.n_facets, side.weight.shape[1], 7))
+        at_points = (side.weight[..., None], displaced, side.point, pair.pressure[..., None], pair.distance[..., None])
+        local[side.facet] = np.concatenate(at_points, axis=-1)
+        whole = side.sum_over_ranks(local)
+        weight, coordinates, X = whole[..., 0], whole[..., 1:3], whole[..., 3:5]
+        s = side.curve.arc_length(side.curve_xi)
+        pressure = project(whole[..., 5], s, weight)
+        found[name] = SurfaceProfile(s, weight, coordinates, pressure, whole[..., 5], whole[..., 6], X)
+    return found
+
+
+def project(pressure: Array, s: Array, weight: Array) -> Array:
+    """L2 projection ``(n, q)`` of ``pressure`` onto one linear function a facet; facet integrals are kept exactly."""
+    total = weight.sum(axis=1, keepdims=True)
+    mean = (weight * pressure).sum(axis=1, keepdims=True) / total
+    lever = s - (weight * s).sum(axis=1, keepdims=True) / total
+    slope = (weight * lever * pressure).sum(axis=1, keepdims=True) / (weight * lever**2).sum(axis=1, keepdims=True)
+    return mean + slope * lever

@@ -1,0 +1,152 @@
+"""A general scene, checked: a problem of bodies in contact, in words."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from archord.scene.keys import key, require
+from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Path, ProblemAnalysis, Support
+from archord.scene.scene import Checked
+from archord.scene.sections import MOST_STEPS, Output, Stepping, Units
+
+FORMAT = 2
+
+
+class ProblemScene(Checked):
+    """Bodies on a mesh, what they touch, what holds them and what loads them.
+
+    As `Scene`, of sections; `[[body]]` and its like are lists of tables. Raises `InputError`.
+    """
+
+    newest: ClassVar[int] = FORMAT
+    format: Literal[2] = key("version of the scene format", default=FORMAT)
+    units: Units = Field(default_factory=Units, description="names of the units")
+    mesh: Mesh = Field(description="the mesh")
+    body: list[Body] = Field(description="deformable bodies", min_length=1)
+    interaction: list[Interaction] = Field(default_factory=list, description="contact and ties")
+    coupling: list[Coupling] = Field(default_factory=list, description="reference points")
+    support: list[Support] = Field(default_factory=list, description="what is held")
+    load: list[Load] = Field(description="what moves or presses", min_length=1)
+    path: Path = Field(default_factory=Path, description="stages and steps of the loads")
+    analysis: ProblemAnalysis = Field(default_factory=ProblemAnalysis, description="model and solver")
+    stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
+    output: Output = Field(default_factory=Output, description="what is written")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ProblemScene:
+        for section in ("body", "interaction", "coupling", "support", "load"):
+            counted = Counter(part.name for part in getattr(self, section))
+            twice = [name for name, count in counted.items() if count > 1]
+            require(not twice, section, f"must have different names, but {twice} stand more than once")
+        taken = Counter([*(c.name for c in self.coupling), *(i.name for i in self.interaction if i.rigid)])
+        twice = [name for name, count in taken.items() if count > 1]
+        require(not twice, "coupling", f"must not share the names {twice} with rigid discs")
+        both = [load.name for load in self.load if load.name in {s.name for s in self.support}]
+        require(not both, "load", f"must not share the names {both} with supports")
+        used = [name for i in self.interaction for name in i.surfaces]
+        many = [name for name, count in Counter(used).items() if count > 1]
+        require(not many, "interaction", f"uses the facet sets {many} more than once")
+        self._directions()
+        steps = self.path.steps
+        n = self.n_stages
+        fits = not isinstance(steps, list) or len(steps) == n
+        require(fits, "path.steps", f"must have one number for each of the {n} stages")
+        require(len(self.targets) <= MOST_STEPS, "path.steps", f"must not add up to more than {MOST_STEPS} steps")
+        return self
+
+    def _directions(self) -> None:
+        """Raise ValueError where one direction of one place is held or loaded twice, or turns what cannot turn."""
+        couplings, discs = {c.name for c in self.coupling}, {i.name for i in self.interaction if i.rigid}
+        seen: dict[tuple[str, str], str] = {}
+        parts = [("support", s.name, s.on, f) for s in self.support for f in s.fixed]
+        parts += [("load", q.name, q.on, q.direction) for q in self.load if q.direction]
+        for section, name, on, freedom in parts:
+            at = (section, name, "fixed" if section == "support" else "direction")
+            turns = freedom != "rotation" or on in couplings
+            require(turns, at, f'must be "x" or "y": {on!r} is no coupling, which alone has a rotation')
+            before = seen.get((on, freedom))
+            said = f"repeats {freedom!r} of {on!r}, which {before} holds or loads already"
+            require(before is None or on not in couplings | discs, at, said)
+            seen[on, freedom] = f"the {section} {name!r}"
+        for load in self.load:
+            free = load.kind != "pressure" or load.on not in couplings | discs
+            require(free, ("load", load.name, "on"), "must be a facet set for a pressure")
+
+    @property
+    def n_stages(self) -> int:
+        """How many stages the loads have."""
+        return max(len(load.stages) for load in self.load)
+
+    @property
+    def fits(self) -> bool:
+        """Whether a stage comes before them in which interferences arise."""
+        return any(i.interference or i.overlap for i in self.interaction)
+
+    def values(self, load: Load) -> tuple[float, ...]:
+        """Values of ``load`` at load factors 0, 1, 2, ..., the ends of all stages."""
+        given = [*load.stages, *[load.stages[-1]] * (self.n_stages - len(load.stages))]
+        return (0.0,) * (1 + self.fits) + tuple(given)
+
+    @property
+    def targets(self) -> list[float]:
+        """The load factor at every output step; stage k ends at k."""
+        steps = self.path.steps
+        each = steps if isinstance(steps, list) else [steps] * self.n_stages
+        counts = [self.path.fit_steps] * self.fits + each
+        return [stage + k / n for stage, n in enumerate(counts) for k in range(1, n + 1)]
+
+    @property
+    def travelled(self) -> list[list[float]]:
+        """Load factor and value of every load at every output step: what two scenes share as far as they agree."""
+        table = [np.interp(self.targets, range(len(v)), v) for v in map(self.values, self.load)]
+        return [[float(v) for v in row] for row in np.column_stack([self.targets, *table])]
+
+    @property
+    def steps_numbered(self) -> bool:
+        """Whether results name steps by number: no, by the load factor."""
+        return False
+
+    @property
+    def loaded_by(self) -> Any:
+        """What a run must be loaded by to be continued with this scene."""
+        return [(load.name, load.on, load.direction, load.kind) for load in self.load]
+
+    @property
+    def accurate(self) -> str:
+        """Name of what an accuracy is asked of."""
+        return f"{self.load[-1].name} {'displacement' if self.load[-1].kind == 'force' else 'force'}"
+
+    @property
+    def loading(self) -> str:
+        """The loads in words."""
+        return "load " + ", ".join(f'"{load.name}"' for load in self.load)
+
+    @property
+    def loads_said(self) -> str:
+        """Values and steps in words."""
+        return f"{[load.stages for load in self.load]} and {self.path.steps}"
+
+    @property
+    def thickness(self) -> float:
+        """Thickness, 1 if forces are per unit thickness."""
+        return self.analysis.thickness or 1.0
+
+    @property
+    def force_unit(self) -> str:
+        """Unit of forces."""
+        return self.units.force_of(self.analysis.thickness)
+
+    @property
+    def plastic(self) -> bool:
+        """Whether any body can yield."""
+        return any(body.yield_stress is not None for body in self.body)
+
+
+def is_problem(data: Mapping[str, Any]) -> bool:
+    """Whether ``data`` is meant as a general scene."""
+    return "joint" not in data and not {"mesh", "body", "interaction"}.isdisjoint(data)
