@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Body", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LinearHardening", "Load",
-    "Problem", "ProblemScene", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System", "TabularHardening", "VoceHardening",
-    "gmsh_to_mesh", "load", "load_scene", "solve",
+    "Problem", "ProblemScene", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System",
+    "TabularHardening", "VoceHardening", "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
     "gmsh_to_mesh": "archord.geometry.meshes.fenicsx",

@@ -1,7 +1,6 @@
-"""The contact pressure along the arcs: per-facet projection, peak and contact angle.
+"""The contact pressure along the arcs of a joint: peak and contact angle.
 
-The raw pressure at quadrature points scatters inside plastic facets, its integrals over facets do not: everything here
-is built from them. Angles and arc lengths are measured on the undeformed arcs from the contact axis.
+Angles and arc lengths are measured on the undeformed arcs from the contact axis.
 """
 
 from __future__ import annotations

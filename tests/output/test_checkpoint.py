@@ -7,7 +7,7 @@ from mpi4py import MPI
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.output import checkpoint
 from archord.presets.joint import Joint
-from archord.presets.measures import Work
+from archord.presets.measures import Measures, Work
 from archord.scene.errors import InputError
 from archord.solver.load_path import Position
 from archord.solver.mesh_order import MeshOrder
@@ -60,7 +60,8 @@ def test_the_state_comes_back_on_any_ranks(comm, pressed, cut):
         assert (np.diff(number) > 0).all()
         assert np.array_equal(together[place][0], number)
         assert together[place][1] == pytest.approx(x, abs=1e-12)
-    again = checkpoint.halt(order, "scene", *checkpoint.resume(order, "path", pressed if comm.rank == 0 else None))
+    measures, *rest = checkpoint.resume(order, "path", pressed if comm.rank == 0 else None)
+    again = checkpoint.halt(order, "scene", Measures(**measures), *rest)
     if comm.rank == 0:
         assert (again.mesh, again.scalars, set(again.arrays)) == (pressed.mesh, pressed.scalars, set(pressed.arrays))
         for name, values in pressed.arrays.items():
