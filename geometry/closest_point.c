@@ -55,7 +55,7 @@ static double closest_on_facet(int p, const double *coefficients, const double *
     return xi;
 }
 
-int32_t closest_points(int32_t m, const double *x, const double *outward, int32_t n_facets, int32_t p,
+int32_t closest_points(int32_t m, const double *x, const double *outward, int32_t n_facets, int32_t closed, int32_t p,
                        const double *X, const double *coefficients, const int32_t *home, int32_t reach, double margin,
                        double end_margin, int32_t steps, int32_t *facet, double *xi, double *point, double *normal, double *tangent,
                        double *bend, double *shape, double *slope, uint8_t *slides, uint8_t *found, int32_t *lost)
@@ -65,10 +65,11 @@ int32_t closest_points(int32_t m, const double *x, const double *outward, int32_
         double least = INFINITY, N[MOST], dN[MOST], low_best = 0, high_best = 1;
         for (int32_t away = -reach; away <= reach; away++) {
             const int32_t wanted = home[i] + away;
-            const int32_t k = wanted < 0 ? 0 : wanted >= n_facets ? n_facets - 1 : wanted;
-            const double low = k == 0 ? -end_margin : -margin;
-            const double high = 1 + (k == n_facets - 1 ? end_margin : margin);
-            const double start = k < home[i] ? 1.0 : k > home[i] ? 0.0 : 0.5;
+            const int32_t inside = wanted < 0 ? 0 : wanted >= n_facets ? n_facets - 1 : wanted;
+            const int32_t k = closed ? (wanted + n_facets) % n_facets : inside;
+            const double low = k == 0 && !closed ? -end_margin : -margin;
+            const double high = 1 + (k == n_facets - 1 && !closed ? end_margin : margin);
+            const double start = k == home[i] ? 0.5 : away < 0 ? 1.0 : 0.0;
             const double at = closest_on_facet(p, coefficients, X + 2 * p * k, x, start, low, high, steps);
             const Frame f = frame(p, coefficients, X + 2 * p * k, at, N, dN);
             const double d2 = (x[0] - f.y[0]) * (x[0] - f.y[0]) + (x[1] - f.y[1]) * (x[1] - f.y[1]);
@@ -82,8 +83,8 @@ int32_t closest_points(int32_t m, const double *x, const double *outward, int32_
         const double d[2] = {x[0] - f.y[0], x[1] - f.y[1]};
         const double along = (d[0] * f.t[0] + d[1] * f.t[1]) / (speed * speed); /* what is left of the Newton step */
         const int clamped = xi[i] <= low_best || xi[i] >= high_best;
-        const int beyond = (k == 0 && xi[i] <= -end_margin && along < 0)
-                           || (k == n_facets - 1 && xi[i] >= 1 + end_margin && along > 0);
+        const int beyond = !closed && ((k == 0 && xi[i] <= -end_margin && along < 0)
+                                       || (k == n_facets - 1 && xi[i] >= 1 + end_margin && along > 0));
         double *n = normal + 2 * i;
         n[0] = f.t[1] / speed, n[1] = -f.t[0] / speed;
         for (int j = 0; j < 2; j++) point[2 * i + j] = f.y[j], tangent[2 * i + j] = f.t[j];

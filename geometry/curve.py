@@ -53,12 +53,13 @@ def lagrange(degree: int) -> Array:
 
 
 class Curve:
-    """A chain of ``n`` polynomial facets with nodes ``X`` ``(n p + 1, 2)``."""
+    """A chain of ``n`` polynomial facets with nodes ``X`` ``(n p + 1, 2)``; ``closed`` if the last is the first."""
 
     def __init__(self, X: Array, degree: int) -> None:
         self.X = X
         self.degree = degree
         self.n_facets = (len(X) - 1) // degree
+        self.closed = self.n_facets > 2 and np.array_equal(X[0], X[-1])
         self.connectivity = (np.arange(self.n_facets)[:, None] * degree + np.arange(degree + 1)).astype(np.int32)
         self._coefficients = lagrange(degree)
 
@@ -110,6 +111,8 @@ class Curve:
         home = self.nearest_facet(x, displacement) if start is None else start
         found = self._project(x, outward, displacement, home)
         step = found.facet - home
+        if self.closed:
+            step = (step + 1) % self.n_facets - 1
         away = ((step == -1) & (found.xi <= 0)) | ((step == 1) & (found.xi >= 1))
         if away.any():
             if start is None:
@@ -133,8 +136,8 @@ class Curve:
         curve: tuple[np.ndarray, ...] = (self.X + displacement, self._coefficients, home)
         results: tuple[np.ndarray, ...] = (facet, xi, point, normal, tangent, bend, shape, slope, slides, found, lost)
         n_lost = library(Path(__file__).with_name("closest_point.c")).closest_points(
-            m, pointer(x), pointer(outward), self.n_facets, self.degree, *map(pointer, curve), reach, margin,
-            _END_MARGIN, _NEWTON_STEPS, *map(pointer, results),
+            m, pointer(x), pointer(outward), self.n_facets, self.closed, self.degree, *map(pointer, curve), reach,
+            margin, _END_MARGIN, _NEWTON_STEPS, *map(pointer, results),
         )  # fmt: skip
         if n_lost:
             at = "({:g}, {:g})".format(*x[lost[0]])
@@ -146,7 +149,7 @@ class Curve:
 class RigidCircle:
     """A rigid disc of the given centre and radius, as an opposite curve of one facet with one node, which moves it."""
 
-    n_facets = 1
+    n_facets, closed = 1, False
 
     def __init__(self, centre: Array, radius: float) -> None:
         self.centre = np.asarray(centre, dtype=float)

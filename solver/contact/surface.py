@@ -130,7 +130,7 @@ class Surface:
 
     def add_to_owned(self, curve_force: Array, force: Array) -> None:
         """Add nodal forces ``(n_nodes, 2)`` of the whole curve to this rank's owned ``force`` ``(n, 2)``."""
-        force[self._owned_local] += curve_force[self._owned]
+        np.add.at(force, self._owned_local, curve_force[self._owned])  # a closed curve ends with its first node
 
     def deform(self, u: Array) -> tuple[Array, Array, Array]:
         """Own displacement ``(n q, 2)``, stress ``(n q, 4)`` and tangent ``(n q, 3, 3)`` at the contact points."""
@@ -157,10 +157,11 @@ class RigidSurface:
         return self.motion
 
 
-def neighbours(n: int, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
-    """``facets`` ``(m,)`` and those within some ``rings`` around, on a surface of ``n`` facets: places ``(k,)`` in
-    ``facets`` and neighbours."""
+def neighbours(n: int, facets: np.ndarray, rings: int, closed: bool) -> tuple[np.ndarray, np.ndarray]:
+    """``facets`` ``(m,)`` and those within some ``rings`` around, on a surface of ``n`` facets, perhaps a ``closed``
+    one: places ``(k,)`` in ``facets`` and neighbours."""
     near = facets[:, None] + np.arange(-rings, rings + 1)
+    near = near % n if closed else near
     inside = np.nonzero((near >= 0) & (near < n))
     return inside[0], near[inside]
 
