@@ -6,10 +6,12 @@ and the symmetry axis is x = 0. The ring's outer edge is held.
 
 from __future__ import annotations
 
+import math
+
 from mpi4py import MPI
 
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Cells, Drawing, Facets, mesh_joint
+from archord.geometry.shapes.joint_mesh import Drawing, mesh_joint
 
 
 def half_ring(
@@ -41,21 +43,22 @@ def half_ring(
 
         bottom, top, pin_arcs = half_circle(1.0)
         axis = [geo.addLine(top, centre), geo.addLine(centre, bottom)]
-        faces = {Cells.PIN: geo.addPlaneSurface([geo.addCurveLoop([*pin_arcs, *axis])])}
+        pin = geo.addPlaneSurface([geo.addCurveLoop([*pin_arcs, *axis])])
         bottom, top, hole_arcs = half_circle(hole)
         low, high, edge = half_circle(outer)
         below, above = geo.addLine(low, bottom), geo.addLine(top, high)
         loop = [*hole_arcs, above, *(-arc for arc in reversed(edge)), below]
-        faces[Cells.BLOCK] = geo.addPlaneSurface([geo.addCurveLoop(loop)])
-        lines = {Facets.PIN_ARC: pin_arcs, Facets.HOLE_ARC: hole_arcs, Facets.BLOCK_HELD: edge}
-        lines[Facets.SYMMETRY] = [*axis, below, above]
-        arcs = {Facets.PIN_ARC: size_ratio * size, Facets.HOLE_ARC: size}
+        faces = {"pin": [pin], "block": [geo.addPlaneSurface([geo.addCurveLoop(loop)])]}
+        lines = {"pin": pin_arcs, "hole": hole_arcs, "pin top": [], "block held": edge}
+        lines["symmetry"] = [*axis, below, above]
+        arcs = {"pin": size_ratio * size, "hole": size}
         from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
         from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
         on_arcs = zip(faces, arcs.values(), strict=True)
         sizes = {body: f"Min({on_arc!r} + {from_arc}, {from_core})" for body, on_arc in on_arcs}
-        return Drawing(faces, sizes, lines, arcs)
+        parts = {line: math.pi / 2 / size for arc, size in arcs.items() for line in lines[arc]}
+        return Drawing(faces, sizes, lines, parts)
 
-    circles = {Facets.PIN_ARC: (0.0, 1.0), Facets.HOLE_ARC: (0.0, hole), Facets.BLOCK_HELD: (0.0, outer)}
+    circles = {"pin": (0.0, 0.0, 1.0), "hole": (0.0, 0.0, hole), "block held": (0.0, 0.0, outer)}
     key = ("half ring", hole, outer, size, growth, core, size_ratio)
     return mesh_joint(comm, draw, circles, key, radius=radius, **options)

@@ -4,8 +4,10 @@ radius whatever the units of the scene, so meshes do not depend on them."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
+from itertools import pairwise
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -41,22 +43,25 @@ class Facets(_Set):
 
 
 class Drawing(NamedTuple):
-    """A joint in gmsh: its faces, their element sizes (expressions in x and y), its lines, and the size of the equal
-    edges on sets of them that are quarter circles of about unit radius."""
+    """A joint in gmsh: the ``faces`` and the element size (an expression in x and y) of every body, the ``lines`` of
+    every set, how many equal edges a line has at least (``parts``), and the corners of faces that are cut into a
+    ``grid``. Sets have the numbers 1, 2, ... in the order of their names here; they may be empty."""
 
-    faces: dict[Cells, int]
-    sizes: dict[Cells, str]
-    lines: dict[Facets, list[int]]
-    arcs: dict[Facets, float]
+    faces: Mapping[str, list[int]]
+    sizes: Mapping[str, str]
+    lines: Mapping[str, list[int]]
+    parts: Mapping[int, float]
+    grid: Mapping[int, list[int]] = MappingProxyType({})
 
 
+Place = tuple[float, float]
 _CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
 
 
 def mesh_joint(
     comm: MPI.Comm,
     draw: Callable[..., Drawing],
-    circles: dict[Facets, tuple[float, float]],
+    circles: Mapping[str, tuple[float, float, float]],
     key: tuple,
     *,
     radius: float,
@@ -66,42 +71,78 @@ def mesh_joint(
 ) -> TaggedMesh:
     """Mesh what ``draw(gmsh.model.geo)`` returns, times ``radius``.
 
-    ``circles`` are the heights of the centre and the radii of sets of arcs, on which all their nodes are put; ``key``
-    is all that enters the drawing. The mesh is made with larger elements, which are then cut in four as often as
+    ``circles`` are the centres (x, y) and the radii of sets of arcs, on which all their nodes are put; ``key`` is all
+    that enters the drawing. The mesh is made with larger elements, which are then cut in four as often as
     ``refinements`` says: much quicker. ``partitioner`` is a dolfinx cell partitioner (tests cut meshes in unusual
     ways). Collective over ``comm``; rank 0 meshes.
     """
 
+    names: list[str] = []
+
     def build(gmsh) -> None:
         drawn, coarser, mesh = draw(gmsh.model.geo), 2.0**refinements, gmsh.model.mesh
         gmsh.model.geo.synchronize()
-        for facets, size in drawn.arcs.items():
-            for line in drawn.lines[facets]:
-                mesh.setTransfiniteCurve(line, max(2, math.ceil(math.pi / 2 / (coarser * size))) + 1)
-        for body, face in drawn.faces.items():
-            gmsh.model.addPhysicalGroup(2, [face], body, body.set_name)
-        for facets, lines in drawn.lines.items():
-            gmsh.model.addPhysicalGroup(1, lines, facets, facets.set_name)
+        names.extend(drawn.lines)
+        for line, parts in drawn.parts.items():
+            mesh.setTransfiniteCurve(line, max(2, math.ceil(parts / coarser)) + 1)
+        for face, corners in drawn.grid.items():
+            mesh.setTransfiniteSurface(face, "AlternateLeft", corners)
+        for dim, sets in ((2, drawn.faces), (1, drawn.lines)):
+            for tag, (name, entities) in enumerate(sets.items(), 1):
+                if entities:
+                    gmsh.model.addPhysicalGroup(dim, entities, tag, name)
+        of_size: dict[str, list[int]] = {}
+        for body, faces in drawn.faces.items():
+            if faces:
+                of_size.setdefault(drawn.sizes[body], []).extend(faces)
         fields = []
-        for expression in dict.fromkeys(drawn.sizes[body] for body in drawn.faces):
+        for expression, faces in of_size.items():
             fields.append(mesh.field.add("MathEval"))
             mesh.field.setString(fields[-1], "F", f"{coarser!r} * ({expression})")
-        if len(fields) > 1:
-            for i, face in enumerate(drawn.faces.values()):
-                whole, fields[i] = fields[i], mesh.field.add("Restrict")
-                mesh.field.setNumber(fields[i], "InField", whole)
-                mesh.field.setNumbers(fields[i], "SurfacesList", [face])
-            fields.append(mesh.field.add("Min"))
-            mesh.field.setNumbers(fields[-1], "FieldsList", fields[:-1])
-        mesh.field.setAsBackgroundMesh(fields[-1])
+            if len(of_size) > 1:
+                whole, fields[-1] = fields[-1], mesh.field.add("Restrict")
+                mesh.field.setNumber(fields[-1], "InField", whole)
+                mesh.field.setNumbers(fields[-1], "SurfacesList", faces)
+        smallest = mesh.field.add("Min")
+        mesh.field.setNumbers(smallest, "FieldsList", fields)
+        mesh.field.setAsBackgroundMesh(smallest)
 
     def exact(x: Array, tag: int) -> Array:
-        return on_circle(x, *circles[Facets(tag)]) if tag in circles else x
+        *centre, r = circles.get(names[tag - 1], (0.0, 0.0, 0.0))
+        return on_circle(x, centre, r) if r else x
 
     how = {"order": degree, "refinements": refinements, "partitioner": partitioner}
     joint = gmsh_to_mesh(comm, build, exact, **how, key=key)
     joint.mesh.geometry.x[:] *= radius
     return joint
+
+
+class Pen:
+    """Draws one body with gmsh's ``geo``: every point, line and arc once, by its ends."""
+
+    def __init__(self, geo) -> None:
+        self._geo = geo
+        self._points: dict[Place, int] = {}
+        self._lines: dict[tuple[Place, Place], int] = {}
+
+    def point(self, x: float, y: float) -> int:
+        """The point (x, y)."""
+        if (x, y) not in self._points:
+            self._points[x, y] = self._geo.addPoint(x, y, 0)
+        return self._points[x, y]
+
+    def path(self, *places: Place, centre: Place | None = None) -> list[int]:
+        """The lines from each place to the next, or arcs around a ``centre``."""
+        for ends in pairwise(places):
+            if ends not in self._lines:
+                a, b = (self.point(*end) for end in ends)
+                arc = centre and self._geo.addCircleArc(a, self.point(*centre), b)
+                self._lines[ends] = self._lines[ends[::-1]] = arc or self._geo.addLine(a, b)
+        return [self._lines[ends] for ends in pairwise(places)]
+
+    def face(self, *paths: list[int]) -> int:
+        """The face within ``paths`` that together are closed, in whatever direction each line goes."""
+        return self._geo.addPlaneSurface([self._geo.addCurveLoop([line for path in paths for line in path], -1, True)])
 
 
 def refinements(cells: float) -> int:
@@ -112,11 +153,10 @@ def refinements(cells: float) -> int:
     return sum(cells > limit for limit in _CUT_ABOVE)
 
 
-def on_circle(x: Array, height: float, radius: float) -> Array:
-    """Points ``x`` ``(n, 2)`` moved along their rays from ``(0, height)`` to exact ``radius``.
+def on_circle(x: Array, centre: Sequence[float], radius: float) -> Array:
+    """Points ``x`` ``(n, 2)`` moved along their rays from the ``centre`` to exact ``radius``.
 
     The clearance is a small difference of large numbers, which the rounding of a mesh generator would spoil.
     """
-    centre = np.array([0.0, height])
-    ray = x - centre
+    ray = x - np.asarray(centre)
     return ray * (radius / np.linalg.norm(ray, axis=1))[:, None] + centre

@@ -210,7 +210,9 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float, **options) 
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
     radii = {INNER: a, OUTER: b}
-    return gmsh_to_mesh(comm, build, lambda x, tag: on_circle(x, 0.0, radii[tag]) if tag in radii else x, **options)
+    return gmsh_to_mesh(
+        comm, build, lambda x, tag: on_circle(x, (0.0, 0.0), radii[tag]) if tag in radii else x, **options
+    )
 
 
 def solve(problem: Problem, loads) -> System:
