@@ -7,7 +7,7 @@ import pytest
 from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 
-from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.geometry.shapes.lug import lug
 from archord.solver.problem import Body, Interaction, Problem, Support
 from archord.solver.system import System
@@ -24,9 +24,9 @@ def made(width=WIDTH, edge=EDGE, size=SIZE, comm=MPI.COMM_SELF, scale=1.0, **opt
 
 def area(joint, body, comm=MPI.COMM_SELF):
     cells = joint.cells_in(body)
-    X, w = bulk_quadrature(joint.mesh.geometry.cmap.degree)
-    n_owned = joint.mesh.topology.index_map(2).size_local
-    basis = cell_basis(joint.mesh, joint.mesh.geometry.cmap.degree, cells[cells < n_owned], X)
+    degree, n_owned = joint.mesh.geometry.cmap.degree, joint.mesh.topology.index_map(2).size_local
+    X, w = bulk_quadrature(TRIANGLE, degree)
+    basis = cell_basis(joint.mesh, degree, cells[cells < n_owned], X)
     return comm.allreduce(float((basis.measure @ w).sum()))
 
 
