@@ -1,8 +1,8 @@
 """A run as files for other programs: CSV tables for anything, and .vtu files for VTK's readers (ParaView, pyvista).
 
-In VTK the bodies keep their curved second-order triangles (VTK_QUADRATIC_TRIANGLE) with the nodal displacement and the
-means of the cells. The contact is a line through the integration points of each facet, undeformed like the mesh, with
-the pressure, the gap and the displacement of the points, so that the same filters deform both.
+In VTK the bodies keep their curved second-order cells (VTK_QUADRATIC_TRIANGLE, VTK_BIQUADRATIC_QUAD) with the nodal
+displacement and the means of the cells. The contact is a line through the integration points of each facet, undeformed
+like the mesh, with the pressure, the gap and the displacement of the points, so that the same filters deform both.
 """
 
 from __future__ import annotations
@@ -73,10 +73,10 @@ def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool =
 
 
 def _bodies(fields: Fields) -> dict:
-    """Both bodies: points, second-order triangles and their data, as meshio takes them."""
+    """All bodies: points, second-order cells and their data, as meshio takes them."""
     return {
         "points": np.pad(fields.coordinates, ((0, 0), (0, 1))),
-        "cells": [("triangle6", fields.cells)],
+        "cells": [({6: "triangle6", 9: "quad9"}[fields.cells.shape[1]], fields.cells)],
         "point_data": {"displacement": np.pad(fields.displacement, ((0, 0), (0, 1)))},
         "cell_data": {"body": [fields.body], **{name: [value] for name, value in fields.cell_fields().items()}},
     }

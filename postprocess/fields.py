@@ -24,8 +24,12 @@ from archord.scene.scene import Scene
 
 BODIES = {"pin": 1, "block": 2}
 CELL_FIELDS = ("von_mises", "mean_stress", "peeq", "contact_state", "contact_pressure")
-SUBTRIANGLES = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]  # of a VTK second-order triangle
-_EDGES = [[0, 3, 1], [1, 4, 2], [2, 5, 0]]  # of a VTK second-order triangle, along it
+# Of VTK's second-order cells by their nodes: straight triangles to draw them by, and the edges, each along it
+_SUBTRIANGLES = {
+    6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
+    9: [[0, 4, 8], [4, 1, 8], [1, 5, 8], [5, 2, 8], [2, 6, 8], [6, 3, 8], [3, 7, 8], [7, 0, 8]],
+}
+_EDGES = {6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]], 9: [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]]}
 _VISIBLE = 0.1  # clearance over R, as drawn
 _FARTHEST = 0.2  # displacement and clearance over R, as drawn
 _NEAR = 3.0  # radii within which displacements count
@@ -33,17 +37,17 @@ _NEAR = 3.0  # radii within which displacements count
 
 @dataclass(frozen=True)
 class Fields:
-    """Half of the joint (x >= 0) at one step: ``n`` nodes and ``m`` curved triangles of second order.
+    """Half of the joint (x >= 0) at one step: ``n`` nodes and ``m`` curved cells of second order.
 
-    ``cells`` has VTK's order: three corners, then the nodes between the first two, the next two, and the last and the
-    first. Stress is positive in tension, contact pressure in compression; `peeq` is None where no body can yield. All
-    in the scene's units.
+    ``cells`` has VTK's order: three or four corners, then the nodes between the first two, the next two, and the last
+    and the first, and that in the middle of four. Stress is positive in tension, contact pressure in compression;
+    `peeq` is None where no body can yield. All in the scene's units.
     """
 
     step: int
     delta: float
     coordinates: Array  # (n, 2) undeformed
-    cells: np.ndarray  # (m, 6)
+    cells: np.ndarray  # (m, 6), or (m, 9) of quadrilaterals
     body: np.ndarray  # (m,) 1 pin, 2 block
     displacement: Array  # (n, 2)
     von_mises: Array  # (m,) means of cells, like the following
@@ -69,9 +73,14 @@ class Fields:
         values = {name: getattr(self, name) for name in CELL_FIELDS}
         return {name: value for name, value in values.items() if value is not None}
 
+    @property
+    def triangles(self) -> np.ndarray:
+        """Nodes ``(m, k, 3)`` of the straight triangles that every cell is drawn by."""
+        return self.cells[:, _SUBTRIANGLES[self.cells.shape[1]]]
+
     def outline(self) -> np.ndarray:
         """Edges ``(k, 3)`` on the boundary of the bodies: first node, the one between, last node."""
-        edges = self.cells[:, _EDGES].reshape(-1, 3)
+        edges = self.cells[:, _EDGES[self.cells.shape[1]]].reshape(-1, 3)
         _, first, count = np.unique(np.sort(edges[:, [0, 2]], axis=1), axis=0, return_index=True, return_counts=True)
         return edges[first[count == 1]]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.curve import gap_name
-from archord.postprocess.fields import SUBTRIANGLES, Fields, magnification, magnified, rigid_arc
+from archord.postprocess.fields import Fields, magnification, magnified, rigid_arc
 from archord.postprocess.run import Run
 from archord.scene.scene import Scene
 
@@ -81,8 +81,9 @@ def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
     # in a ring the core on which the load acts does not count for the range of colours
     away = np.hypot(*fields.coordinates[fields.cells[:, :3]].mean(axis=1).T) > (R / 2 if ring else 0)
     drawn = axes.tripcolor(
-        *x.T, fields.cells[near][:, SUBTRIANGLES].reshape(-1, 3),
-        facecolors=np.repeat(values[near], len(SUBTRIANGLES)), cmap=cmap, vmin=0, vmax=values[away].max() or None,
+        *x.T, fields.triangles[near].reshape(-1, 3),
+        facecolors=np.repeat(values[near], fields.triangles.shape[1]), cmap=cmap,
+        vmin=0, vmax=values[away].max() or None,
     )  # fmt: skip
     cut = "max" if values[near].max() > drawn.norm.vmax else "neither"
     axes.figure.colorbar(drawn, ax=axes, label=label, shrink=0.85, extend=cut)

@@ -12,7 +12,7 @@ import hashlib
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.basis import Array
+from archord.geometry.basis import Array, tabulate
 from archord.materials.material import Points
 from archord.solver.system import System
 
@@ -41,26 +41,36 @@ class Gather:
 class MeshOrder:
     """The generator's order of the nodes and cells of ``system``. Collective.
 
-    ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, a)`` are the mesh in that order, on rank 0.
+    ``coordinates`` ``(n, 3)`` and ``nodes_of_cell`` ``(n, a)`` are the mesh in that order, on rank 0. Nodes are the
+    displacement's: where the geometry is of another order, they come as the cells first name them.
     """
 
     def __init__(self, system: System) -> None:
-        self.system = system
-        mesh, V = system.problem.mesh.mesh, system.V
+        self.system, V = system, system.V
+        mesh, geometry, dofs = V.mesh, V.mesh.geometry, V.dofmap.list
         self.n_cells = mesh.topology.index_map(2).size_local
-        self._n_local = system.equilibrium.n_local
-        # displacement dof of every mesh node of this rank: both number the nodes of a cell alike
-        self._dof = np.zeros(len(mesh.geometry.x), dtype=np.int64)
-        self._dof[mesh.geometry.dofmap.ravel()] = V.dofmap.list.ravel()
-        self._n_owned = mesh.geometry.index_map().size_local
-        self._index = np.asarray(mesh.geometry.input_global_indices)
+        self._n_local, self._n_owned = system.equilibrium.n_local, V.dofmap.index_map.size_local
         self._cell_index = np.asarray(mesh.topology.original_cell_index)[: self.n_cells]
-        self._nodes = Gather(system.comm, self._index[: self._n_owned])
         self.cells = Gather(system.comm, self._cell_index)
-        self.coordinates = self._nodes(mesh.geometry.x[: self._n_owned])
-        cells = self.cells(self._index[mesh.geometry.dofmap[: self.n_cells]])
+        index, owned = np.asarray(geometry.input_global_indices), geometry.index_map().size_local
+        nodes = Gather(system.comm, index[:owned])
+        self.coordinates, cells = nodes(geometry.x[:owned]), self.cells(index[geometry.dofmap[: self.n_cells]])
         root = system.comm.rank == 0
-        self.nodes_of_cell = np.searchsorted(self._nodes.unique, cells) if root else cells
+        self.nodes_of_cell = np.searchsorted(nodes.unique, cells) if root else cells
+        if V.element.basix_element.degree == geometry.cmap.degree:  # both number the nodes of a cell alike
+            self._index = np.zeros(self._n_local, dtype=np.int64)
+            self._index[dofs] = index[geometry.dofmap]
+        else:
+            numbers = V.dofmap.index_map.local_to_global(np.arange(self._n_local, dtype=np.int32))
+            of_cells, first = self.cells(numbers[dofs[: self.n_cells]]), None
+            if root:
+                at = tabulate(mesh.basix_cell(), geometry.cmap.degree, V.element.basix_element.points)[0]
+                places = np.einsum("qa,nai->nqi", at, self.coordinates[self.nodes_of_cell]).reshape(-1, 3)
+                first = np.unique(of_cells, return_index=True)[1]
+                self.coordinates = places[np.sort(first)]
+                self.nodes_of_cell = np.searchsorted(np.sort(first), first[of_cells])
+            self._index = system.comm.bcast(first)[numbers]
+        self._nodes = Gather(system.comm, self._index[: self._n_owned])
 
     def mesh_digest(self) -> str:
         """SHA-256 of coordinates and cells, on rank 0."""
@@ -76,15 +86,13 @@ class MeshOrder:
 
     def collect(self, u: Array) -> Array:
         """Nodal values ``(n_local, k)`` of all ranks on rank 0, nothing elsewhere. Collective."""
-        return self._nodes(u[self._dof[: self._n_owned]])
+        return self._nodes(u[: self._n_owned])
 
     def spread(self, whole: Array | None) -> Array:
         """The inverse of `collect`: this rank's nodal values ``(n_local, k)``, ghosts included. Collective."""
         comm = self.system.comm
         index, values = comm.bcast((self._nodes.unique, whole) if comm.rank == 0 else None)
-        u = np.zeros((self._n_local, values.shape[1]))
-        u[self._dof] = values[np.searchsorted(index, self._index)]
-        return u
+        return values[np.searchsorted(index, self._index)]
 
     def collect_history(self) -> Arrays:
         """History of the points that have one, on rank 0: "history/PLACE/point", their numbers in rising order, and

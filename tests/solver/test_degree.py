@@ -63,7 +63,7 @@ def test_middles_of_polynomials_are_exact():
         x[3 + 2 * k : 5 + 2 * k] = x[i] + t[1:3, None] * (x[j] - x[i])
     x[9] = 1 / 3
     f = lambda p: p[:, :1] ** 3 - 2 * p[:, 1:] ** 2 * p[:, :1] + p[:, 1:]  # noqa: E731
-    second = SecondOrder(cell, 3)
+    second = SecondOrder(cell)
     middles = np.array([(x[i] + x[j]) / 2 for i, j in ends])
     at = second(f(x))
     np.testing.assert_allclose(at[second.cells[0, :3]], f(x[:3]), rtol=0, atol=0)
