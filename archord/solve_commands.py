@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from archord.options import SCENE, flag, output, overrides, quiet
+from archord.options import PATH, SCENE, flag, output, overrides, quiet
 
 if TYPE_CHECKING:
     from archord.scene.file import AnyScene
@@ -89,13 +89,19 @@ def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, quiet: bool
 
 
 @click.command()
-@flag("--example", "print a commented example")
+@flag("--example", "print a commented example of a joint")
+@flag("--general", "print a commented example of a general scene")
 @flag("--reference", "print all keys as Markdown tables")
-def scene(example: bool, reference: bool) -> int:
+@click.option("--expand", type=PATH, metavar="SCENE", help="print the general scene that SCENE stands for")
+def scene(example: bool, general: bool, reference: bool, expand: Path | None) -> int:
     """Print what a scene file may hold."""
-    if example == reference:
-        raise click.UsageError("choose one of --example and --reference")
+    if example + general + reference + (expand is not None) != 1:
+        raise click.UsageError("choose one of --example, --general, --reference and --expand")
     from archord.scene import reference as pages
+    from archord.scene.file import load_scene, resolved
 
-    print(pages.example() if example else pages.reference(), end="")
+    if expand is not None:
+        print(resolved(load_scene(expand)), end="")
+    else:
+        print(pages.reference() if reference else pages.example(general), end="")
     return 0

@@ -139,10 +139,26 @@ def override_key(data: dict[str, Any], override: str) -> str:
     key."""
     key, sign, text = override.partition("=")
     section, dot, name = key.strip().partition(".")
+    if isinstance(data.get(section), list):
+        return _in_table(data[section], section, name, override)
     if "\n" in override or not (sign and dot and section and name and "." not in name):
         raise InputError(f"--set {override!r}: must read section.key=value, like joint.clearance=0.01.")
     put(data, section, name, _value(text.strip()) if text.strip() else None, f"--set {override}")
     return f"{section}.{name}"
+
+
+def _in_table(tables: list[Any], section: str, place: str, override: str) -> str:
+    """As `override_key`, of the key ``place``, NAME.KEY, of one of the ``tables`` of a section."""
+    name, dot, key = place.rpartition(".")
+    found = next((table for table in tables if isinstance(table, dict) and table.get("name") == name), None)
+    text = override.partition("=")[2].strip()
+    if not (dot and key and found is not None and "=" in override):
+        names = ", ".join(str(table.get("name")) for table in tables if isinstance(table, dict))
+        raise InputError(f"--set {override!r}: must read {section}.NAME.key=value, with a name among {names}.")
+    found.pop(key, None)
+    if text:
+        found[key] = _value(text)
+    return f'{section} "{name}".{key}'
 
 
 def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) -> None:

@@ -31,6 +31,8 @@ def require(holds: bool, name: str | tuple[str, ...], said: str) -> None:
 
 def toml_value(value: Any) -> str:
     """``value`` as TOML writes it."""
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{name} = {toml_value(part)}' for name, part in value.items())}}}"
     return json.dumps(value, default=str, ensure_ascii=False)
 
 

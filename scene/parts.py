@@ -7,16 +7,16 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from archord.scene.keys import LINE, Positive, Section, key, require
-from archord.scene.sections import Analysis, NotNegative, Solid, Steps, Targets
+from archord.scene.sections import Modelling, NotNegative, Solid, Steps, Targets
 
 Point = Annotated[list[float], Field(min_length=2, max_length=2)]
 Freedom = Literal["x", "y", "rotation"]
 VALUES = ("displacement", "force", "pressure")
 
 
-def name_of(what: str) -> Any:
+def name_of(what: str, example: str) -> Any:
     """The key ``name`` of a part."""
-    return key(f"name of the {what}", min_length=1, pattern=LINE)
+    return key(f"name of the {what}", example=example, min_length=1, pattern=LINE)
 
 
 def set_of(what: str, **more: Any) -> Any:
@@ -62,21 +62,21 @@ class Mesh(Section):
 class Body(Solid):
     """A deformable body: a set of cells, of one material."""
 
-    name: str = name_of("body")
+    name: str = name_of("body", "pin")
     cells: str | None = set_of("its set of cells, that of its name if absent", default=None, other="plate")
 
 
 class RigidCircle(Section):
     """A rigid disc."""
 
-    centre: Point = key("centre", "length")
-    radius: Positive = key("radius", "length")
+    centre: Point = key("centre", "length", example=[0.0, 0.0])
+    radius: Positive = key("radius", "length", example=10.0)
 
 
 class Interaction(Section):
     """What two surfaces do to each other, or a rigid disc to one."""
 
-    name: str = name_of("interaction")
+    name: str = name_of("interaction", "contact")
     surfaces: Annotated[list[str], Field(min_length=1, max_length=2)] = key(
         "two facet sets, or one beside a rigid disc", example=["pin", "hole"]
     )
@@ -114,7 +114,7 @@ class Interaction(Section):
 class Coupling(Section):
     """A reference point that stands for a set of facets: supports and loads may be on it."""
 
-    name: str = name_of("coupling")
+    name: str = name_of("coupling", "reference point")
     facets: str = set_of("facet set", example="bore")
     point: Point = key("the reference point", "length", example=[0.0, 0.0])
     kind: Literal["rigid", "distributing"] = key(
@@ -126,8 +126,8 @@ class Coupling(Section):
 class Support(Section):
     """What is held."""
 
-    name: str = name_of("support")
-    on: str = set_of("facet, point or cell set, coupling, or interaction with a rigid disc", example="clamp")
+    name: str = name_of("support", "clamp")
+    on: str = set_of("facet, point or cell set, or coupling", example="clamp")
     fixed: Annotated[list[Freedom], Field(min_length=1)] = key(
         "directions held; rotation is of couplings alone", example=["x", "y"]
     )
@@ -136,7 +136,7 @@ class Support(Section):
 class Load(Section):
     """What moves or presses: one value, or a list of values at the ends of the path's stages."""
 
-    name: str = name_of("load")
+    name: str = name_of("load", "press")
     on: str = set_of("facet, point or cell set, coupling, or interaction with a rigid disc", example="flat")
     direction: Freedom | None = key(
         "of displacement and force; rotation is of couplings alone", default=None, example="x"
@@ -182,8 +182,8 @@ class Path(Section):
     fit_steps: Steps = key("output steps of the stage before, in which interferences arise", default=1)
 
 
-class ProblemAnalysis(Analysis):
-    """How the problem is modelled and solved."""
+class ProblemAnalysis(Modelling):
+    """How a general problem is modelled and solved."""
 
     symmetry: int = key(
         "how many times the modelled part makes up the whole, whose forces and energies are told",
@@ -191,8 +191,3 @@ class ProblemAnalysis(Analysis):
         ge=1,
         le=100,
     )
-
-    @model_validator(mode="after")
-    def _integration(self) -> ProblemAnalysis:
-        require(self.integration == "both", "integration", "is for joints; interactions say it by their key integrated")
-        return self

@@ -73,6 +73,10 @@ class ProblemScene(Checked):
             said = f"repeats {freedom!r} of {on!r}, which {before} holds or loads already"
             require(before is None or on not in couplings | discs, at, said)
             seen[on, freedom] = f"the {section} {name!r}"
+        for support in self.support:
+            require(
+                support.on not in discs, ("support", support.name, "on"), "must not be a rigid disc, which stands still"
+            )
         for load in self.load:
             free = load.kind != "pressure" or load.on not in couplings | discs
             require(free, ("load", load.name, "on"), "must be a facet set for a pressure")

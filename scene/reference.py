@@ -3,22 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
 from archord.report.table import Table
 from archord.scene.keys import toml_value
+from archord.scene.parts import Mesh
+from archord.scene.problem import ProblemScene
 from archord.scene.scene import FORMAT, Scene
 
+_GENERAL: dict[str, Any] = {}
+for _name, _info in ProblemScene.model_fields.items():
+    if _name != "format":
+        _GENERAL[_name] = _info
+    if _name == "mesh":
+        _GENERAL["mesh.circle"] = Mesh.model_fields["circle"]
 _SECTIONS: dict[str, Any] = {name: info for name, info in Scene.model_fields.items() if name != "format"}
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 _KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false", "array": "list"}
 
 
-def example() -> str:
-    """A commented scene that shows every key; alternatives and absent defaults are commented out."""
-    text = f"# An archord scene: archord solve scene.toml\n\nformat = {FORMAT}  # version of the scene format\n"
-    for section, info in _SECTIONS.items():
-        text += f"\n[{section}]  # {info.description}\n"
+def example(general: bool = False) -> str:
+    """A commented scene that shows every key, of a joint or a ``general`` one; alternatives and absent defaults are
+    commented out."""
+    sections, version = (_GENERAL, ProblemScene.newest) if general else (_SECTIONS, FORMAT)
+    text = f"# An archord scene: archord solve scene.toml\n\nformat = {version}  # version of the scene format\n"
+    for section, info in sections.items():
+        text += f"\n{_heading(section, info)}  # {info.description}\n"
         for name, key, schema in _keys(info):
             default = "" if schema.get("default") is None else f", default {toml_value(schema['default'])}"
             unit = f" [{schema['unit']}]" if schema["unit"] else ""
@@ -32,25 +42,47 @@ def reference() -> str:
     parts = [
         "# Scene reference\n",
         "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.\n",
-        f"Above the sections a scene may say the version of its format, and what archord writes does say it: "
-        f"`format = {FORMAT}`. A scene of a newer version is refused.\n",
+        "A scene with the section `[joint]` is one of a pin in a hole; one with `[mesh]` is a general one, of any "
+        "bodies on any mesh.\n",
+        "Above the sections a scene may say the version of its format, and what archord writes does say it: "
+        f"`format = {FORMAT}`, of a general scene `format = {ProblemScene.newest}`. A scene of a newer version is "
+        "refused.\n",
+        "# Joints\n",
+        *_tables(_SECTIONS, {}),
+        "# General scenes\n",
+        "The sections units, stepping and output are those of joints. Headings in double brackets may stand any number "
+        "of times.\n",
+        *_tables(_GENERAL, {name: _SECTIONS[name] for name in ("units", "analysis", "stepping", "output")}),
     ]
-    for section, info in _SECTIONS.items():
+    return "\n".join(parts)
+
+
+def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
+    """Tables of the keys of ``sections``, without those that stood ``before``."""
+    for section, info in sections.items():
+        known = [name for name, _, _ in _keys(before[section])] if section in before else []
         table = Table("key", "unit", "default", "allowed", "what")
         for name, key, schema in _keys(info):
-            default = "" if schema.get("default") is None else f"`{toml_value(schema['default'])}`"
-            default = "required" if key.is_required() else default
-            table.add(f"`{name}`", schema["unit"], default, _allowed(schema), key.description)
-        parts += [f"## [{section}]\n", f"{info.description[0].upper()}{info.description[1:]}.\n", table.markdown()]
-    return "\n".join(parts)
+            if name not in known:
+                default = "" if schema.get("default") is None else f"`{toml_value(schema['default'])}`"
+                default = "required" if key.is_required() else default
+                table.add(f"`{name}`", schema["unit"], default, _allowed(schema), key.description)
+        if table.rows:
+            said = f"{info.description[0].upper()}{info.description[1:]}{', also' if known else ''}.\n"
+            yield from (f"## {_heading(section, info)}\n", said, table.markdown())
+
+
+def _heading(section: str, info: Any) -> str:
+    return f"[[{section}]]" if get_args(info.annotation) else f"[{section}]"
 
 
 def _keys(section: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:
     """Name, field and JSON schema of every key of a section."""
-    model = section.annotation
+    model = next(iter(get_args(section.annotation)), section.annotation)
     schemas = model.model_json_schema()["properties"]
-    for name in sorted(schemas, key=lambda name: name not in ("E", "nu")):
-        yield name, model.model_fields[name], schemas[name]
+    for name in sorted(schemas, key=lambda name: (name != "name", name not in ("E", "nu"))):
+        if "unit" in schemas[name]:
+            yield name, model.model_fields[name], schemas[name]
 
 
 def _allowed(schema: dict[str, Any]) -> str:
@@ -59,5 +91,5 @@ def _allowed(schema: dict[str, Any]) -> str:
     one, *more = [s for s in kinds if s.get("type") != "null"]
     if "enum" in one:
         return ", ".join(f"`{toml_value(value)}`" for value in one["enum"])
-    kind = " or ".join([_KINDS[one["type"]], *(_KINDS.get(s.get("type"), "table") for s in more)])
+    kind = " or ".join(_KINDS.get(s.get("type"), "table") for s in (one, *more))
     return f"{kind} {', '.join(f'{sign} {one[limit]:g}' for limit, sign in _SIGNS.items() if limit in one)}".strip()

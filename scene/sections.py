@@ -189,15 +189,12 @@ class Load(Section):
         return self.steps if isinstance(self.steps, list) else [self.steps] * len(self.legs)
 
 
-class Analysis(Section):
-    """How the joint is modelled and solved."""
+class Modelling(Section):
+    """How a problem is modelled and solved."""
 
     plane: Literal["strain", "stress"] = key("plane strain or plane stress", default="strain")
     kinematics: Literal["current", "reference"] = key(
         "pairs in contact: closest points on the deformed curves, or fixed ones where they touch", default="current"
-    )
-    integration: Literal["both", "pin", "block"] = key(
-        "whose contact edge carries the integral: both halves (unbiased), or one side's alone", default="both"
     )
     gamma_factor: float = key(
         "Nitsche's gamma over the trace constant of a contact cell; coercive above 0.25", default=0.5, ge=1e-3, le=1e6
@@ -221,6 +218,14 @@ class Analysis(Section):
     )
     tolerance: float = key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
     max_iterations: int = key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
+
+
+class Analysis(Modelling):
+    """How the joint is modelled and solved."""
+
+    integration: Literal["both", "pin", "block"] = key(
+        "whose contact edge carries the integral: both halves (unbiased), or one side's alone", default="both"
+    )
 
 
 class Stepping(Section):

@@ -1,0 +1,141 @@
+"""General scenes: what they may hold, what is refused and how it is said."""
+
+import copy
+import tomllib
+
+import pytest
+
+from archord.scene.errors import InputError
+from archord.scene.file import load_scene, parse_any, resolved
+from archord.scene.problem import ProblemScene
+from archord.scene.reference import example
+
+LUG = """
+[mesh]
+file = "lug.msh"
+[[mesh.circle]]
+facets = "hole"
+centre = [0.0, 0.0]
+radius = 10.0
+[[body]]
+name = "pin"
+E = 210000.0
+nu = 0.3
+[[body]]
+name = "lug"
+E = 210000.0
+nu = 0.3
+yield_stress = 300.0
+[[interaction]]
+name = "contact"
+surfaces = ["pin", "hole"]
+[[coupling]]
+name = "point"
+facets = "bore"
+point = [0.0, 0.0]
+[[support]]
+name = "clamp"
+on = "clamp"
+fixed = ["x", "y"]
+[[load]]
+name = "press"
+on = "flat"
+direction = "x"
+displacement = [0.1, 0.3]
+[[load]]
+name = "side"
+on = "point"
+direction = "y"
+force = 5.0
+[path]
+steps = [2, 4]
+"""
+
+
+def lug() -> dict:
+    return tomllib.loads(LUG)
+
+
+def changed(place: str, value) -> dict:
+    """The data with the key at ``place``, like "load.0.force", replaced."""
+    data = copy.deepcopy(lug())
+    *way, last = [int(part) if part.isdigit() else part for part in place.split(".")]
+    table = data
+    for part in way:
+        table = table[part]
+    if value is None:
+        del table[last]
+    else:
+        table[last] = value
+    return data
+
+
+def test_stages_follow_the_longest_list():
+    scene = parse_any(lug())
+    assert isinstance(scene, ProblemScene)
+    assert scene.targets == [0.5, 1.0, 1.25, 1.5, 1.75, 2.0]
+    assert [scene.values(load) for load in scene.load] == [(0.0, 0.1, 0.3), (0.0, 5.0, 5.0)]
+    assert scene.travelled[-1] == [2.0, 0.3, 5.0]
+
+
+def test_an_interference_has_a_stage_of_its_own():
+    scene = parse_any(changed("interaction.0.interference", 0.02))
+    assert scene.fits
+    assert scene.targets == [1.0, 1.5, 2.0, 2.25, 2.5, 2.75, 3.0]
+    assert scene.values(scene.load[0]) == (0.0, 0.0, 0.1, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        ("body.0.E", -1, 'body "pin".E = -1 must be greater than 0'),
+        ("body.1.foo", 1, 'body "lug".foo = 1 is not a known key'),
+        ("body.0.name", "lug", "body .* must have different names, but .'lug'. stand more than once"),
+        ("body.1.hardening", [[0.0, 300.0], [0.1, 200.0]], 'body "lug".hardening = .* is no hardening law'),
+        ("body", 5, "body = 5 must be a list"),
+        ("body", None, "body is missing"),
+        ("support.0.fixed", ["z"], 'support "clamp".fixed = ."z".: entry 1 must be'),
+        ("support.0.fixed", ["rotation"], 'support "clamp".fixed = .* must be "x" or "y": .clamp. is no coupling'),
+        ("support.0.name", "press", "load .* must not share the names .'press'. with supports"),
+        ("load.0.force", 1.0, 'load "press".displacement = .* must not be given together with force'),
+        ("load.0.displacement", None, 'load "press".displacement is missing'),
+        ("load.0.direction", None, 'load "press".direction is missing'),
+        ("load.1.direction", "z", 'load "side".direction = "z" must be'),
+        ("interaction.0.surfaces", ["pin"], 'interaction "contact".surfaces = ."pin". must name two facet sets'),
+        ("interaction.0.integrated", "end", 'interaction "contact".integrated = "end" must be one of the surfaces'),
+        ("interaction.0.rigid", {"centre": [0.0], "radius": 1.0}, 'interaction "contact".rigid.centre'),
+        ("mesh.file", None, "mesh.file is missing"),
+        ("mesh.circle.0.radius", -1.0, "mesh.circle.radius must be greater than 0"),
+        ("path.steps", [1, 2, 3], "path.steps = .* must have one number for each of the 2 stages"),
+        ("analysis", {"plane": "space"}, "analysis.plane = .* must be 'strain' or 'stress'"),
+        ("format", 3, "format = 3 is for a newer archord"),
+    ],
+)
+def test_a_fault_is_said_in_a_sentence(place, value, said):
+    with pytest.raises(InputError, match=f"^lug.toml: {said}") as fault:
+        parse_any(changed(place, value), "lug.toml")
+    assert len(str(fault.value).splitlines()) == 1
+
+
+def test_what_is_loaded_twice_is_refused():
+    twice = lug()
+    twice["load"].append(twice["load"][1] | {"name": "again"})
+    with pytest.raises(InputError, match=r'load "again".direction = "y" repeats .y. of .point., which the load .side.'):
+        parse_any(twice)
+
+
+def test_a_scene_loads_as_it_is_resolved(tmp_path):
+    path = tmp_path / "lug.toml"
+    path.write_text(LUG)
+    scene = load_scene(path, ["body.lug.yield_stress=250", "load.press.displacement=[0.1, 0.2]"])
+    assert scene.body[1].yield_stress == 250
+    assert scene.mesh.file == str(tmp_path / "lug.msh")
+    assert parse_any(tomllib.loads(resolved(scene))) == scene
+    with pytest.raises(InputError, match=r"must read body.NAME.key=value, with a name among pin, lug"):
+        load_scene(path, ["body.plate.E=1"])
+
+
+def test_the_example_is_a_scene():
+    assert parse_any(tomllib.loads(example(general=True))).body[0].name == "pin"
+    hidden = "\n".join(line.removeprefix("# ") for line in example(general=True).splitlines()[2:])
+    assert tomllib.loads(hidden)["interaction"][0]["rigid"]["radius"] == 10.0
