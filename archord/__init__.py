@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from archord.materials.kinematic import KinematicMaterial
     from archord.scene.problem import ProblemScene
     from archord.scene.scene import Scene
-    from archord.solver.problem import Body, Interaction, Load, Problem, Support
+    from archord.solver.problem import Body, Drive, Interaction, Load, Mean, Problem, Rigid, Support
     from archord.solver.system import System
 
 
 __all__ = [
-    "Body", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LinearHardening", "Load",
-    "Problem", "ProblemScene", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System",
+    "Body", "Drive", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LinearHardening",
+    "Load", "Mean", "Problem", "ProblemScene", "Rigid", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System",
     "TabularHardening", "VoceHardening", "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
@@ -45,7 +45,9 @@ _HOME = {
     ),
     "Scene": "archord.scene.scene",
     "ProblemScene": "archord.scene.problem",
-    **dict.fromkeys(("Body", "Interaction", "Load", "Problem", "Support"), "archord.solver.problem"),
+    **dict.fromkeys(
+        ("Body", "Drive", "Interaction", "Load", "Mean", "Problem", "Rigid", "Support"), "archord.solver.problem"
+    ),
 }
 
 

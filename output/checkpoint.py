@@ -49,7 +49,8 @@ class Checkpoint:
 def halt(order: MeshOrder, scene: str, m: Any, step: Step, position: Position, work: Work) -> Checkpoint:
     """The checkpoint (on rank 0) of a run of ``scene`` after the step ``m``, reached as ``step`` says, from which
     `resume` goes on. Collective."""
-    system, state, increment = order.system, order.system.equilibrium.state(), position.increment
+    system, increment = order.system, position.increment
+    u, levels = np.split(system.equilibrium.state(), [2 * system.equilibrium.n_local])
     scalars = {
         "measures": asdict(m),
         "step": asdict(step),
@@ -57,12 +58,12 @@ def halt(order: MeshOrder, scene: str, m: Any, step: Step, position: Position, w
         "position": {name: value for name, value in vars(position).items() if name != "increment"},
         "largest_reaction": system.equilibrium.largest_reaction,
         "gamma_by_and_by": system.solver.continues_gamma,
-        "level": float(state[-1]),
+        "level": levels.tolist(),
     }
-    arrays = order.collect_history() | {"fields/displacement": order.collect(state[:-1].reshape(-1, 2))}
+    arrays = order.collect_history() | {"fields/displacement": order.collect(u.reshape(-1, 2))}
     if increment is not None:
-        scalars["level_increment"] = float(increment[-1])
-        arrays["fields/increment"] = order.collect(increment[:-1].reshape(-1, 2))
+        scalars["level_increment"] = increment[len(u) :].tolist()
+        arrays["fields/increment"] = order.collect(increment[: len(u)].reshape(-1, 2))
     mesh = order.mesh_digest() if system.comm.rank == 0 else ""
     return Checkpoint(m.step, scene, mesh, scalars, arrays)
 

@@ -17,7 +17,7 @@ from archord.geometry.shapes.joint_mesh import refinements
 from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.presets.arc import SYMMETRY
 from archord.scene.scene import Scene
-from archord.solver.problem import Body, Guess, Interaction, Load, Problem, Rigid, Support
+from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Rigid, Support
 from archord.solver.system import System
 from archord.solver.timer import Timer
 
@@ -63,7 +63,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         [contact],
         supports,
         [Load("pin", (0.0, -1.0), core)] if ring else [],
-        control="force" if by_force and not ring else "factor",
+        drives=[Drive("", control="force")] if by_force and not ring else [],
         degree=analysis.degree,
         symmetry=SYMMETRY * scene.thickness,
         load_name="P" if by_force else "delta",
@@ -112,9 +112,9 @@ class Joint(System):
 
     def delta(self) -> float:
         """Displacement of the pin from first touch: of its diameter, or in a ring the mean over the core."""
-        return self.driven() - (max(self.scene.joint.dR, 0.0) if self.problem.loads else 0.0)
+        return self.drive_displacement("") - (max(self.scene.joint.dR, 0.0) if self.problem.loads else 0.0)
 
     def forces(self) -> dict[str, float]:
         """Downward force of the whole joint at pin, contact and block's support, per unit thickness."""
-        contact, block = -self.contact_force()[1], self.reaction("block")[1]
-        return {"pin": self.driving_force(), "contact": contact, "block": block}
+        contact, block = -self.contact_force("contact")[1], self.reaction("block")[1]
+        return {"pin": self.drive_force(""), "contact": contact, "block": block}

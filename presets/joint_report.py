@@ -65,7 +65,7 @@ class JointAccount:
 
     def driven(self) -> tuple[float, float]:
         """delta and P. Collective."""
-        return self.system.delta(), self.system.driving_force()
+        return self.system.delta(), self.system.drive_force("")
 
     def profiles(self) -> dict[str, ArcProfile]:
         """The contact along the arcs, by side. Collective."""

@@ -50,7 +50,7 @@ class CoarseStart:
         self._reached: float | None = None
 
     def increment(self, load: float) -> Array | None:
-        """What a step to ``load`` adds to the state of the fine problem, ``(2 n_local + 1,)``; None if the coarse mesh
+        """What a step to ``load`` adds to the state of the fine problem, ``(2 n_local + d,)``; None if the coarse mesh
         does not tell."""
         with self.fine.timer("coarse start"):
             result, contact = self.path.attempt(load), self.coarse.contact
@@ -59,11 +59,12 @@ class CoarseStart:
             if not result.converged or (contact.pairs and contact.n_active() < _FEWEST_POINTS):
                 return None
             step = self.coarse.equilibrium.state() - self.path.state
-            on_nodes = self.coarse.comm.bcast(self._order.collect(step[:-1].reshape(-1, 2)))
+            increment, levels = np.split(step, [2 * self.coarse.equilibrium.n_local])
+            on_nodes = self.coarse.comm.bcast(self._order.collect(increment.reshape(-1, 2)))
             u = np.zeros((self.fine.equilibrium.n_local, 2))
             for nodes, interpolate in self._maps:
                 u[nodes] = interpolate(on_nodes)
-            return np.append(u, step[-1])
+            return np.append(u, levels)
 
     def follow(self) -> bool:
         """Follow the fine problem, which has accepted the last step; returns whether the coarse one could."""

@@ -15,6 +15,7 @@ from archord.solver.recovery import Recovery
 if TYPE_CHECKING:
     from archord.solver.coarse_start import CoarseStart
 
+_STRAIGHT = 1e-6  # part of a step that may lie beside the line of the last one
 _PREDICTOR_LIMIT = 4.0  # an increment is not extrapolated to more than this many times its length
 
 
@@ -38,9 +39,9 @@ class LoadPath:
     """The path that ``solver``'s equilibrium follows from the position ``at``, from the beginning if absent.
 
     The guess for a step is, where there is a ``coarse`` start, what a coarser mesh found. Else it extrapolates the last
-    increment; where that fails elastic bodies start from the last state itself. Where the path starts or turns, the
-    guess comes from the elastic solution, at the start from ``first_guess(load)``. Where the bodies were not in
-    equilibrium before the first step (a press fit), its increment says nothing about the next.
+    increment; where that fails elastic bodies start from the last state itself. Where the path starts or turns, or
+    another drive takes over, the guess comes from the elastic solution, at the start from ``first_guess(load)``. Where
+    the bodies were not in equilibrium before the first step (a press fit), its increment says nothing about the next.
     """
 
     def __init__(
@@ -69,7 +70,10 @@ class LoadPath:
         if self.at.increment is None:
             yield self._first_guess(load), True
             return
-        ratio = (load - self.at.load) / self.at.stride
+        ratio = self._ratio(load)
+        if ratio is None:
+            yield self.state, True
+            return
         near = abs(ratio) <= _PREDICTOR_LIMIT
         # where the path turns, it first goes back elastically
         afar = ratio < 0
@@ -77,6 +81,14 @@ class LoadPath:
         if near and not afar and not self.solver.equilibrium.bulk.plastic:
             # an extrapolated state has a kink where the contact ended, which fine meshes resolve
             yield self.state, True
+
+    def _ratio(self, load: float) -> float | None:
+        """How far the step to ``load`` goes on the line of the last one, over that one's length; None if off it."""
+        at, course = self.at, self.solver.equilibrium.drives.course
+        before, last, now = course(at.load - at.stride), course(at.load), course(load)
+        step, length = last - before, float(np.linalg.norm(last - before))
+        ratio = float(step @ (now - last)) / length**2 if length else 0.0
+        return ratio if np.linalg.norm(now - last - ratio * step) <= _STRAIGHT * np.linalg.norm(now - last) else None
 
     def accept(self, load: float) -> None:
         """Go to ``load``, where the last attempt has found equilibrium, and keep its history."""

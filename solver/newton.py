@@ -55,7 +55,7 @@ class NewtonSolver:
         self.equilibrium, problem = equilibrium, equilibrium.problem
         self.tolerance, self.max_iterations = problem.tolerance, problem.max_iterations
         self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
-        self._x = equilibrium.control.vector()
+        self._x = equilibrium.vector()
         self._raised: BaseException | None = None
         with equilibrium.timer(BEFORE_SOLVING):
             self._solvers = {searches: self._solver("bt" if searches else "basic") for searches in (True, False)}
@@ -114,7 +114,8 @@ class NewtonSolver:
         self._result = result = Newton(False, "", 0, [])
         self._failure, self._raised = "", None
         self._renewed, self._reuse = True, False  # the last factorisation is of another matrix
-        at.control.singular = False
+        if at.border:
+            at.border.singular = None
         if guess is not None:
             at.pack(guess, self._x)
             at.contact.search()
@@ -128,7 +129,7 @@ class NewtonSolver:
                 raise
         code, result.iterations = snes.getConvergedReason(), snes.getIterationNumber()
         if self._ksp.getConvergedReason() < 0:
-            at.control.replace(at.tangent.A)
+            at.renew_factorisation()
             self._start_linear()
         result.converged = code > 0
         result.reason = "converged" if result.converged else self._failure or _REASONS.get(code, f"SNES reason {code}")
@@ -179,7 +180,7 @@ class NewtonSolver:
         reaction = max(at.reaction_norm, at.largest_reaction)
         result.active_set_changes.append(at.changes)
         result.residuals.append(float(norm / reaction if reaction > 0 else norm))
-        if at.control.singular:
+        if at.border and at.border.singular is not None:
             pressed = at.load > 0 and at.contact.n_active() > 0
             self._failure = f"{'no stiffness is left' if pressed else 'nothing resists the force'} (singular mode)"
             return reasons.DIVERGED_LINEAR_SOLVE

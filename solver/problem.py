@@ -1,7 +1,8 @@
 """A problem of solid mechanics to be solved: bodies on a mesh, what they touch, what holds them, what loads them.
 
-Sets of cells and facets are named in the mesh. One number, the load factor, moves supports and rigid circles by their
-rates and multiplies the loads. Lengths, stresses and forces (per unit thickness) are in any consistent units.
+Sets of cells, facets and points are named in the mesh. One number, the load factor, runs along the path; drives turn it
+into displacements of supports and rigid circles, and into forces. Lengths, stresses and forces (per unit thickness) are
+in any consistent units.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from archord.geometry.basis import Array
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.solver.contact.interaction import Interaction, Rigid
 
-__all__ = ["Body", "Guess", "Interaction", "Load", "Problem", "Rigid", "Support"]
+__all__ = ["Body", "Drive", "Guess", "Interaction", "Load", "Mean", "Problem", "Rigid", "Support"]
 Vector = tuple[float, float]
 
 
@@ -30,34 +31,82 @@ class Body:
 
 
 @dataclass(frozen=True)
+class Drive:
+    """What moves supports, rigid circles and means, or multiplies loads: by a displacement or a force on the ``path``.
+
+    ``path`` holds the values at the load factors 0, 1, 2, ..., with straight lines between, constant behind; without
+    one the value is the load factor itself. Under ``control`` "force" the value is the force that works on the drive's
+    displacement, over all symmetric parts of the problem, and the displacement is one more unknown. Of loads the value
+    is always the force.
+    """
+
+    name: str
+    path: Sequence[float] = ()
+    control: Literal["displacement", "force"] = "displacement"
+
+    def value(self, factor: float) -> float:
+        """The value at the load ``factor``."""
+        return float(np.interp(factor, np.arange(len(self.path)), self.path)) if len(self.path) else factor
+
+
+@dataclass(frozen=True)
 class Support:
-    """Component ``axis`` of the displacement of a facet set is ``rate`` times the load factor.
+    """Component ``axis`` of the displacement of a facet set is ``rate`` times that of the ``drive``.
 
     ``rate`` is a number, or a function of the nodes' positions ``(n, 2)`` that returns ``(n,)``. Supports of one
-    ``name`` have one reaction. Where supports share nodes, the last one counts.
+    ``name`` have one reaction, and where they share nodes their drives add up; of different names the last one counts
+    there. Supports of one name by drives "x", "y" and "turn" with the rates 1, 1, and ``Y - y`` and ``x - X``, are a
+    rigid reference point at (X, Y).
     """
 
     name: str
     facets: str
     axis: int
     rate: float | Callable[[Array], Array] = 0.0
+    drive: str = ""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it depends on its drive."""
+        return callable(self.rate) or self.rate != 0
 
 
 @dataclass(frozen=True)
 class Load:
-    """The ``force`` on the cells of a set, per unit of the load factor and over all symmetric parts of the problem.
+    """Dead loads on the cells or the facets of a set, times the value of the ``drive``.
 
-    It is spread as ``density(x)``, a UFL expression of the position, says, evenly without.
+    ``force`` is that over all symmetric parts of the problem, spread as ``density(x)``, a UFL expression of the
+    position, says, evenly without. ``pressure`` acts on facets, along the undeformed normal into the body.
     """
 
-    cells: str
-    force: Vector
+    cells: str = ""
+    force: Vector = (0.0, 0.0)
     density: Callable[[Any], Any] | None = None
+    facets: str = ""
+    pressure: float = 0.0
+    drive: str = ""
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean motion of a facet set, as that of a reference ``point`` along ``axis`` 0, 1 or 2, its rotation.
+
+    With mean displacement ``w`` and mean rotation ``t = integral of (x - c) x u / integral of |x - c|^2`` about the
+    centroid ``c``, the point moves by ``w + t x (point - c)``. The ``drive`` prescribes that motion, or the force
+    (moment) on the point, which the facets get spread as the motion's derivative says: statically equivalent. Means of
+    one ``name`` have one reaction. A drive has one mean at most.
+    """
+
+    name: str
+    facets: str
+    axis: int
+    point: Vector
+    drive: str = ""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """Where the first solve starts: the load factor, and by how much each body has moved rigidly."""
+    """Where the first solve starts: the displacement of the drive "", and by how much each body has moved rigidly."""
 
     factor: float
     moved: Mapping[str, Vector] = field(default_factory=dict)
@@ -67,15 +116,18 @@ class Guess:
 class Problem:
     """What is to be solved.
 
-    Under ``control`` "factor" a load on the path is the load factor itself (displacement control, dead loads); under
-    "force" it is the force that works on the load factor, along the rates of supports and rigid discs, and the factor
-    is one more unknown (force control). ``load_name`` names it in messages.
+    A load on the path is the load factor, which each of the ``drives`` turns into its value. The drive "" is there
+    without being given, with the load factor for its displacement. ``load_name`` names the load in messages.
+
+    With ``fit`` the path begins with a stage of its own: between the load factors 0 and 1 interferences grow from
+    nothing. With ``stabilise`` bodies that supports alone do not hold are attached to their last accepted state by weak
+    springs, so that they may begin without contact.
 
     ``symmetry`` is how many times the modelled part makes up the whole, whose forces and energies are reported.
     ``travel`` is the size of displacements to be expected, which limits what counts as round-off. Newton's method stops
     at a residual of ``tolerance`` over the reaction. ``guess`` starts the first step at a load; ``from_rest`` tells
-    whether the bodies are in equilibrium before it (they are not in a press fit). ``coarser`` makes the same problem
-    on a coarser mesh, for guesses.
+    whether the bodies are in equilibrium before it (they are not in a press fit without a stage of its own).
+    ``coarser`` makes the same problem on a coarser mesh, for guesses.
     """
 
     mesh: TaggedMesh
@@ -83,7 +135,10 @@ class Problem:
     interactions: Sequence[Interaction] = ()
     supports: Sequence[Support] = ()
     loads: Sequence[Load] = ()
-    control: Literal["factor", "force"] = "factor"
+    means: Sequence[Mean] = ()
+    drives: Sequence[Drive] = ()
+    fit: bool = False
+    stabilise: bool = False
     degree: int = 2
     symmetry: float = 1.0
     load_name: str = "load factor"
@@ -95,13 +150,47 @@ class Problem:
     coarser: Callable[[], Problem] | None = None
 
     def __post_init__(self) -> None:
-        """Check names, which must be unique. Raises ValueError."""
-        for kind in ("bodies", "interactions"):
+        """Check names, which must be unique, and drives. Raises ValueError."""
+        for kind in ("bodies", "interactions", "drives"):
             names = [part.name for part in getattr(self, kind)]
             if len(set(names)) < len(names):
                 raise ValueError(f"{kind} must have different names, these are {', '.join(names)}")
-        if self.control == "force" and self.loads:
-            raise ValueError('loads follow the load factor, which control = "force" does not know: use "factor"')
+        for load in self.loads:
+            if bool(load.cells) == bool(load.facets) or (load.pressure and load.cells):
+                raise ValueError("a load acts on the cells of a set or on its facets, a pressure on facets")
+        moves, loads, means = self.moving_drives(), {x.drive for x in self.loads}, [x.drive for x in self.means]
+        known = [drive.name for drive in self.all_drives]
+        for name in (*moves, *loads, *means):
+            if name not in known:
+                raise ValueError(f"there is no drive {name!r}; there are {', '.join(map(repr, known))}")
+            if (name in moves) + (name in loads) + means.count(name) > 1:
+                raise ValueError(
+                    f"the drive {name!r} must move supports and discs, or multiply loads, or have one mean"
+                )
+        for name in known:
+            if name and name not in (*moves, *loads, *means):
+                raise ValueError(f"the drive {name!r} moves nothing and multiplies no load")
+
+    def moving_drives(self) -> set[str]:
+        """Names of the drives that move supports or rigid discs."""
+        discs = [given for i in self.interactions for given in i.surfaces if isinstance(given, Rigid)]
+        return {s.drive for s in self.supports if s.moves} | {name for disc in discs for name in disc.moved_by()}
+
+    @property
+    def all_drives(self) -> list[Drive]:
+        """The ``drives``, and the one of the load factor where it is used and not given, or alone."""
+        used = self.moving_drives() | {load.drive for load in self.loads} | {mean.drive for mean in self.means}
+        alone = not self.drives or ("" in used and all(drive.name for drive in self.drives))
+        return [*self.drives, *([Drive("")] if alone else [])]
+
+    @property
+    def by_force(self) -> bool:
+        """Whether any load is a force."""
+        return bool(self.loads) or any(drive.control == "force" for drive in self.drives)
+
+    def fitted(self, factor: float) -> float:
+        """The part of interferences that is there at the load ``factor``."""
+        return min(max(factor, 0.0), 1.0) if self.fit else 1.0
 
     def cells_of(self, body: Body) -> np.ndarray:
         """Cells ``(n,)`` of the body on this rank, ghosts included."""

@@ -86,7 +86,7 @@ class Recovery:
         for line_search in (not full_steps, full_steps):
             if self._solve_holding(guess, line_search, goal):
                 return True
-            if self.equilibrium.control.singular:
+            if (border := self.equilibrium.border) and border.singular is not None:
                 break
         return False
 

@@ -111,7 +111,7 @@ def march(
 
 
 def _why(result: Newton, problem: Problem, load: float, held: float, size: float) -> str:
-    name, by_force = problem.load_name, problem.control == "force" or problem.loads
+    name, by_force = problem.load_name, problem.by_force
     where = "" if result.worst is None else f", the largest residual at ({result.worst[0]:.4g}, {result.worst[1]:.4g})"
     last = f"{result.residuals[-1]:.1e}" if result.residuals and np.isfinite(result.residuals[-1]) else "none"
     cut = f"the step was cut to {size:.2g} of an output step" if size < 1 else "no smaller step is allowed"

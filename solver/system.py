@@ -54,7 +54,7 @@ class System:
 
     def _surface(self, given: str | Rigid, interaction: str) -> Surface | RigidSurface:
         if isinstance(given, Rigid):
-            return RigidSurface(given.circle, given.rate)
+            return RigidSurface(given.circle)
         name = given if given not in self.sides else f"{given} ({interaction})"
         mesh, material = self.problem.mesh, self.problem.body_of(given).material
         self.sides[name] = Surface(self.V, mesh.facets_in(given), material, name)
@@ -80,28 +80,55 @@ class System:
         u = np.zeros((self.equilibrium.n_local, 2))
         for body in self.problem.bodies:
             u[self.nodes_of(body)] = guess.moved.get(body.name, 0.0)
-        return np.append(u, guess.factor)
+        levels = np.zeros(len(self.equilibrium.levels))
+        levels[: len(self.drive_names)] = [0.0 if name else guess.factor for name in self.drive_names]
+        return np.append(u, levels)
 
     def reaction(self, name: str) -> Array:
-        """Force ``(2,)`` of the supports ``name`` on the whole."""
-        return self.problem.symmetry * self.equilibrium.reaction(name)
+        """Force ``(2,)`` of the supports and means ``name`` on the whole."""
+        return self.problem.symmetry * self.comm.allreduce(self.equilibrium.reaction(name).sum(axis=0))
 
-    def contact_force(self) -> Array:
-        """Force ``(2,)`` of the contact on its second surface."""
-        return self.problem.symmetry * self.contact.resultant()
+    def reaction_moment(self, name: str, point: Sequence[float]) -> float:
+        """Moment of these forces about ``point``, anticlockwise, on the whole."""
+        force = self.equilibrium.reaction(name)
+        arm = self.V.tabulate_dof_coordinates()[: len(force), :2] - np.asarray(point)
+        moment = float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum())
+        return self.problem.symmetry * self.comm.allreduce(moment)
 
-    def driving_force(self) -> float:
-        """The force whose work is that of the load: on the load factor, or the load where there are ``loads``."""
-        if self.problem.loads:
-            return self.equilibrium.load
-        return self.problem.symmetry * self.equilibrium.force_on_factor()
+    def contact_force(self, name: str = "") -> Array:
+        """Force ``(2,)`` of the interaction ``name``, the first without, on its second surface."""
+        return self.problem.symmetry * self.contact.resultant(name)
 
-    def driven(self) -> float:
-        """The displacement on which that force works: the load factor, or the mean one along the ``loads``."""
-        if not self.problem.loads:
-            return self.equilibrium.factor
-        u = self.equilibrium.displacement()[: self.equilibrium.n_owned]
-        return self.problem.symmetry * self.comm.allreduce(float((self.equilibrium.applied * u).sum()))
+    def contact_moment(self, name: str, point: Sequence[float]) -> float:
+        """Moment of these forces on the undeformed surface about ``point``, anticlockwise."""
+        return self.problem.symmetry * self.contact.interface(name).moment(np.asarray(point))
+
+    @property
+    def drive_names(self) -> list[str]:
+        """The names of the problem's drives."""
+        return self.equilibrium.drives.names
+
+    def drive_forces(self) -> Array:
+        """Force ``(d,)`` of each of the ``drive_names`` on the whole: its work is done on the drive's displacement."""
+        return self._of_drives(self.equilibrium.drives.moving)
+
+    def drive_displacements(self) -> Array:
+        """Displacement ``(d,)`` of each of the ``drive_names``: that of what it moves, or the mean one along loads."""
+        return self._of_drives(~self.equilibrium.drives.moving)
+
+    def _of_drives(self, conjugate: np.ndarray) -> Array:
+        """What is ``conjugate`` to the drives' levels, or else the levels."""
+        at = self.equilibrium
+        found = np.where(conjugate, self.problem.symmetry * at.conjugates(), at.levels)
+        return found[: len(self.drive_names)]
+
+    def drive_force(self, name: str) -> float:
+        """`drive_forces` of the drive ``name``."""
+        return float(self.drive_forces()[self.drive_names.index(name)])
+
+    def drive_displacement(self, name: str) -> float:
+        """`drive_displacements` of the drive ``name``."""
+        return float(self.drive_displacements()[self.drive_names.index(name)])
 
     def energies(self) -> tuple[float, float]:
         """Elastic energy and plastic dissipation of the whole."""

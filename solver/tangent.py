@@ -10,6 +10,7 @@ from archord.geometry.basis import Array
 from archord.geometry.meshes.fenicsx import create_vector
 from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact.contact import Contact
+from archord.solver.drives import Drives
 from archord.solver.linear.condensed import Condensed, filled
 from archord.solver.timer import BEFORE_SOLVING, Timer
 
@@ -17,26 +18,27 @@ from archord.solver.timer import BEFORE_SOLVING, Timer
 class TangentMatrix:
     """``A``, of the last evaluation of ``bulk`` and ``contact``, assembled by `update`. Collective.
 
-    ``fixed`` ``(n_local, 2)`` are the prescribed displacements, ``rate`` what they are per unit of the load factor.
-    With ``condense``, for elastic bodies which their supports hold, ``A`` is that of the bulk, and the contact is in
-    ``condensed``. ``factorisations`` counts those of sparse matrices that `update` asked for.
+    ``drives`` tell the prescribed displacements, and what they are per unit of the unknown levels. With ``condense``,
+    for elastic bodies which their supports hold, ``A`` is that of the bulk, and the contact is in ``condensed``.
+    ``factorisations`` counts those of sparse matrices that `update` asked for.
     """
 
-    def __init__(
-        self, bulk: Bulk, contact: Contact, fixed: np.ndarray, rate: Array, timer: Timer, *, condense: bool
-    ) -> None:
+    def __init__(self, bulk: Bulk, contact: Contact, drives: Drives, timer: Timer, *, condense: bool) -> None:
         self.V, self.bulk, self.contact, self.timer = bulk.V, bulk, contact, timer
         self.comm, index_map = self.V.mesh.comm, self.V.dofmap.index_map
         self._size, self._start, self._n = index_map.size_global, index_map.local_range[0], index_map.size_local
-        self._fixed, self._rate = fixed[: self._n], rate[: self._n]
+        self.drives, fixed, m = drives, drives.fixed, len(drives.unknown)
+        self._fixed, rate = fixed[: self._n], drives.unknown_rate[:, : self._n].reshape(m, 2 * self._n).T
+        self._direction = fem.Function(self.V)
         self._bcs = []
         for axis in range(2):
             dofs = 2 * np.flatnonzero(fixed[:, axis]).astype(np.int32) + axis
             self._bcs.append(fem.dirichletbc(0.0, dofs, self.V.sub(axis)))
         # prescribed dofs of all ranks and their rates, with those of rigid surfaces and one that is none behind
         own = np.flatnonzero(self._fixed)
-        rigid = np.append([surface.rate for surface in contact.rigid], 0.0)
-        parts = [*self.comm.allgather((2 * self._start + own, self._rate.ravel()[own]))]
+        discs = [drives.weight[:, None] * surface.rate[drives.unknown] for surface in contact.rigid]
+        rigid = np.hstack([*discs, np.zeros((m, 1))]).T
+        parts = [*self.comm.allgather((2 * self._start + own, rate[own]))]
         parts.append((2 * self._size + np.arange(len(rigid)), rigid))
         self._prescribed, self._rates = (np.concatenate(column) for column in zip(*parts, strict=True))
         self.factorisations = 0
@@ -82,11 +84,11 @@ class TangentMatrix:
 
     def _at(self, nodes: np.ndarray) -> tuple[Array, Array]:
         """Which displacements of ``nodes`` ``(k,)``, block dofs of any rank or of rigid surfaces, are free ``(k, 2)``,
-        and the rates of those that are not."""
+        and the rates ``(k, 2, m)`` of those that are not."""
         dofs = 2 * nodes[:, None] + np.arange(2)
         at = np.searchsorted(self._prescribed, dofs)
         free = self._prescribed[at] != dofs
-        return free, np.where(free, 0.0, self._rates[at])
+        return free, np.where(free[..., None], 0.0, self._rates[at])
 
     @staticmethod
     def _add(A: PETSc.Mat, rows: np.ndarray, columns: np.ndarray, values: Array) -> None:
@@ -141,22 +143,29 @@ class TangentMatrix:
         self.contact.add_force(force)
         return np.where(self._fixed, 0.0, force)
 
-    def border(self, direction: fem.Function) -> tuple[Array, Array, float]:
-        """Derivatives with respect to the load factor, which moves the bodies along ``direction``, ``(n_owned dofs,)``,
-        those of the force on it, alike, and that of the force on it with respect to it, of all ranks. The bulk's of
+    def border(self) -> tuple[Array, Array, Array]:
+        """Derivatives of the residual with respect to the unknown levels ``(n_owned dofs, m)``, of what these prescribe
+        with respect to the displacements, alike, and with respect to the levels ``(m, m)``, of all ranks. The bulk's of
         both are the same where its tangent is symmetric, as of all materials without recovery of back stresses."""
-        b = create_vector(self.V.dofmap.index_map, 2)
-        self.bulk.add_action(direction, b)
-        d = float(b.array_r @ self._rate.ravel())
-        c, tangent, blocks = b.copy(), self.contact.tangent, self._contact_blocks
-        on_rows = np.einsum("nij,nj->ni", blocks, self._column_rate)
-        on_columns = np.einsum("ni,nij->nj", self._row_rate, blocks)
-        d += float((self._row_rate * on_rows).sum())
-        free, found = ~self._fixed.ravel(), []
-        for vector, nodes, values in ((b, tangent.rows, on_rows), (c, tangent.columns, on_columns)):
-            inside = nodes < self._size
-            vector.setValuesBlocked(nodes[inside].astype(PETSc.IntType), values[inside], PETSc.InsertMode.ADD)
-            vector.assemble()
-            found.append(vector.array_r * free)
-            vector.destroy()
-        return *found, self.comm.allreduce(d)
+        drives, tangent, blocks = self.drives, self.contact.tangent, self._contact_blocks
+        m, free = len(drives.unknown), ~self._fixed.ravel()
+        load, rate = drives.unknown_load.reshape(m, -1), drives.unknown_rate[:, : self._n].reshape(m, -1)
+        on_rows = np.einsum("nij,njm->nim", blocks, self._column_rate)
+        on_columns = np.einsum("nim,nij->njm", self._row_rate, blocks)
+        D = np.tensordot(self._row_rate, on_rows, ((0, 1), (0, 1))) - rate @ load.T + load @ rate.T
+        B, C = -load.T, load.T.copy()
+        for level in range(m):
+            b = create_vector(self.V.dofmap.index_map, 2)
+            if drives.moving[drives.unknown[level]]:
+                self._direction.x.array[:] = drives.unknown_rate[level].ravel()
+                self.bulk.add_action(self._direction, b)
+                D[:, level] += rate @ b.array_r
+            c = b.copy()
+            for vector, nodes, values, whole in ((b, tangent.rows, on_rows, B), (c, tangent.columns, on_columns, C)):
+                inside = nodes < self._size
+                at = nodes[inside].astype(PETSc.IntType)
+                vector.setValuesBlocked(at, np.ascontiguousarray(values[inside, :, level]), PETSc.InsertMode.ADD)
+                vector.assemble()
+                whole[:, level] += vector.array_r
+                vector.destroy()
+        return B * free[:, None], C * free[:, None], self.comm.allreduce(D)

@@ -50,10 +50,13 @@ class Contact:
         self._reaches = [Reach(pair, i.slide) for i in interfaces for pair in i.pairs]
         self.tangent = ContactTangent(self._reaches)
 
-    def move(self, factor: float) -> None:
-        """Displace rigid surfaces by their rates times the load ``factor``."""
+    def move(self, levels: Array, fitted: float = 1.0) -> None:
+        """Displace rigid surfaces by their rates times the drives' ``levels`` ``(d,)``; interferences are there by the
+        part ``fitted``."""
         for surface in self.rigid:
-            surface.motion = factor * surface.rate[None]
+            surface.motion = levels[None] @ surface.rate
+        for interface in self.interfaces:
+            interface.fit(fitted)
 
     def search(self) -> None:
         """Forget where the pairs were: the next evaluation searches them over whole surfaces."""
@@ -116,15 +119,19 @@ class Contact:
         slots = (rows * size + columns)[(rows < size) & (columns < size)]
         return np.divmod(np.unique(np.concatenate(self.comm.allgather(slots))), size)
 
-    def resultant(self, name: str = "") -> Array:
-        """Contact force ``(2,)`` on the second surface of the interaction ``name``, the first without, over all
-        ranks."""
-        return next(i for i in self.interfaces if name in ("", i.interaction.name)).resultant()
+    def interface(self, name: str = "") -> Interface:
+        """The interface of the interaction ``name``, the first without."""
+        return next(i for i in self.interfaces if name in ("", i.interaction.name))
 
-    def force_on_factor(self) -> float:
-        """Contact force on what moves rigid surfaces, the first ones of theirs, along their rates, over all ranks."""
+    def resultant(self, name: str = "") -> Array:
+        """Contact force ``(2,)`` on the second surface of the interaction ``name``, over all ranks."""
+        return self.interface(name).resultant()
+
+    def force_on_drives(self) -> Array:
+        """Contact force ``(d,)`` on what moves rigid surfaces, the first ones of theirs, along their rates, over all
+        ranks; a single zero where there are none."""
         first = [(i.surfaces[0], i) for i in self.interfaces]
-        return float(sum(disc.rate @ i.resultant() for disc, i in first if isinstance(disc, RigidSurface)))
+        return sum((d.rate @ i.resultant() for d, i in first if isinstance(d, RigidSurface)), np.zeros(1))
 
     def histories(self) -> dict[str, tuple[np.ndarray, Points]]:
         """Numbers ``(n,)`` of facets of this rank and their ``n q`` points, of materials and of laws, by place."""

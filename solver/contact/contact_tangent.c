@@ -50,7 +50,7 @@ static void linearise(const Side *s, int32_t i, Rates *d)
     if (!s->moves) return;
     const double *tau = s->tangent + 2 * i, *x_y = s->separation + 2 * i, *t = s->stress_vector + 2 * i, b = s->bend[i];
     const double speed = sqrt(tau[0] * tau[0] + tau[1] * tau[1]);
-    const double slide = s->slides[i] ? 1 / (speed * speed - s->opening[2 * i] * b) : 0;
+    const double slide = s->slides[i] ? 1 / (speed * speed - (x_y[0] * n[0] + x_y[1] * n[1]) * b) : 0;
     /* the trial pressure follows the turning normal through t . n and, where y is a vertex, through the gap */
     const double lever = (g * (x_y[0] * tau[0] + x_y[1] * tau[1]) - (t[0] * tau[0] + t[1] * tau[1])) / speed;
     for (int c = 0; c < columns; c++)

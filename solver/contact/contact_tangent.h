@@ -10,7 +10,7 @@ typedef struct {
     double share;
     const double *gamma;
     const uint8_t *active;
-    const double *traction, *derivative, *stress_vector, *separation, *opening, *moduli;
+    const double *traction, *derivative, *stress_vector, *separation, *moduli;
     const double *shape, *slope, *normal, *tangent, *bend;
     const uint8_t *slides;
 } Side;

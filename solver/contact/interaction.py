@@ -15,7 +15,7 @@ that meshes that match nowhere pass the patch tests.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal
@@ -30,15 +30,23 @@ from archord.solver.contact.pair import Pair
 from archord.solver.contact.quadrature import segment_rule
 from archord.solver.contact.surface import RigidSurface, Surface
 
+Vector = tuple[float, float]
 GAMMA_FACTOR = 0.5  # twice the bound of coercivity; larger values stiffen the edge of the contact and cost iterations
 
 
 @dataclass(frozen=True)
 class Rigid:
-    """A rigid disc that is displaced by ``rate`` times the load factor."""
+    """A rigid disc that is displaced by ``rate`` times the displacement of the ``drive``, or by a rate of each of
+    several drives, by their names."""
 
     circle: RigidCircle
-    rate: tuple[float, float] = (0.0, 0.0)
+    rate: Vector | Mapping[str, Vector] = (0.0, 0.0)
+    drive: str = ""
+
+    def moved_by(self) -> dict[str, Vector]:
+        """Its rates by the names of the drives that move it."""
+        rates = self.rate if isinstance(self.rate, Mapping) else {self.drive: self.rate}
+        return {name: rate for name, rate in rates.items() if any(rate)}
 
 
 @dataclass(frozen=True)
@@ -51,6 +59,10 @@ class Interaction:
     Nitsche's gamma over the trace constant of each contact cell. ``integrated`` names the one facet set whose points
     carry the contact, both do if empty. ``slide`` is how far pairs are expected to slide, for which the matrix gets
     room from the start.
+
+    The gap of the law is that between the surfaces, less ``interference``, which their mesh does not show; ``overlap``
+    is what the mesh shows. Both grow from nothing in a stage of the fit, to ``s``: the gap is raised by
+    ``overlap (1 - s) - interference s``.
     """
 
     name: str
@@ -60,13 +72,15 @@ class Interaction:
     gamma_factor: float = GAMMA_FACTOR
     integrated: str = ""
     slide: float = 0.0
+    interference: float = 0.0
+    overlap: float = 0.0
 
 
 class Interface:
     """The ``interaction`` of two ``surfaces`` as pairs of them.
 
-    Collective; raises ValueError if none of them is to be integrated, and `ProjectionError` on every rank if a point on
-    any of them finds no partner.
+    Collective; raises ValueError if none of them is to be integrated, or an interference is to be tied, and
+    `ProjectionError` on every rank if a point on any of them finds no partner.
     """
 
     def __init__(self, interaction: Interaction, surfaces: Sequence[Surface | RigidSurface]) -> None:
@@ -76,6 +90,8 @@ class Interface:
         self.slide = interaction.slide if moves else 0.0
         given = zip(surfaces, interaction.surfaces, strict=True)
         chosen = [own for own, name in given if isinstance(own, Surface) and interaction.integrated in ("", name)]
+        if not law.slides and (interaction.interference or interaction.overlap):
+            raise ValueError(f"{interaction.name!r} is tied: it keeps its gaps, and knows no interference or overlap")
         if not chosen:
             raise ValueError(f"{interaction.name!r} does not have the surface {interaction.integrated!r}")
         compliance = np.array([1 / own.material.elastic_tangent[0, 0] for own in chosen])
@@ -88,6 +104,12 @@ class Interface:
                 self.pairs.append(Pair(own, opposite, law, float(share), moves=moves))
         if not moves and isinstance(surfaces[1], Surface) and chosen[0] is surfaces[0]:
             self.pairs[0].use_own_normals()
+        self.fit(1.0)
+
+    def fit(self, part: float) -> None:
+        """Let interferences be there by this ``part``."""
+        for pair in self.pairs:
+            pair.offset = self.interaction.overlap * (1 - part) - self.interaction.interference * part
 
     def resultant(self) -> Array:
         """Contact force ``(2,)`` on the second surface, over all ranks."""
@@ -95,6 +117,15 @@ class Interface:
         for pair in self.pairs:
             total += pair.forces.sum(0) * (1 if pair.surface is self.surfaces[1] else -1)
         return self.pairs[0].surface.sum_over_ranks(total)
+
+    def moment(self, point: Array) -> float:
+        """Moment of the contact forces on the nodes of the second surface about ``point`` ``(2,)``, over all ranks."""
+        second, total = self.surfaces[1], np.zeros_like(self.surfaces[1].curve.X)
+        for pair in self.pairs:
+            other = np.zeros_like((pair.opposite if pair.surface is second else pair.surface).curve.X)
+            pair.add_forces(*((total, other) if pair.surface is second else (other, total)))
+        arm = second.curve.X - point
+        return float(self.pairs[0].surface.sum_over_ranks(arm[:, 0] * total[:, 1] - arm[:, 1] * total[:, 0]).sum())
 
 
 @contextmanager

@@ -24,8 +24,9 @@ class Pair:
     ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)`` normal and tangent
     and ``opening`` ``(m, 2)`` gap and slip; ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` are those of the
     own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active``
-    ``(m,)`` points touch, and ``changes`` opened or closed. The next evaluation searches partners from ``start`` on:
-    anywhere, near the last ones, or on their facets alone, where points are held until it is set again.
+    ``(m,)`` points touch, and ``changes`` opened or closed. ``offset`` is added to the gap. The next evaluation
+    searches partners from ``start`` on: anywhere, near the last ones, or on their facets alone, where points are held
+    until it is set again.
     """
 
     def __init__(
@@ -39,6 +40,7 @@ class Pair:
         self.traction: Array = np.zeros((len(x), 2))
         self.active = np.zeros(len(x), dtype=bool)
         self.start: Start = "anywhere"
+        self.offset = 0.0
 
     def use_gamma(self, factor: float) -> None:
         """Nitsche's gamma ``(m,)`` is ``factor`` times the share and the trace constant of the point's cell."""
@@ -65,6 +67,7 @@ class Pair:
         self.stress_vector = np.stack([xx * N_x + xy * N_y, xy * N_x + yy * N_y], axis=1)
         self.frame = np.stack([n[:, 0], n[:, 1], -n[:, 1], n[:, 0]], axis=1).reshape(-1, 2, 2)
         self.opening = np.einsum("mij,mj->mi", self.frame, opening)
+        self.opening[:, 0] += self.offset
         self.trial = np.einsum("mij,mj->mi", self.frame, self.stress_vector) - self.gamma[:, None] * self.opening
         self.traction = self._answer(self.trial)
 

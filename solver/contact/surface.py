@@ -7,10 +7,9 @@ cells it owns. What a facet needs of its own cell stays local.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import basix
 import numpy as np
+import numpy.typing as npt
 from dolfinx import fem
 
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis, strain, strain_matrix
@@ -142,13 +141,13 @@ class Surface:
 class RigidSurface:
     """A rigid disc as a surface of one facet, without points of its own, displaced by ``motion`` ``(1, 2)``.
 
-    ``rate`` ``(2,)`` is that per unit of the load factor; ``curve_dofs`` ``(1,)`` is a block dof behind the others.
+    ``rate`` ``(d, 2)`` is that per unit of each drive; ``curve_dofs`` ``(1,)`` is a block dof behind the others.
     """
 
     n_facets = 1
 
-    def __init__(self, circle: RigidCircle, rate: Sequence[float] = (0.0, 0.0)) -> None:
-        self.curve, self.rate = circle, np.array(rate, dtype=float)
+    def __init__(self, circle: RigidCircle, rate: npt.ArrayLike = (0.0, 0.0)) -> None:
+        self.curve, self.rate = circle, np.atleast_2d(np.asarray(rate, dtype=float))
         self.motion: Array = np.zeros((1, 2))
         self.curve_dofs = np.zeros(1, dtype=np.int64)
 

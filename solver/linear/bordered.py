@@ -1,7 +1,8 @@
-"""Newton's linear system with one more unknown: the load factor of a rigid motion on which a given force acts.
+"""Newton's linear system with a few more unknowns: levels of drives, such as rigid motions on which given forces act.
 
-``[A b; c d] (u, s) = (r, rho)`` is solved by one factorisation of A, the matrix at a given load factor, and two solves
-with it: displacement control is regular wherever force control is, and beyond.
+``[A B; C D] (u, s) = (r, rho)`` with ``m`` of them is solved by one factorisation of A, the matrix at given levels, and
+``m + 1`` solves with it, through the Schur complement ``D - C A^-1 B``: displacement control is regular wherever force
+control is, and beyond.
 """
 
 from __future__ import annotations
@@ -15,31 +16,38 @@ from archord.geometry.basis import Array
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Inverse, Strategy
 
-_SINGULAR = 1e-9  # stiffness against the motion over ``stiffness`` below which nothing resists the force
+_SINGULAR = 1e-9  # stiffness against a motion over ``stiffness`` below which nothing resists the force
+_FORCED = 1e-3  # part of a right-hand side along such a motion above which the system has no solution
 
 
 def why_not(facts: Facts) -> str | None:
     """Why the system has no border."""
-    return None if facts.by_force else "the load is no force"
+    return None if facts.by_force else "no load is the force on a motion, or a mean displacement"
 
 
 class Bordered(Inverse):
     """Python context of the bordered matrix and of its preconditioner, which solves with the last one that was
     factorised.
 
-    The load factor is the last entry of rank 0. ``stiffness`` scales what counts as resistance; ``factoriser``
-    gives the strategy for ``A``. Collective.
+    The ``m`` levels are the last entries of rank 0. ``stiffness`` scales what counts as resistance; ``factoriser``
+    gives the strategy for ``A``. ``singular`` numbers the level that a force moves most which nothing resists, None
+    without one. Collective.
     """
 
-    def __init__(self, A: PETSc.Mat, stiffness: float, factoriser: Callable[[PETSc.Mat], Strategy] = Direct) -> None:
+    def __init__(
+        self, A: PETSc.Mat, m: int, stiffness: float, factoriser: Callable[[PETSc.Mat], Strategy] = Direct
+    ) -> None:
         self.comm, self._stiffness, self._factoriser = A.comm.tompi4py(), stiffness, factoriser
         self._n = A.getLocalSize()[0]
-        self._extra = int(self.comm.rank == 0)
-        self.b, self.c, self.d = np.zeros(self._n), np.zeros(self._n), 0.0
-        self._factorised = self.c, self.d  # with the matrix that the preconditioner is of
-        self._stale, self.singular = True, False
+        self._extra = m if self.comm.rank == 0 else 0
+        self.B: Array = np.zeros((self._n, m))
+        self.C: Array = np.zeros((self._n, m))
+        self.D: Array = np.zeros((m, m))
+        self._factorised: tuple[Array, Array] = self.C, self.D  # with the matrix that the preconditioner is of
+        self._stale = True
+        self.singular: int | None = None
         self._x, self._y = A.createVecs()
-        self._along_b = np.zeros(self._n)
+        self._along_B: Array = np.zeros((self._n, m))
         self._ksp = PETSc.KSP()
         size = (self._n + self._extra, None)
         self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=self.comm)
@@ -54,21 +62,22 @@ class Bordered(Inverse):
         self._factoriser(A).attach(self._ksp)
 
     def vector(self) -> PETSc.Vec:
-        """A vector with the load factor as its last entry."""
+        """A vector with the levels as its last entries."""
         return PETSc.Vec().createMPI((self._n + self._extra, None), comm=self.comm)
 
-    def factor(self, x: PETSc.Vec) -> float:
-        """The load factor in ``x``, on every rank."""
-        return float(self.comm.bcast(x.array_r[-1] if self._extra else None))
+    def levels(self, x: PETSc.Vec) -> Array:
+        """The levels ``(m,)`` in ``x``, on every rank."""
+        return self.comm.bcast(x.array_r[self._n :].copy())
 
-    def join(self, x: PETSc.Vec, u: Array, factor: float) -> None:
-        """Put ``u`` ``(n_owned dofs,)`` and ``factor`` into ``x``."""
-        x.array[: self._n], x.array[self._n :] = u, factor
+    def join(self, x: PETSc.Vec, u: Array, levels: Array) -> None:
+        """Put ``u`` ``(n_owned dofs,)`` and ``levels`` ``(m,)`` into ``x``."""
+        x.array[: self._n], x.array[self._n :] = u, levels[: self._extra]
 
-    def update(self, b: Array, c: Array, d: float, *, factorise: bool = True) -> None:
-        """New border for a matrix with new values: ``b`` and ``c`` of this rank's dofs, ``d`` of all ranks. Without
-        ``factorise`` the preconditioner stays that of the last matrix that was factorised."""
-        self.b, self.c, self.d = b, c, d
+    def update(self, B: Array, C: Array, D: Array, *, factorise: bool = True) -> None:
+        """New border for a matrix with new values: ``B`` and the transpose of ``C`` ``(n_owned dofs, m)``, ``D`` ``(m,
+        m)`` of all ranks. Without ``factorise`` the preconditioner stays that of the last matrix that was factorised.
+        """
+        self.B, self.C, self.D = B, C, D
         self._stale |= factorise
         self._ksp.getPC().setReusePreconditioner(not self._stale)
 
@@ -78,20 +87,24 @@ class Bordered(Inverse):
         return self._y.array_r.copy()
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """``y = [A b; c d] x``, called by PETSc."""
-        s, u = self.factor(x), x.array_r[: self._n]
+        """``y = [A B; C D] x``, called by PETSc."""
+        s, u = self.levels(x), x.array_r[: self._n]
         self._x.array[:] = u
         self._A.mult(self._x, self._y)
-        self.join(y, self._y.array_r + s * self.b, self.comm.allreduce(float(self.c @ u)) + self.d * s)
+        self.join(y, self._y.array_r + self.B @ s, self.comm.allreduce(u @ self.C) + self.D @ s)
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, x: PETSc.Vec) -> None:
-        """``x = [A b; c d]^-1 r``, called by PETSc; where nothing resists the motion, the load factor stays."""
+        """``x = [A B; C D]^-1 r``, called by PETSc; levels stay along motions that nothing resists."""
         if self._stale:
-            self._along_b, self._factorised = self._solve(self.b), (self.c, self.d)
-            self._stale = False
-        rho, u = self.factor(r), self._solve(r.array_r[: self._n])
-        c, d = self._factorised
-        along_b, along_u = self.comm.allreduce(np.array([c @ self._along_b, c @ u]))
-        self.singular = abs(d - along_b) < _SINGULAR * self._stiffness
-        s = 0.0 if self.singular else (rho - along_u) / (d - along_b)
-        self.join(x, u - s * self._along_b, s)
+            self._along_B = np.stack([self._solve(b) for b in self.B.T], axis=1)
+            self._factorised, self._stale = (self.C, self.D), False
+        rho, u = self.levels(r), self._solve(r.array_r[: self._n])
+        C, D = self._factorised
+        along_B, along_u = self.comm.allreduce(C.T @ self._along_B), self.comm.allreduce(u @ C)
+        left, resistance, right = np.linalg.svd(D - along_B)
+        forced, resisted = left.T @ (rho - along_u), resistance >= _SINGULAR * self._stiffness
+        s = right.T @ np.divide(forced, resistance, where=resisted, out=np.zeros_like(forced))
+        free = np.where(resisted, 0.0, np.abs(forced))
+        loose = free.max() > _FORCED * r.norm()
+        self.singular = int(np.argmax(np.abs(right[np.argmax(free)]))) if loose else None
+        self.join(x, u - self._along_B @ s, s)

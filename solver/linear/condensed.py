@@ -34,7 +34,7 @@ def why_not(facts: Facts) -> str | None:
     if facts.yields:
         return "bodies can yield"
     if facts.by_force:
-        return "the load is a force"
+        return "displacements of drives are unknown"
     if facts.dofs >= _MOST_DOFS:
         return f"{_MOST_DOFS} dofs or more"
     if facts.gamma_factor is None:

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
 from archord.solver.load_path import LoadPath
-from archord.solver.problem import Body, Guess, Interaction, Load, Problem, Support
+from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Support
 from archord.solver.stepping import StepRules
 from archord.solver.system import System
 from tests.solver.parts import ELASTIC, HARDENING, NU, E, blocks, coordinates, solve
@@ -32,14 +32,14 @@ def columns(width: float = 1.0, material=HARDENING, **options) -> Problem:
     return Problem(blocks(MPI.COMM_SELF, 3, 4, width=width), bodies, [ON_EACH_OTHER], BETWEEN_WALLS, **options)
 
 
-@pytest.mark.parametrize("control", ["factor", "force"])
+@pytest.mark.parametrize("control", ["displacement", "force"])
 def test_half_a_problem_with_symmetry_two_is_the_whole(control):
     """Forces, energies and PEEQ under both controls: the load of the half is that of the whole."""
-    halves = [columns(width, symmetry=2 / width, control=control) for width in (1.0, 2.0)]
-    systems = [solve(halves[0], [DEPTH if control == "factor" else 0.06])]
+    halves = [columns(width, symmetry=2 / width, drives=[Drive("", control=control)]) for width in (1.0, 2.0)]
+    systems = [solve(halves[0], [DEPTH if control == "displacement" else 0.06])]
     systems.append(solve(halves[1], [systems[0].equilibrium.load]))
     found = [
-        [s.driven(), s.driving_force(), *s.reaction("base"), *s.contact_force(), *s.energies(), *s.peeq()]
+        [s.drive_displacement(""), s.drive_force(""), *s.reaction("base"), *s.contact_force(), *s.energies(), *s.peeq()]
         for s in systems
     ]
     assert found[0] == pytest.approx(found[1], rel=1e-8, abs=1e-14)
@@ -61,8 +61,8 @@ def test_a_second_call_goes_on_from_the_first(monkeypatch):
 def test_force_control_finds_the_load_factor_of_its_force():
     """The force that a displacement takes, prescribed, takes that displacement back."""
     moved = solve(columns(), [DEPTH])
-    pushed = solve(columns(control="force"), [moved.driving_force()])
-    assert pushed.equilibrium.factor == pytest.approx(DEPTH, rel=1e-8)
+    pushed = solve(columns(drives=[Drive("", control="force")]), [moved.drive_force("")])
+    assert pushed.drive_displacement("") == pytest.approx(DEPTH, rel=1e-8)
     assert pushed.energies() == pytest.approx(moved.energies(), rel=1e-8)
 
 
@@ -80,9 +80,9 @@ def test_a_column_under_its_weight_follows_the_closed_form(symmetry):
     exact = -weight / symmetry / modulus * (1 - y[lower] ** 2) / 2
     np.testing.assert_allclose(u[lower, 1], exact, rtol=0, atol=1e-9 * weight)
     assert system.reaction("base")[1] == pytest.approx(weight, rel=1e-9)
-    assert system.driving_force() == weight
-    assert system.driven() == pytest.approx(weight / symmetry / modulus / 3, rel=1e-9)
-    assert system.energies()[0] == pytest.approx(system.driving_force() * system.driven() / 2, rel=1e-9)
+    assert system.drive_force("") == weight
+    assert system.drive_displacement("") == pytest.approx(weight / symmetry / modulus / 3, rel=1e-9)
+    assert system.energies()[0] == pytest.approx(system.drive_force("") * system.drive_displacement("") / 2, rel=1e-9)
 
 
 def test_a_load_is_spread_as_its_density_says():
@@ -90,9 +90,9 @@ def test_a_load_is_spread_as_its_density_says():
     mesh, load = blocks(MPI.COMM_SELF, 3, 3), Load("upper", (3.0, 4.0), lambda x: x[0] * x[1])
     bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
     equilibrium = System(Problem(mesh, bodies, (), [Support("base", "base", 1)], [load])).equilibrium
-    assert equilibrium.applied.sum(axis=0) == pytest.approx([3.0, 4.0], rel=1e-12)
+    assert equilibrium.drives.applied[0].sum(axis=0) == pytest.approx([3.0, 4.0], rel=1e-12)
     x = coordinates(equilibrium.V)
-    assert equilibrium.applied.T @ x == pytest.approx(np.outer([3, 4], [2 / 3, 2 / 3]), rel=1e-12)
+    assert equilibrium.drives.applied[0].T @ x == pytest.approx(np.outer([3, 4], [2 / 3, 2 / 3]), rel=1e-12)
 
 
 def test_a_guess_moves_bodies_rigidly():
@@ -124,7 +124,7 @@ class Lopsided(Elastic):
 def test_an_anisotropic_body_follows_the_closed_form():
     """Between walls: the pressure is the upright modulus times the strain."""
     grained = Grained(E, NU, "strain")
-    assert solve(columns(material=grained), [DEPTH]).driving_force() == pytest.approx(
+    assert solve(columns(material=grained), [DEPTH]).drive_force("") == pytest.approx(
         grained.elastic_tangent[1, 1] * DEPTH / 2, rel=1e-9
     )
 
@@ -146,7 +146,11 @@ REFUSED = {
     "does not have the surface 'lid'": {
         "interactions": [Interaction("joint", ("upper bottom", "lower top"), integrated="lid")]
     },
-    'use "factor"': {"control": "force", "loads": [Load("lower", (0.0, -1.0))]},
+    "must move supports": {"supports": [Support("base", "base", 1, 1.0)], "loads": [Load("lower", (0.0, -1.0))]},
+    "no drive 'up'": {"loads": [Load("lower", (0.0, -1.0), drive="up")]},
+    "'up' moves nothing": {"drives": [Drive("up")]},
+    "on the cells of a set or on its facets": {"loads": [Load("lower", pressure=1.0)]},
+    "'joint' is tied": {"interactions": [Interaction("joint", ("upper bottom", "lower top"), "tied", overlap=0.1)]},
     "must say yields": {"bodies": [Body("lower", Stiffening(E, NU, "strain"))]},
 }
 
@@ -172,5 +176,5 @@ def test_round_off_is_no_reason_to_refuse_a_material(nu):
     """Where a stress of the check cancels, nothing but round-off is left of it."""
     for plane in ("strain", "stress"):
         materials = Elastic(E, nu, plane), Rounded(E, nu, plane)
-        forces = [solve(columns(material=material), [DEPTH]).driving_force() for material in materials]
+        forces = [solve(columns(material=material), [DEPTH]).drive_force("") for material in materials]
         assert forces[0] == pytest.approx(forces[1], rel=1e-9)

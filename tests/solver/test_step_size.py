@@ -16,7 +16,8 @@ from archord.solver.stepping import StepFailure, StepRules, march
 class Spring:
     """Equilibrium and solver in one, which converges in ``cost(load, stride)`` iterations; infinite: it fails."""
 
-    problem = SimpleNamespace(load_name="delta", control="factor", loads=[], from_rest=True)
+    problem = SimpleNamespace(load_name="delta", by_force=False, from_rest=True)
+    drives = SimpleNamespace(course=lambda load: np.array([load]))
     bulk = SimpleNamespace(plastic=True)
 
     def __init__(self, cost):

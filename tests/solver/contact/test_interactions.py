@@ -115,12 +115,12 @@ def test_every_rigid_disc_moves_by_itself():
     sides = {"pin": [pin, parts.sides[0]], "disc": [disc, edge]}
     interfaces = [Interface(Interaction(name, ("", "")), surfaces) for name, surfaces in sides.items()]
     both, u, depth, h = Contact(parts.V, interfaces), np.zeros((len(coordinates(parts.V)), 2)), 1.5 * DR, 1e-6 * DR
-    both.move(depth)
-    np.testing.assert_array_equal([pin.motion[0], disc.motion[0]], [depth * pin.rate, depth * disc.rate])
+    both.move(np.array([depth]))
+    np.testing.assert_array_equal([pin.motion[0], disc.motion[0]], [depth * pin.rate[0], depth * disc.rate[0]])
     contact_force(both, u)
     assert all(pair.active.any() for pair in both.pairs)
-    along = sum(rate @ both.resultant(name) for rate, name in ((pin.rate, "pin"), (disc.rate, "disc")))
-    assert both.force_on_factor() == pytest.approx(along, rel=1e-14)
+    along = sum(d.rate @ both.resultant(name) for d, name in ((pin, "pin"), (disc, "disc")))
+    assert both.force_on_drives() == pytest.approx(along, rel=1e-14)
     rows, columns, blocks_ = both.tangent.rows, both.tangent.columns, both.tangent.blocks()
     for number, surface in enumerate((pin, disc)):
         for axis, direction in enumerate(np.eye(2)):

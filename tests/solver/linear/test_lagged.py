@@ -57,7 +57,8 @@ def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
     rng = np.random.default_rng(3)
     n = 6
     old, new = (rng.normal(size=(n, n)) + 5 * np.eye(n) for _ in range(2))
-    borders = [(rng.normal(size=n), rng.normal(size=n), 3.0), (rng.normal(size=n), rng.normal(size=n), 4.0)]
+    m = 2
+    borders = [(rng.normal(size=(n, m)), rng.normal(size=(n, m)), 3 * k * np.eye(m)) for k in (1, 2)]
     A = PETSc.Mat().createAIJ((n, n), nnz=n, comm=MPI.COMM_SELF)
 
     def fill(values):
@@ -66,13 +67,13 @@ def test_a_border_kept_solves_with_the_last_one_that_was_factorised():
         A.assemble()
 
     def whole(values, border):
-        b, c, d = border
-        return np.block([[values, b[:, None]], [c[None], np.array([[d]])]])
+        B, C, D = border
+        return np.block([[values, B], [C.T, D]])
 
     fill(old)
-    system = Bordered(A, 1.0)
+    system = Bordered(A, m, 1.0)
     r, x = system.vector(), system.vector()
-    r.array[:] = rng.normal(size=n + 1)
+    r.array[:] = rng.normal(size=n + m)
     system.update(*borders[0])
     system.apply(None, r, x)
     assert whole(old, borders[0]) @ x.array_r == pytest.approx(r.array_r, abs=1e-12)

@@ -1,0 +1,193 @@
+"""What moves and what loads a problem: the shape of each drive in the displacement space, and which are unknown.
+
+Every drive has one level: the displacement ``q`` of what it moves, where prescribed displacements are ``rate q``, or
+the force ``f`` of loads and means, whose nodal forces are ``applied f``. Conjugate to it is the force on what moves, or
+the displacement of what is loaded: their product is work. Where a drive prescribes the conjugate (a force on what
+moves; the displacement of a mean, whose force is a Lagrange multiplier then), the level is unknown, with the equation
+that the conjugate is the drive's value.
+
+A body that nothing but prescribed means holds would leave the tangent of all displacements singular. Three of its
+displacements become levels of drives without force, its anchors, which change nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.la import InsertMode
+from dolfinx.mesh import meshtags
+from mpi4py import MPI
+
+from archord.geometry.basis import Array
+from archord.solver.contact.contact import Contact
+from archord.solver.contact.surface import RigidSurface
+from archord.solver.problem import Body, Load, Mean, Problem, Rigid
+
+_LOAD_DEGREE = 6  # of the quadrature of distributed forces
+_MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
+_SAME_PLACE = 1e-9  # of the distance between two anchors
+
+
+class Drives:
+    """The drives of ``problem`` in the displacement space ``V``, which move the rigid surfaces of ``contact``, too;
+    ``stiffness`` is that of the stiffest body. Collective; raises ValueError.
+
+    ``names`` are the problem's; in arrays of ``d`` drives the anchors follow. ``fixed`` ``(n_local, 2)`` are the
+    prescribed displacements; ``rate`` ``(d, n_local, 2)`` and ``applied`` ``(d, n_owned, 2)``, on the modelled part,
+    are per unit of the levels, which are displacements where ``moving`` ``(d,)``. The levels ``unknown`` ``(m,)`` are
+    solved for in units of ``weight`` ``(m,)``, as are their equations: displacements of bodies, and forces.
+    """
+
+    def __init__(self, problem: Problem, V: fem.FunctionSpace, contact: Contact, stiffness: float) -> None:
+        self.problem, self.V, self.comm, index_map = problem, V, V.mesh.comm, V.dofmap.index_map
+        self.n_owned, self._n_local = index_map.size_local, index_map.size_local + index_map.num_ghosts
+        self._x, self._stiffness = V.tabulate_dof_coordinates()[:, :2], stiffness
+        self._drives = problem.all_drives
+        self.names = names = [drive.name for drive in self._drives]
+        self.rate, self.applied = (np.zeros((len(names), n, 2)) for n in (self._n_local, self.n_owned))
+        self._supports = list(dict.fromkeys(s.name for s in problem.supports))
+        self._holder = np.full((self._n_local, 2), -1)  # which of them holds a displacement
+        self._hold()
+        for load in problem.loads:
+            self.applied[names.index(load.drive)] += self._nodal_forces(load)
+        for mean in problem.means:
+            self.applied[names.index(mean.drive)] = self._mean_motion(mean) / problem.symmetry
+        controls = {drive.name: drive.control for drive in self._drives}
+        prescribed = [m for m in problem.means if controls[m.drive] == "displacement"]
+        moves = problem.moving_drives()
+        unknown = [name for name in moves if controls[name] == "force"] + [m.drive for m in prescribed]
+        anchors = self._anchors({body.name: body for body in (problem.body_of(m.facets) for m in prescribed)}.values())
+        self.rate = np.concatenate([self.rate, anchors])
+        self.applied = np.pad(self.applied, ((0, len(anchors)), (0, 0), (0, 0)))
+        self.moving = np.append(np.isin(names, list(moves)), np.ones(len(anchors), dtype=bool))
+        self.unknown = np.append(np.flatnonzero(np.isin(names, unknown)), len(names) + np.arange(len(anchors)))
+        self.unknown = self.unknown.astype(int)
+        for interface in contact.interfaces:
+            disc, given = interface.surfaces[0], interface.interaction.surfaces[0]
+            if isinstance(disc, RigidSurface) and isinstance(given, Rigid):
+                rates = [given.moved_by().get(name, (0.0, 0.0)) for name in names]
+                disc.rate = np.array(rates + [(0.0, 0.0)] * len(anchors))
+        self.fixed = self._holder >= 0
+        self.weight = np.array([self._weight(level, contact) for level in self.unknown])
+        self.unknown_rate = self.weight[:, None, None] * self.rate[self.unknown]
+        self.unknown_load = self.weight[:, None, None] * self.applied[self.unknown]
+
+    def _hold(self) -> None:
+        """Note what supports prescribe."""
+        for s in self.problem.supports:
+            nodes, number = self.problem.mesh.dofs_in(self.V, s.facets), self._supports.index(s.name)
+            self.rate[:, nodes[self._holder[nodes, s.axis] != number], s.axis] = 0.0
+            self._holder[nodes, s.axis] = number
+            if s.moves:
+                rate = s.rate(self._x[nodes]) if callable(s.rate) else s.rate
+                self.rate[self.names.index(s.drive), nodes, s.axis] = rate
+
+    def _weight(self, level: int, contact: Contact) -> float:
+        """The unit of a level: one that moves a node by 1 at most, or whose forces are of the size of the stiffness."""
+        if not self.moving[level]:
+            return self._stiffness / self.comm.allreduce(np.abs(self.applied[level]).sum())
+        largest = max(
+            np.abs(self.rate[level]).max(initial=0.0), *(np.abs(d.rate[level]).max() for d in contact.rigid), 0
+        )
+        return 1 / self.comm.allreduce(largest, op=MPI.MAX)
+
+    def values(self, factor: float) -> Array:
+        """What the drives prescribe ``(d,)`` at the load ``factor``."""
+        values = [drive.value(factor) for drive in self._drives]
+        return np.array(values + [0.0] * (len(self.rate) - len(values)))
+
+    def course(self, factor: float) -> Array:
+        """Where the path is at the load ``factor``: the problem's drives over their largest values, and the fit."""
+        largest = [max(map(abs, drive.path), default=1.0) or 1.0 for drive in self._drives]
+        return np.append(self.values(factor)[: len(largest)] / largest, self.problem.fitted(factor))
+
+    def held_by(self, name: str) -> np.ndarray:
+        """Which displacements ``(n_owned, 2)`` the supports ``name`` prescribe."""
+        return self._holder[: self.n_owned] == (self._supports.index(name) if name in self._supports else np.nan)
+
+    def of_means(self, name: str) -> list[int]:
+        """The levels that are forces of the means ``name``."""
+        return [self.names.index(mean.drive) for mean in self.problem.means if mean.name == name]
+
+    def held(self, body: Body, *, alone: bool = True) -> bool:
+        """Whether supports ``alone`` keep the ``body`` from moving rigidly; else whether they do with means while
+        drives without a prescribed displacement give way. Collective."""
+        nodes = np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
+        x = self._x[nodes] / self.comm.allreduce(np.abs(self._x[nodes]).max(initial=0.0), op=MPI.MAX)
+        modes = np.zeros((self._n_local, 2, 3))
+        modes[nodes, 0, 0] = modes[nodes, 1, 1] = 1.0
+        modes[nodes, 0, 2], modes[nodes, 1, 2] = -x[:, 1], x[:, 0]
+        fixed = self._holder >= 0
+        rows = np.hstack([modes[fixed], np.zeros((fixed.sum(), 0)) if alone else self.unknown_rate[:, fixed].T])
+        gram = self.comm.allreduce(rows.T @ rows)
+        released = np.linalg.pinv(gram[3:, 3:], rcond=_MOVABLE, hermitian=True)
+        stiffness = gram[:3, :3] - gram[:3, 3:] @ released @ gram[3:, :3]
+        if not alone:
+            along = np.tensordot(self.unknown_load / self._stiffness, modes[: self.n_owned], 2)
+            along = self.comm.allreduce(along)
+            stiffness += along.T @ along
+        smallest, _, largest = np.linalg.eigvalsh(stiffness)
+        return bool(smallest > _MOVABLE * largest)
+
+    def _anchors(self, bodies: Iterable[Body]) -> Array:
+        """The rates ``(a, n_local, 2)`` of three anchors for each of the ``bodies`` that supports do not hold."""
+        found: list[Array] = []
+        for body in bodies:
+            if self.held(body):
+                continue
+            nodes = np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
+            nodes = nodes[(self._holder[nodes] < 0).all(axis=1)]
+            places = np.concatenate(self.comm.allgather(self._x[nodes[nodes < self.n_owned]]))
+            first = places[np.lexsort(places.T)[0]]
+            away = places[np.argmax(np.linalg.norm(places - first, axis=1))] - first
+            across = int(abs(away[0]) > abs(away[1]))
+            for place, axis in ((first, 0), (first, 1), (first + away, across)):
+                here = nodes[np.abs(self._x[nodes] - place).max(axis=1) < _SAME_PLACE * np.abs(away).max()]
+                found.append(np.zeros((self._n_local, 2)))
+                found[-1][here, axis] = 1.0
+                self._holder[here, axis] = len(self._supports)
+        return np.array(found).reshape(-1, self._n_local, 2)
+
+    def _measure(self, cells: str, facets: str) -> Any:
+        """The measure of a set of cells, or of facets."""
+        mesh, sets = self.V.mesh, self.problem.mesh
+        entities = np.unique(sets.cells_in(cells) if cells else sets.facets_in(facets))
+        tags = meshtags(mesh, 2 if cells else 1, entities.astype(np.int32), 1)
+        rule = {"quadrature_degree": _LOAD_DEGREE}
+        return ufl.Measure("dx" if cells else "ds", mesh, subdomain_data=tags, metadata=rule)(1)
+
+    def _integral(self, form: Any) -> float:
+        return self.comm.allreduce(fem.assemble_scalar(fem.form(form)))
+
+    def _vector(self, form: Any) -> Array:
+        """The linear ``form`` at the nodes ``(n_owned, 2)``."""
+        vector = fem.assemble_vector(fem.form(form))
+        vector.scatter_reverse(InsertMode.add)
+        return vector.array[: 2 * self.n_owned].reshape(-1, 2)
+
+    def _nodal_forces(self, load: Load) -> Array:
+        """Forces ``(n_owned, 2)`` on the modelled part per unit of the drive."""
+        mesh, v, measure = self.V.mesh, ufl.TestFunction(self.V), self._measure(load.cells, load.facets)
+        if load.pressure:
+            normal = ufl.FacetNormal(mesh)
+            return self._vector(-fem.Constant(mesh, load.pressure) * ufl.inner(normal, v) * measure)
+        force = fem.Constant(mesh, np.array(load.force))
+        density = fem.Constant(mesh, 1.0) if load.density is None else load.density(ufl.SpatialCoordinate(mesh))
+        total = self._integral(density * measure)
+        return self._vector(density * ufl.inner(force, v) * measure) / (self.problem.symmetry * total)
+
+    def _mean_motion(self, mean: Mean) -> Array:
+        """Derivative ``(n_owned, 2)`` of the mean motion by the displacements of the nodes."""
+        mesh, v, ds = self.V.mesh, ufl.TestFunction(self.V), self._measure("", mean.facets)
+        x, one = ufl.SpatialCoordinate(mesh), fem.Constant(mesh, 1.0)
+        length = self._integral(one * ds)
+        centre = np.array([self._integral(x[i] * ds) for i in (0, 1)]) / length
+        arm = x - fem.Constant(mesh, centre)
+        lever = np.array(mean.point) - centre
+        rotation = np.array([-lever[1], lever[0], 1.0])[mean.axis] / self._integral(ufl.inner(arm, arm) * ds)
+        shift, turn = (fem.Constant(mesh, c) for c in (np.eye(3)[mean.axis, :2] / length, rotation))
+        return self._vector((ufl.inner(shift, v) + turn * (arm[0] * v[1] - arm[1] * v[0])) * ds)
