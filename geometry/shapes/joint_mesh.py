@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from itertools import pairwise
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -55,6 +55,7 @@ class Drawing(NamedTuple):
 
 
 Place = tuple[float, float]
+PinPart = Literal["half", "whole", "none"]
 _CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
 
 
@@ -117,32 +118,51 @@ def mesh_joint(
     return joint
 
 
-class Pen:
-    """Draws one body with gmsh's ``geo``: every point, line and arc once, by its ends."""
+class Sketch:
+    """Bodies drawn with gmsh's ``geo``, each with every point, line and arc once, and its ``faces`` and ``lines``."""
 
-    def __init__(self, geo) -> None:
+    def __init__(self, geo, bodies: Sequence[str], sets: Sequence[str]) -> None:
         self._geo = geo
-        self._points: dict[Place, int] = {}
-        self._lines: dict[tuple[Place, Place], int] = {}
+        self._points: dict[tuple[str, Place], int] = {}
+        self._lines: dict[tuple[str, Place, Place], int] = {}
+        self.faces: dict[str, list[int]] = {name: [] for name in bodies}
+        self.lines: dict[str, list[int]] = {name: [] for name in sets}
 
-    def point(self, x: float, y: float) -> int:
-        """The point (x, y)."""
-        if (x, y) not in self._points:
-            self._points[x, y] = self._geo.addPoint(x, y, 0)
-        return self._points[x, y]
+    def point(self, body: str, place: Place) -> int:
+        """The point of ``body`` at (x, y)."""
+        if (body, place) not in self._points:
+            self._points[body, place] = self._geo.addPoint(*place, 0)
+        return self._points[body, place]
 
-    def path(self, *places: Place, centre: Place | None = None) -> list[int]:
-        """The lines from each place to the next, or arcs around a ``centre``."""
-        for ends in pairwise(places):
-            if ends not in self._lines:
-                a, b = (self.point(*end) for end in ends)
-                arc = centre and self._geo.addCircleArc(a, self.point(*centre), b)
-                self._lines[ends] = self._lines[ends[::-1]] = arc or self._geo.addLine(a, b)
-        return [self._lines[ends] for ends in pairwise(places)]
+    def path(self, body: str, *places: Place, centre: Place | None = None) -> list[int]:
+        """The lines of ``body`` from each place to the next, or arcs around a ``centre``."""
+        for a, b in pairwise(places):
+            if (body, a, b) not in self._lines:
+                p, q = self.point(body, a), self.point(body, b)
+                arc = centre and self._geo.addCircleArc(p, self.point(body, centre), q)
+                self._lines[body, a, b] = self._lines[body, b, a] = arc or self._geo.addLine(p, q)
+        return [self._lines[body, a, b] for a, b in pairwise(places)]
 
-    def face(self, *paths: list[int]) -> int:
-        """The face within ``paths`` that together are closed, in whatever direction each line goes."""
-        return self._geo.addPlaneSurface([self._geo.addCurveLoop([line for path in paths for line in path], -1, True)])
+    def face(self, body: str, **paths: list[int]) -> int:
+        """A face of ``body`` within ``paths`` that together are closed, in whatever direction each line goes; the lines
+        go to the sets of these names."""
+        loop = [line for path in paths.values() for line in path]
+        self.faces[body].append(self._geo.addPlaneSurface([self._geo.addCurveLoop(loop, reorient=True)]))
+        for name, path in paths.items():
+            self.lines[name] += [line for line in path if line not in self.lines[name]]
+        return self.faces[body][-1]
+
+    def pin(self, x: float, up: int, part: PinPart) -> None:
+        """The quarters, above or below the axis, of a pin of radius 1 about (x, 0)."""
+        for to in {"half": (1,), "whole": (1, -1), "none": ()}[part]:
+            arc = self.path("pin", (x + to, 0), (x, up), centre=(x, 0))
+            flat, axis = self.path("pin", (x, up), (x, 0)), self.path("pin", (x, 0), (x + to, 0))
+            self.face("pin", pin=arc, flat=flat, axis=axis)
+
+
+def around(x: float) -> str:
+    """The distance from (x, 0), for sizes."""
+    return f"Sqrt((x - {x!r})^2 + y^2)"
 
 
 def refinements(cells: float) -> int:

@@ -14,10 +14,10 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Drawing, Pen, mesh_joint
+from archord.geometry.shapes.joint_mesh import Drawing, PinPart, Sketch, around, mesh_joint
 
 _ACROSS = 3  # elements across the narrowest ligament, at least
-PinPart = Literal["half", "whole", "none"]
+_CORNER = 2.0  # size at the clamp's corners, where the stress is singular, over that on the arcs
 
 
 def lug(
@@ -48,30 +48,20 @@ def lug(
     round_end = end == "round"
 
     def draw(geo) -> Drawing:
-        faces: dict[str, list[int]] = {"pin": [], "lug": []}
-        lines: dict[str, list[int]] = {name: [] for name in ("pin", "hole", "flat", "clamp", "axis", "end", "sides")}
-        of_lug, of_pin = Pen(geo), Pen(geo)
-
-        def add(pen: Pen, body: str, **paths: list[int]) -> None:
-            faces[body].append(pen.face(*paths.values()))
-            for name, path in paths.items():
-                lines[name] += [line for line in path if line not in lines[name]]
-
+        sketch = Sketch(geo, ("pin", "lug"), ("pin", "hole", "flat", "clamp", "axis", "end", "sides"))
         for up in (1,) if half else (1, -1):
-            arc = of_lug.path((hole, 0), (0, up * hole), (-hole, 0), centre=(0, 0))
-            behind, before = of_lug.path((-hole, 0), (-back, 0)), of_lug.path((tip, 0), (hole, 0))
-            clamp = of_lug.path((-back, 0), (-back, up * side))
+            arc = sketch.path("lug", (hole, 0), (0, up * hole), (-hole, 0), centre=(0, 0))
+            axis = sketch.path("lug", (-hole, 0), (-back, 0)) + sketch.path("lug", (tip, 0), (hole, 0))
             corner = (tip - side if round_end else tip, up * side)
-            edge = of_lug.path((-back, up * side), corner)
-            last = of_lug.path(corner, (tip, 0), centre=(tip - side, 0) if round_end else None)
-            add(of_lug, "lug", hole=arc, axis=[*behind, *before], clamp=clamp, sides=edge, end=last)
-            for to in {"half": (1,), "whole": (1, -1), "none": ()}[pin]:
-                arc = of_pin.path((x + to, 0), (x, up), centre=(x, 0))
-                flat, axis = of_pin.path((x, up), (x, 0)), of_pin.path((x, 0), (x + to, 0))
-                add(of_pin, "pin", pin=arc, flat=flat, axis=axis)
-        growing = f"{size!r} + {growth!r} * Abs(Sqrt((x - {{!r}})^2 + y^2) - {{!r}})"
-        sizes = {"pin": growing.format(x, 1.0), "lug": growing.format(0.0, hole)}
-        return Drawing(faces, sizes, lines, {line: math.pi / 2 / size for line in lines["pin"] + lines["hole"]})
+            clamp, sides = sketch.path("lug", (-back, 0), (-back, up * side)), [(-back, up * side), corner]
+            last = sketch.path("lug", corner, (tip, 0), centre=(tip - side, 0) if round_end else None)
+            sketch.face("lug", hole=arc, axis=axis, clamp=clamp, sides=sketch.path("lug", *sides), end=last)
+            sketch.pin(x, up, pin)
+        growing = f"{size!r} + {growth!r} * Abs({{}} - {{!r}})"
+        clamped = f"{_CORNER * size!r} + {growth!r} * Sqrt((x + {back!r})^2 + (Abs(y) - {side!r})^2)"
+        sizes = {"pin": growing.format(around(x), 1.0), "lug": f"Min({growing.format(around(0), hole)}, {clamped})"}
+        parts = {line: math.pi / 2 / size for line in sketch.lines["pin"] + sketch.lines["hole"]}
+        return Drawing(sketch.faces, sizes, sketch.lines, parts)
 
     circles = {"pin": (x, 0.0, 1.0), "hole": (0.0, 0.0, hole)} | ({"end": (tip - side, 0.0, side)} if round_end else {})
     key = ("lug", hole, side, tip, back, size, growth, end, half, pin)

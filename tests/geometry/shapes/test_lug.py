@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 
-from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.geometry.shapes.lug import lug
 from archord.solver.problem import Body, Interaction, Problem, Support
 from archord.solver.system import System
+from tests.geometry.shapes.measures import area, facet_nodes, length
 from tests.solver.parts import ELASTIC
 
 R, DR, WIDTH, EDGE, LENGTH, SIZE, GROWTH = 10.0, 0.1, 40.0, 20.0, 60.0, 1.5, 0.4
@@ -20,24 +19,6 @@ HOLE = R + DR
 def made(width=WIDTH, edge=EDGE, size=SIZE, comm=MPI.COMM_SELF, scale=1.0, **options):
     lengths = (scale * v for v in (R, DR, width, edge, LENGTH, size))
     return lug(comm, *lengths, GROWTH, **options)
-
-
-def area(joint, body, comm=MPI.COMM_SELF):
-    cells = joint.cells_in(body)
-    degree, n_owned = joint.mesh.geometry.cmap.degree, joint.mesh.topology.index_map(2).size_local
-    X, w = bulk_quadrature(TRIANGLE, degree)
-    basis = cell_basis(joint.mesh, degree, cells[cells < n_owned], X)
-    return comm.allreduce(float((basis.measure @ w).sum()))
-
-
-def facet_nodes(joint, name):
-    joint.mesh.topology.create_connectivity(1, 2)
-    return joint.mesh.geometry.x[entities_to_geometry(joint.mesh, 1, joint.facets_in(name))][..., :2]
-
-
-def length(joint, name):
-    x = facet_nodes(joint, name)
-    return np.linalg.norm(x[:, 0] - x[:, 1], axis=1).sum()
 
 
 def end_area(width, edge, end):

@@ -1,0 +1,75 @@
+"""A pin in any number of sleeves in a housing that is held at its outer edge: the half y >= 0.
+
+The housing's centre is the origin. All bodies are drawn concentric, or shifted in +x until each touches the next one
+out. Surfaces that interfere are drawn into each other, around one centre.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from mpi4py import MPI
+
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.joint_mesh import Drawing, PinPart, Sketch, around, mesh_joint
+
+_LAYERS = 2  # across a wall, at least
+_SLENDER = 4.0  # longest element of a wall over its thickness
+_THIN = 4.0  # walls of fewer elements are cut into a grid
+
+
+def bushing(
+    comm: MPI.Comm,
+    radius: float,
+    sleeves: Sequence[Sequence[float]],
+    bore: float,
+    outer_radius: float,
+    element_size: float,
+    growth: float,
+    *,
+    touching: bool = False,
+    pin: PinPart = "half",
+    **options,
+) -> TaggedMesh:
+    """Mesh the bodies "pin", "sleeve 1", ... and "housing", with ``options`` as for `mesh_joint`.
+
+    ``sleeves`` are the inner and outer radii from the pin outward. Lengths share one unit. All arcs are cut into equal
+    angles, of elements ``element_size`` long on the pin, shorter if walls are thin; away from the arcs they grow by
+    ``growth`` per unit of distance. Sets: "pin", "flat" (the pin's line across the axis, see `lug`), "sleeve 1 inside",
+    "sleeve 1 outside", ..., "bore", "outer edge" and "axis" (y = 0).
+    """
+    rings = [(inner / radius, outer / radius) for inner, outer in [*sleeves, (bore, outer_radius)]]
+    size = min(element_size / radius, *(_SLENDER / _LAYERS * (outer - inner) for inner, outer in rings))
+    within = [1.0, *(outer for _, outer in rings)]
+    gaps = [touching * max(inner - r, 0.0) for (inner, _), r in zip(rings, within, strict=False)]
+    shifts = [sum(gaps[i:]) for i in range(len(rings) + 1)]
+    names = ["pin", *(f"sleeve {k}" for k in range(1, len(rings))), "housing"]
+    sets = [(f"{name} inside", f"{name} outside") for name in names[1:-1]] + [("bore", "outer edge")]
+
+    def draw(geo) -> Drawing:
+        sketch = Sketch(geo, names, ["pin", "flat", *(name for pair in sets for name in pair), "axis"])
+        sketch.pin(shifts[0], 1, pin)
+        sizes = {"pin": f"{size!r} + {growth!r} * Abs({around(shifts[0])} - 1)"}
+        parts: dict[int, float] = {}
+        grid: dict[int, list[int]] = {}
+        for body, pair, (inner, outer), x in zip(names[1:], sets, rings, shifts[1:], strict=True):
+            ends = [((x + r, 0.0), (x, r), (x - r, 0.0)) for r in (inner, outer)]
+            arcs = {name: sketch.path(body, *places, centre=(x, 0.0)) for name, places in zip(pair, ends, strict=True)}
+            across = sketch.path(body, ends[0][0], ends[1][0]) + sketch.path(body, ends[0][2], ends[1][2])
+            face = sketch.face(body, **arcs, axis=across)
+            r, layers = around(x), (outer - inner) / (size * inner)
+            away = f"{r} - {inner!r}" if body == "housing" else f"Min(Abs({r} - {inner!r}), Abs({r} - {outer!r}))"
+            sizes[body] = f"{size!r} * {r} + {growth!r} * Abs({away})"
+            if layers < _THIN:
+                parts |= dict.fromkeys(across, max(_LAYERS, layers))
+                grid[face] = [sketch.point(body, places[i]) for places, i in zip(ends * 2, (0, 0, 2, 2), strict=True)]
+        round_lines = [line for name, lines in sketch.lines.items() if name not in ("flat", "axis") for line in lines]
+        parts |= dict.fromkeys(round_lines, math.pi / 2 / size)
+        return Drawing(sketch.faces, sizes, sketch.lines, parts, grid)
+
+    circles = {"pin": (shifts[0], 0.0, 1.0)}
+    for pair, radii, x in zip(sets, rings, shifts[1:], strict=True):
+        circles |= {name: (x, 0.0, r) for name, r in zip(pair, radii, strict=True)}
+    key = ("bushing", rings, size, growth, touching, pin)
+    return mesh_joint(comm, draw, circles, key, radius=radius, **options)
