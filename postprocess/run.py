@@ -20,12 +20,14 @@ from archord.postprocess.fields import Fields, read_fields
 from archord.presets.arc import ArcProfile
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
+from archord.scene.scene import Scene
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _KNOWN = {"status", "message", "warnings", "versions", "seconds", "totals", "steps"}  # keys of a run.json
-_NEEDED = (*CURVES, "step", "delta/dR", "P/(E* R)", "p0/E*", "iterations", "cutbacks", "seconds")
+_NEEDED = ("step", "iterations", "cutbacks", "seconds")
+_OF_A_JOINT = (*CURVES, "delta/dR", "P/(E* R)", "p0/E*")
 _WHOLE = ("step", "iterations", "cutbacks")  # columns of whole numbers
 
 
@@ -47,15 +49,17 @@ class Run:
                 if is_sweep(self.folder):
                     is_no_run = f"is a sweep, not a run; its runs are the folders in {self.folder / 'cases'}"
                 raise InputError(f"{self.folder}: {is_no_run}.")
-        self.columns = _read_columns(self.folder / "history.csv")
         self.scene: Any = load_scene(self.folder / "scene.toml")
+        self.is_joint = isinstance(self.scene, Scene)
+        self.columns = _read_columns(self.folder / "history.csv", (*_NEEDED, *(_OF_A_JOINT if self.is_joint else ())))
         self.summary: dict[str, Any] = _read_report(self.folder / "run.json")
         self.status, self.message, self.warnings = (self.summary[key] for key in ("status", "message", "warnings"))
         self.steps = len(self.columns["step"])
 
     def __repr__(self) -> str:
         """Folder, status and how far it came."""
-        end = f", delta/dR = {self.columns['delta/dR'][-1]:g}" if self.steps else ""
+        name = "delta/dR" if self.is_joint else "load_factor"
+        end = f", {name} = {self.columns[name][-1]:g}" if self.steps else ""
         return f"<Run {self.folder}: {self.status}, {self.steps} step{'s' if self.steps != 1 else ''}{end}>"
 
     @cached_property
@@ -68,9 +72,15 @@ class Run:
 
     @cached_property
     def curve(self) -> RunCurve:
-        """P, p0 and eps over delta as arrays, for laws and fits. Raises `InputError` without an accepted step."""
+        """P (per unit thickness), p0 and eps over delta as arrays, for laws and fits.
+
+        Raises `InputError` without an accepted step, and of a run that is not of a joint.
+        """
+        if not self.is_joint:
+            raise InputError(f"{self.folder}: is the run of a general scene; this is for those of a [joint].")
         self.number(None)
         columns = {name: np.array(self.columns[name]) for name in CURVES}
+        columns["P"] = columns["P"] / self.scene.thickness
         return RunCurve(str(self.folder), self.scene, **columns, folder=self.folder)
 
     def contact(self, step: int | None = None) -> dict[str, ArcProfile]:
@@ -114,10 +124,10 @@ class Run:
         return int(step)
 
 
-def _read_columns(path: Path) -> dict[str, list[float]]:
+def _read_columns(path: Path, needed: tuple[str, ...]) -> dict[str, list[float]]:
     try:
         columns = read_history(path)
-        if not np.isfinite([columns[name] for name in _NEEDED]).all():
+        if not np.isfinite([columns[name] for name in needed]).all():
             raise ValueError("numbers that are not finite")
     except (ValueError, IndexError, KeyError, OSError):
         raise InputError(f"{path}: cannot be read as the history of a run.") from None

@@ -9,10 +9,10 @@ from mpi4py import MPI
 
 from archord.materials.material import Array
 from archord.presets.edge import EdgeProfile
+from archord.presets.general import GeneralAccount, Record
 from archord.presets.joint import Joint
 from archord.presets.joint_report import JointAccount
 from archord.presets.measures import Measures
-from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
 from archord.solver.stepping import Step
@@ -79,9 +79,9 @@ def account_of(scene: AnyScene, comm: MPI.Comm, timer: Timer | None = None, part
     """The problem of ``scene``, ready to be solved, and its account. Collective over ``comm``; raises `InputError`."""
     if isinstance(scene, Scene):
         return JointAccount(Joint(scene, comm, timer=timer, partitioner=partitioner))
-    raise InputError("scene: a general scene cannot be solved yet.")
+    return GeneralAccount(scene, comm, timer=timer, partitioner=partitioner)
 
 
-def record_type(scene: AnyScene) -> type[Measures]:
+def record_type(scene: AnyScene) -> type:
     """The class of the steps' records of ``scene``."""
-    return Measures
+    return Measures if isinstance(scene, Scene) else Record

@@ -198,6 +198,10 @@ class Equilibrium:
         """Those that can yield."""
         return [points for points in self.points() if points.yields]
 
+    def residual_on(self, nodes: np.ndarray) -> Array:
+        """Sum ``(2,)`` of the residual over the owned ones of these ``nodes`` of all ranks."""
+        return self.comm.allreduce(self._where_free()[nodes[nodes < self.n_owned]].sum(axis=0))
+
     def worst_place(self) -> tuple[float, float] | None:
         """Where the residual is largest, over all ranks."""
         size = np.nan_to_num(np.linalg.norm(self._where_free(), axis=1), nan=-1.0, posinf=-1.0)

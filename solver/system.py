@@ -10,7 +10,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from archord.geometry.basis import Array
+from archord.geometry.basis import Array, bulk_quadrature, cell_basis
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface, Rigid
@@ -51,6 +51,7 @@ class System:
             self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
             self.solver = Recovery(NewtonSolver(self.equilibrium))
         self._path: LoadPath | None = None
+        self.stabilisation_energy = 0.0
 
     def _surface(self, given: str | Rigid, interaction: str) -> Surface | RigidSurface:
         if isinstance(given, Rigid):
@@ -140,6 +141,25 @@ class System:
         """Largest PEEQ at a quadrature point, and the integral of PEEQ over the whole."""
         largest, integral = self.bulk.peeq()
         return self.comm.allreduce(largest, op=MPI.MAX), self.problem.symmetry * self.comm.allreduce(integral)
+
+    def largest_peeq(self, body: Body) -> tuple[float, float, float]:
+        """Largest PEEQ at a quadrature point of the ``body``, and its place x, y."""
+        cells, points = self.bulk.histories()[self.problem.tag(body)]
+        peeq, found = np.asarray(points.peeq), (0.0, 0.0, 0.0)
+        if peeq.any():
+            X, _ = bulk_quadrature(self.V.mesh.basix_cell(), self.bulk.degree)
+            at = int(np.argmax(peeq))
+            place = cell_basis(self.V.mesh, self.bulk.degree, cells[[at // len(X)]], X).point[0, at % len(X)]
+            found = (float(peeq[at]), float(place[0]), float(place[1]))
+        return max(self.comm.allgather(found))
+
+    def force_balance(self) -> float:
+        """Largest resultant of all forces on a body, over the largest force of an interaction or a support."""
+        left = [self.equilibrium.residual_on(self.nodes_of(body)) for body in self.problem.bodies]
+        forces = [np.zeros(2), *(self.contact_force(interaction.name) for interaction in self.problem.interactions)]
+        forces += [self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)]
+        largest = np.linalg.norm(forces, axis=1).max()
+        return float(self.problem.symmetry * np.linalg.norm(left, axis=1).max() / largest) if largest else 0.0
 
     @property
     def factorisations(self) -> int:

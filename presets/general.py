@@ -1,0 +1,190 @@
+"""The account of a general problem: loads, supports, interactions and bodies, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.materials.material import Array
+from archord.presets.edge import SurfaceProfile, surface_profiles
+from archord.presets.joint_report import sizes
+from archord.presets.problem import as_input_error, general_problem
+from archord.scene.problem import ProblemScene
+from archord.solver.stepping import Step
+from archord.solver.system import System
+from archord.solver.timer import Timer
+
+_FEW_FACETS = 3
+_LARGE_STRAIN = 0.05  # PEEQ
+_SPURIOUS = 1e-4  # of the work, in the springs that hold floating bodies
+NEVER = "no surfaces ever touched: no load presses any of them together"
+
+
+@dataclass(frozen=True)
+class Record:
+    """One accepted output step of the whole, at the load factor ``at``; ``values`` by the names of columns."""
+
+    step: int
+    at: float
+    values: dict[str, float]
+    contact_area: float
+    elastic_energy: float
+    plastic_dissipation: float
+    work: float
+    force_balance: float
+    iterations: int
+    cutbacks: int
+    seconds: float
+
+
+class GeneralAccount:
+    """The account of the problem that ``scene`` states (see `Account`). Collective; raises `InputError`."""
+
+    record: ClassVar[type] = Record
+    fixed: ClassVar[tuple[str, ...]] = ("s", "weight", "X")
+
+    def __init__(self, scene: ProblemScene, comm: MPI.Comm, *, timer: Timer | None = None, partitioner=None) -> None:
+        timer = timer or Timer()
+        with timer("mesh"):
+            problem = general_problem(scene, comm, partitioner)
+        self.scene = scene
+        with as_input_error(scene):
+            self.system = System(problem, timer=timer)
+        self._supports = list(dict.fromkeys(s.name for s in problem.supports if s.name not in self.system.drive_names))
+
+    def columns(self) -> list[tuple[str, Callable[[Record], float | int]]]:
+        """Loads, supports, interactions, bodies, then energies and what the step cost."""
+        units, thickness = self.scene.units, self.scene.analysis.thickness
+        energy = units.energy_of(thickness)
+        first = [("step", _attribute("step")), ("load_factor", _attribute("at"))]
+        named = [(f"{name} [{unit}]" if unit else name, partial(_value, name)) for name, unit in self._units().items()]
+        energies = ("elastic_energy", "plastic_dissipation", "work")
+        last = [(f"{name} [{energy}]", _attribute(name)) for name in energies]
+        last += [(name, _attribute(name)) for name in ("force_balance", "iterations", "cutbacks")]
+        return [*first, *named, *last, ("seconds [s]", _attribute("seconds"))]
+
+    def _units(self) -> dict[str, str]:
+        """Units of all values, by name and in order."""
+        scene, units = self.scene, self.scene.units
+        length, force, moment = units.length, scene.force_unit, units.energy_of(scene.analysis.thickness)
+        found = {}
+        for load in scene.load:
+            turns = load.direction == "rotation"
+            found[f"{load.name} displacement"] = "rad" if turns else length
+            found[f"{load.name} force"] = moment if turns else force
+            if load.pressure is not None:
+                found |= {f"{load.name} displacement": f"{length}2", f"{load.name} force": units.stress}
+        for name in self._supports:
+            found |= {f"{name} x": force, f"{name} y": force, f"{name} moment": moment}
+        for part in scene.interaction:
+            found |= {f"{part.name} {axis}": force for axis in ("force x", "force y")}
+            found |= {f"{part.name} largest pressure": units.stress}
+            found |= {f"{part.name} {at}": length for at in ("at x", "at y", "contact length")}
+            found |= {f"{part.name} arcs": ""}
+        for body in scene.body:
+            if body.yield_stress is not None:
+                found |= {f"{body.name} peeq_max": "", f"{body.name} at x": length, f"{body.name} at y": length}
+        return found
+
+    def driven(self) -> tuple[Array, Array]:
+        """Displacements and forces of all loads. Collective."""
+        names = [load.name for load in self.scene.load]
+        q = [self.system.drive_displacement(name) for name in names]
+        return np.array(q), np.array([self.system.drive_force(name) for name in names])
+
+    def profiles(self) -> dict[str, SurfaceProfile]:
+        """The contact along the surfaces, by name. Collective."""
+        return surface_profiles(self.system)
+
+    def step(
+        self, before: Sequence[Record], step: Step, profiles: Mapping[str, SurfaceProfile], work: float, seconds: float
+    ) -> Record:
+        """The record of the last accepted state. Collective."""
+        system, values = self.system, list[float]()
+        for q, force in zip(*self.driven(), strict=True):
+            values += [float(q), float(force)]
+        for name in self._supports:
+            values += [*system.reaction(name), system.reaction_moment(name, (0.0, 0.0))]
+        area = 0.0
+        for part in self.scene.interaction:
+            met = [profile for name, profile in profiles.items() if name in part.surfaces]
+            pressure, at = max((p.largest for p in met), key=lambda found: found[0])
+            lengths = [p.contact_length for p in met]
+            values += [*system.contact_force(part.name), pressure, *at, float(np.mean(lengths)), met[-1].n_arcs]
+            area += float(np.mean(lengths))
+        for body in system.problem.bodies:
+            if body.material.yields:
+                values += system.largest_peeq(body)
+        stored, dissipated = system.energies()
+        return Record(
+            step=len(before) + 1,
+            at=system.equilibrium.load,
+            values=dict(zip(self._units(), map(float, values), strict=True)),
+            contact_area=area,
+            elastic_energy=stored,
+            plastic_dissipation=dissipated,
+            work=work,
+            force_balance=system.force_balance(),
+            iterations=step.iterations,
+            cutbacks=step.cutbacks,
+            seconds=seconds,
+        )
+
+    def facts(self) -> dict[str, Any]:
+        """Sizes of the mesh, and what was made of the scene."""
+        mesh, problem = self.scene.mesh, self.system.problem
+        content = Path(mesh.file).read_bytes() if mesh.file and self.system.comm.rank == 0 else b""
+        source = {"file": mesh.file, "sha256": sha256(content).hexdigest()} if mesh.file else {}
+        shares = {i.interaction.name: [pair.share for pair in i.pairs] for i in self.system.contact.interfaces}
+        bodies = {body.name: list(problem.mesh.cell_sets[body.cells or body.name]) for body in problem.bodies}
+        return {"mesh": sizes(self.system) | source, "model": {"contact_shares": shares}, "bodies": bodies}
+
+    def warnings(self) -> list[str]:
+        """What to warn of before the first step."""
+        return []
+
+    def step_warnings(self, m: Record, profiles: Mapping[str, SurfaceProfile], residual: float) -> list[str]:
+        """What to warn of after the step ``m``. Collective."""
+        said = []
+        for name, profile in profiles.items():
+            touching = int((profile.in_contact > 0).sum())
+            if 0 < touching < _FEW_FACETS:
+                said.append(f"only {touching} facets of {name!r} in contact; smaller elements would resolve it")
+        if (largest := max((v for k, v in m.values.items() if k.endswith(" peeq_max")), default=0.0)) > _LARGE_STRAIN:
+            said.append(f"PEEQ reaches {largest:.2g}, too much for small-strain theory")
+        if residual > 1e-8:
+            said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
+        if m.force_balance > 1e-8:
+            said.append(f"the forces on the whole do not balance: {m.force_balance:.1e} of the largest is left")
+        if (spurious := self.system.stabilisation_energy) > _SPURIOUS * abs(m.work):
+            said.append(f"springs that hold floating bodies do {spurious / abs(m.work):.1e} of the work")
+        return said
+
+    def ending(self, steps: Sequence[Record]) -> tuple[str, list[str]]:
+        """A warning where nothing ever touched."""
+        return "", [NEVER] if self.scene.interaction and not any(m.contact_area for m in steps) else []
+
+    def energy_balance(self, steps: Sequence[Record]) -> float | None:
+        """How far work and stored and dissipated energy of the last of the ``steps`` are apart, over the largest work;
+        where interferences arise first, from the end of their stage on."""
+        fit = self.scene.path.fit_steps if self.scene.fits else 0
+        if len(steps) <= fit:
+            return None
+        missing = [m.work - m.elastic_energy - m.plastic_dissipation for m in (steps[fit - 1], steps[-1])]
+        work = max(abs(m.work) for m in steps)
+        return abs(missing[1] - (missing[0] if fit else 0.0)) / work if work else 0.0
+
+
+def _attribute(name: str) -> Callable[[Record], float | int]:
+    return lambda record: getattr(record, name)
+
+
+def _value(name: str, record: Record) -> float:
+    return record.values[name]

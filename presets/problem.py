@@ -1,0 +1,180 @@
+"""A general scene as a problem to solve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Literal
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.geometry.curve import RigidCircle
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.lug import lug
+from archord.materials.material import Array
+from archord.scene import parts
+from archord.scene.errors import InputError
+from archord.scene.problem import ProblemScene
+from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
+
+_SHAPES = {"lug": lug}
+_AXES = {"x": 0, "y": 1, "rotation": 2}
+
+
+def general_problem(scene: ProblemScene, comm: MPI.Comm, partitioner=None) -> Problem:
+    """The problem that ``scene`` states; ``partitioner`` as for `gmsh_to_mesh`. Collective over ``comm``.
+
+    Raises `InputError`: a file that is no mesh, a set that it does not have, a problem that contradicts itself.
+    """
+    with as_input_error(scene):
+        return _Builder(scene, scene_mesh(scene, comm, partitioner)).problem()
+
+
+@contextmanager
+def as_input_error(scene: ProblemScene) -> Iterator[None]:
+    """Raise the ValueError of a mesh or a problem as `InputError` that names the mesh of ``scene``."""
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(f"{scene.mesh.file or 'mesh.shape'}: {str(error).rstrip('.')}.") from None
+
+
+def scene_mesh(scene: ProblemScene, comm: MPI.Comm, partitioner=None) -> TaggedMesh:
+    """The mesh of ``scene``. Collective; raises ValueError."""
+    if scene.mesh.shape is None:
+        raise ValueError("mesh files cannot be read yet")
+    shape = dict(scene.mesh.shape)
+    return _SHAPES[shape.pop("kind")](comm, degree=scene.analysis.degree, partitioner=partitioner, **shape)
+
+
+class _Builder:
+    """The parts of a `Problem` from those of ``scene``, by the names of sets of ``mesh``, of couplings and of discs."""
+
+    def __init__(self, scene: ProblemScene, mesh: TaggedMesh) -> None:
+        self.scene, self.mesh = scene, mesh
+        self.couplings = {coupling.name: coupling for coupling in scene.coupling}
+        self.loaded = {(load.on, str(load.direction)): load for load in scene.load}
+        self.held = {(support.on, freedom) for support in scene.support for freedom in support.fixed}
+        self.drives: list[Drive] = []
+        self.supports: list[Support] = []
+        self.means: list[Mean] = []
+        self.loads: list[Load] = []
+
+    def problem(self) -> Problem:
+        """All of them together. Raises ValueError."""
+        scene, analysis = self.scene, self.scene.analysis
+        discs = {i.name for i in scene.interaction if i.rigid}
+        for support in scene.support:
+            if support.on not in self.couplings:
+                self.supports += [Support(support.name, support.on, _AXES[freedom]) for freedom in support.fixed]
+        for load in scene.load:
+            self._load(load, on_disc=load.on in discs)
+        for coupling in scene.coupling:
+            (self._rigid_point if coupling.kind == "rigid" else self._mean_point)(coupling)
+        lengths = [abs(v) for load in scene.load if load.kind == "displacement" for v in load.stages]
+        by_force = any(load.kind != "displacement" for load in scene.load)
+        travel = sum(lengths) + max((i.interference + i.overlap for i in scene.interaction), default=0.0)
+        problem = Problem(
+            self.mesh,
+            [Body(body.name, body.material(analysis.plane), body.cells or body.name) for body in scene.body],
+            [self._interaction(part, 0.0 if by_force else travel) for part in scene.interaction],
+            self.supports,
+            self.loads,
+            self.means,
+            self.drives,
+            fit=scene.fits,
+            stabilise=True,
+            degree=analysis.degree,
+            symmetry=analysis.symmetry * scene.thickness,
+            travel=np.inf if by_force else travel,
+            tolerance=analysis.tolerance,
+            max_iterations=analysis.max_iterations,
+            guess=self._guess,
+        )
+        self._driven = list(self._driven_bodies(problem))
+        return problem
+
+    def _load(self, load: parts.Load, on_disc: bool) -> None:
+        by_force = load.kind == "force"
+        on_set = load.on not in self.couplings and not on_disc
+        spread = load.kind == "pressure" or (on_set and by_force and load.on not in self._edges_and_points())
+        control: Literal["displacement", "force"] = "force" if by_force and not spread else "displacement"
+        self.drives.append(Drive(load.name, self.scene.values(load), control))
+        if load.pressure is not None:
+            self.loads.append(Load(facets=load.on, pressure=1.0, drive=load.name))
+        elif spread:
+            force = (1.0, 0.0) if load.direction == "x" else (0.0, 1.0)
+            self.loads.append(Load(cells=load.on, force=force, drive=load.name))
+        elif on_set:
+            self.supports.append(Support(load.name, load.on, _AXES[load.direction or "x"], 1.0, load.name))
+
+    def _edges_and_points(self) -> set[str]:
+        return {*self.mesh.facet_sets, *self.mesh.point_sets}
+
+    def _freedoms(self, coupling: parts.Coupling) -> Iterator[tuple[str, str | None]]:
+        """The motions of a reference point that are not held, and the drive of each, None where nothing loads it."""
+        for freedom in _AXES:
+            if (coupling.name, freedom) not in self.held:
+                load = self.loaded.get((coupling.name, freedom))
+                yield freedom, load.name if load else None
+
+    def _rigid_point(self, coupling: parts.Coupling) -> None:
+        X, Y = coupling.point
+        rates: dict[str, list[tuple[int, float | Callable[[Array], Array]]]] = {
+            "x": [(0, 1.0)],
+            "y": [(1, 1.0)],
+            "rotation": [(0, lambda x: Y - x[:, 1]), (1, lambda x: x[:, 0] - X)],
+        }
+        self.supports += [Support(coupling.name, coupling.facets, axis) for axis in (0, 1)]
+        for freedom, drive in self._freedoms(coupling):
+            if drive is None:
+                drive = f"{coupling.name} {freedom}"
+                self.drives.append(Drive(drive, (0.0, 0.0), "force"))
+            for axis, rate in rates[freedom]:
+                self.supports.append(Support(coupling.name, coupling.facets, axis, rate, drive))
+
+    def _mean_point(self, coupling: parts.Coupling) -> None:
+        point = (coupling.point[0], coupling.point[1])
+        for freedom, axis in _AXES.items():
+            load = self.loaded.get((coupling.name, freedom))
+            drive = load.name if load else f"{coupling.name} {freedom}"
+            if load is None and (coupling.name, freedom) in self.held:
+                self.drives.append(Drive(drive, (0.0, 0.0)))
+            elif load is None:
+                continue
+            self.means.append(Mean(coupling.name, coupling.facets, axis, point, drive))
+
+    def _interaction(self, part: parts.Interaction, slide: float) -> Interaction:
+        surfaces: tuple[str | Rigid, str] = (part.surfaces[0], part.surfaces[-1])
+        if part.rigid is not None:
+            circle = RigidCircle(np.array(part.rigid.centre), part.rigid.radius)
+            loads = [load for load in self.scene.load if load.on == part.name]
+            rates = {load.name: (1.0, 0.0) if load.direction == "x" else (0.0, 1.0) for load in loads}
+            surfaces = Rigid(circle, rates), part.surfaces[0]
+        return Interaction(
+            part.name,
+            surfaces,
+            law=part.law,
+            kinematics=self.scene.analysis.kinematics,
+            gamma_factor=self.scene.analysis.gamma_factor,
+            integrated=part.integrated or "",
+            slide=slide,
+            interference=part.interference,
+            overlap=part.overlap,
+        )
+
+    def _driven_bodies(self, problem: Problem) -> Iterator[tuple[parts.Load, str]]:
+        """Loads that displace an edge, and the body that they take along. Collective."""
+        for load in self.scene.load:
+            if load.kind == "displacement" and load.on in self.mesh.facet_sets:
+                yield load, problem.body_of(load.on).name
+
+    def _guess(self, factor: float) -> Guess:
+        """Bodies moved rigidly as their edges are displaced."""
+        moved: dict[str, tuple[float, float]] = {}
+        for load, body in self._driven:
+            value = float(np.interp(factor, range(len(values := self.scene.values(load))), values))
+            x, y = moved.get(body, (0.0, 0.0))
+            moved[body] = (x + value, y) if load.direction == "x" else (x, y + value)
+        return Guess(factor, moved)

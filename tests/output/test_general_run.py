@@ -1,0 +1,132 @@
+"""A general scene solved into a run folder: a lug, loaded, let go, continued."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.output.restart import plan_restart
+from archord.output.run import solve_scene
+from archord.postprocess.run import Run
+from archord.scene.errors import InputError
+from archord.scene.file import parse_any
+
+STEEL = {"E": 210000.0, "nu": 0.3}
+
+
+def scene(steps: int = 3, thickness: float | None = None, **changes):
+    shape = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+    data = {
+        "mesh": {"shape": shape | {"element_size": 1.5, "growth": 0.6}},
+        "body": [{"name": "pin"} | STEEL, {"name": "lug", "yield_stress": 355.0, "hardening": 2000.0} | STEEL],
+        "interaction": [{"name": "contact", "surfaces": ["pin", "hole"]}],
+        "support": [
+            {"name": "clamp", "on": "clamp", "fixed": ["x", "y"]},
+            {"name": "symmetry", "on": "axis", "fixed": ["y"]},
+        ],
+        "load": [{"name": "press", "on": "flat", "direction": "x", "displacement": [0.15, 0.1]}],
+        "path": {"steps": [steps, 1]},
+        "analysis": {"symmetry": 2} | ({"thickness": thickness} if thickness else {}),
+    }
+    return parse_any(data | changes, "lug.toml")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lug")
+    outcome = solve_scene(scene(), folder, MPI.COMM_SELF)
+    assert (outcome.status, outcome.warnings) == ("done", [])
+    return Run(folder)
+
+
+def test_forces_balance_and_work_is_kept(run):
+    h = run.columns
+    assert np.allclose(h["press force"], h["contact force x"], rtol=1e-8)
+    assert np.allclose(h["press force"], np.negative(h["clamp x"]), rtol=1e-8)
+    assert max(h["force_balance"]) < 1e-8
+    assert h["press displacement"] == pytest.approx([0.05, 0.1, 0.15, 0.1])
+    assert h["press force"][3] < h["press force"][1] < h["press force"][2]
+    assert h["lug peeq_max"][2] > 1e-3
+    assert h["plastic_dissipation"][2] == pytest.approx(h["plastic_dissipation"][3])
+    assert run.summary["error_estimates"]["energy_balance"] < 0.05
+
+
+def test_contact_is_told_with_its_place(run):
+    h = run.columns
+    assert h["contact arcs"] == [1, 1, 1, 1]
+    assert np.hypot(h["contact at x"], h["contact at y"]) == pytest.approx(10, abs=0.11)
+    assert 0 < h["contact contact length"][0] < h["contact contact length"][2] < np.pi * 10
+    assert run.history.attrs["units"]["contact largest pressure"] == "MPa"
+
+
+def test_thickness_makes_forces_of_the_whole(run, tmp_path):
+    solve_scene(scene(thickness=12.0), tmp_path, MPI.COMM_SELF)
+    thick = Run(tmp_path)
+    for name in ("press force", "clamp moment", "work", "elastic_energy", "plastic_dissipation"):
+        assert thick.columns[name] == pytest.approx(np.multiply(12, run.columns[name]), rel=1e-8)
+    assert thick.columns["contact largest pressure"] == pytest.approx(run.columns["contact largest pressure"])
+    assert thick.history.attrs["units"]["press force"] == "N"
+
+
+@pytest.mark.mpi
+def test_ranks_agree(comm, tmp_path_factory):
+    one, several = (Path(comm.bcast(str(tmp_path_factory.mktemp(name)))) for name in ("one", "several"))
+    if comm.rank == 0:
+        solve_scene(scene(), one, MPI.COMM_SELF)
+    solve_scene(scene(), several, comm)
+    comm.barrier()
+    a, b = Run(one).columns, Run(several).columns
+    for name in a:
+        if name not in ("seconds", "force_balance", "iterations"):
+            assert b[name] == pytest.approx(a[name], rel=1e-9, abs=1e-9 * max(map(abs, a[name])) + 1e-12), name
+
+
+def pressed(*stages: float, steps: list[int]):
+    load = {"name": "press", "on": "flat", "direction": "x", "displacement": list(stages)}
+    return scene(load=[load], path={"steps": steps})
+
+
+def test_a_run_goes_on_with_further_stages(tmp_path):
+    """From the end of the first stage, as if there had been no end; not with another first stage."""
+    for name in ("whole", "parts"):
+        (tmp_path / name).mkdir()
+    solve_scene(pressed(0.1, 0.15, 0.1, steps=[2, 1, 1]), tmp_path / "whole", MPI.COMM_SELF)
+    parts = tmp_path / "parts"
+    solve_scene(pressed(0.1, steps=[2]), parts, MPI.COMM_SELF)
+    with pytest.raises(
+        InputError, match=r'steps are not the first ones of the scene\'s path; load "press" and its steps'
+    ):
+        plan_restart(parts, pressed(0.12, 0.15, steps=[2, 1]))
+    plan = plan_restart(parts, pressed(0.1, 0.15, 0.1, steps=[2, 1, 1]), extend=True)
+    assert solve_scene(plan.scene, parts, MPI.COMM_SELF, start=plan.start).status == "done"
+    whole, again = (Run(tmp_path / name).columns for name in ("whole", "parts"))
+    for name in ("press force", "lug peeq_max", "work"):
+        assert again[name] == pytest.approx(whole[name], rel=1e-9), name
+
+
+def test_another_load_is_refused(run):
+    other = scene(load=[{"name": "pull", "on": "flat", "direction": "x", "displacement": 0.1}], path={"steps": 3})
+    with pytest.raises(InputError, match=r'was loaded by load "press"; load "pull" cannot continue it'):
+        plan_restart(run.folder, other, extend=True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"support": [{"name": "clamp", "on": "clam", "fixed": ["x"]}]}, "there is no .* 'clam' .did you mean 'clamp'"),
+        ({"interaction": [{"name": "contact", "surfaces": ["pin", "bore"]}]}, "there is no facet set 'bore'"),
+    ],
+)
+def test_a_set_that_is_not_there_is_named(changes, said, tmp_path):
+    with pytest.raises(InputError, match=said):
+        solve_scene(scene(**changes), tmp_path, MPI.COMM_SELF)
+
+
+def test_what_never_touches_is_told(tmp_path):
+    load = [{"name": "press", "on": "flat", "direction": "x", "displacement": -0.1}]
+    outcome = solve_scene(scene(load=load, path={"steps": 1}), tmp_path, MPI.COMM_SELF)
+    assert outcome.status == "done"
+    assert "no surfaces ever touched" in outcome.warnings[-1]
+    assert json.loads((tmp_path / "run.json").read_text())["warnings"] == outcome.warnings
