@@ -57,10 +57,11 @@ class Drives:
         for mean in problem.means:
             self.applied[names.index(mean.drive)] = self._mean_motion(mean) / problem.symmetry
         controls = {drive.name: drive.control for drive in self._drives}
-        prescribed = [m for m in problem.means if controls[m.drive] == "displacement"]
+        bodies = {mean.drive: problem.body_of(mean.facets) for mean in problem.means}
+        prescribed = [name for name in bodies if controls[name] == "displacement"]
         moves = problem.moving_drives()
-        unknown = [name for name in moves if controls[name] == "force"] + [m.drive for m in prescribed]
-        anchors = self._anchors({body.name: body for body in (problem.body_of(m.facets) for m in prescribed)}.values())
+        unknown = [name for name in moves if controls[name] == "force"] + prescribed
+        anchors = self._anchors({bodies[name].name: bodies[name] for name in prescribed}.values())
         self.rate = np.concatenate([self.rate, anchors])
         self.applied = np.pad(self.applied, ((0, len(anchors)), (0, 0), (0, 0)))
         self.moving = np.append(np.isin(names, list(moves)), np.ones(len(anchors), dtype=bool))

@@ -182,7 +182,10 @@ class NewtonSolver:
         result.residuals.append(float(norm / reaction if reaction > 0 else norm))
         if at.border and at.border.singular is not None:
             pressed = at.load > 0 and at.contact.n_active() > 0
-            self._failure = f"{'no stiffness is left' if pressed else 'nothing resists the force'} (singular mode)"
+            of = next(
+                (f" of the drive {n!r}" for n in at.drives.names[at.drives.unknown[at.border.singular] :] if n), ""
+            )
+            self._failure = f"{'no stiffness is left' if pressed else 'nothing resists the force'}{of} (singular mode)"
             return reasons.DIVERGED_LINEAR_SOLVE
         if not np.isfinite(norm):
             return reasons.DIVERGED_FNORM_NAN
