@@ -92,16 +92,19 @@ def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, quiet: bool
 @flag("--example", "print a commented example of a joint")
 @flag("--general", "print a commented example of a general scene")
 @flag("--reference", "print all keys as Markdown tables")
+@flag("--materials", "print the metals that a scene may name, as a Markdown table")
 @click.option("--expand", type=PATH, metavar="SCENE", help="print the general scene that SCENE stands for")
-def scene(example: bool, general: bool, reference: bool, expand: Path | None) -> int:
+def scene(example: bool, general: bool, reference: bool, materials: bool, expand: Path | None) -> int:
     """Print what a scene file may hold."""
-    if example + general + reference + (expand is not None) != 1:
-        raise click.UsageError("choose one of --example, --general, --reference and --expand")
+    if example + general + reference + materials + (expand is not None) != 1:
+        raise click.UsageError("choose one of --example, --general, --reference, --materials and --expand")
     from archord.scene import reference as pages
     from archord.scene.file import load_scene, resolved
 
     if expand is not None:
         print(resolved(load_scene(expand)), end="")
+    elif materials:
+        print(pages.materials(), end="")
     else:
         print(pages.reference() if reference else pages.example(general), end="")
     return 0

@@ -59,7 +59,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
 
     return Problem(
         _mesh(scene, comm, partitioner),
-        [Body(name, solid.material(analysis.plane)) for name, solid in scene.solids.items()],
+        [Body(name, solid.constitutive(analysis.plane)) for name, solid in scene.solids.items()],
         [contact],
         supports,
         [Load("pin", (0.0, -1.0), core)] if ring else [],

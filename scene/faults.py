@@ -10,7 +10,7 @@ from typing import Any, get_args
 from archord.scene.keys import SEPARATOR, Section, toml_value
 
 _MOST_SENTENCES = 20
-_KINDS = ("number", "list", "law", "float", "int")  # of values that a key may have
+_KINDS = ("number", "list", "law", "float", "int", "constrained-int")  # of values that a key may have
 _PHRASES = {
     "missing": "is missing",
     "extra_forbidden": "is not a known key; {hint}{kind} are {known}",

@@ -18,6 +18,7 @@ ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
     "load": [(*LOADS, "path")],
 }
+_BROUGHT = {"material": ("E", "nu", "yield_stress", "hardening")}
 _LARGEST_FILE = 10**6  # bytes
 _DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
@@ -57,12 +58,17 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     if "base" in data and "joint" not in data:
         raise InputError(f"{path}: is a sweep, not a scene; archord sweep solves it.")
     _give_way(data, overrides)
-    origin = {override_key(data, override): f"--set {override}" for override in overrides}
+    origin = {override_key(data, o): f"--set {o}" for o in sorted(overrides, key=set_later)}
     read_targets(data, Path(path))
     mesh = data.get("mesh")
     if isinstance(mesh, dict) and isinstance(mesh.get("file"), str):
         mesh["file"] = str((Path(path).parent / mesh["file"]).absolute())
     return parse_any(data, str(path), origin)
+
+
+def set_later(key: str) -> bool:
+    """Whether ``key`` is set after a rigid pin and materials, which drop what the file says, not other overrides."""
+    return not key.partition("=")[0].strip().endswith((".rigid", ".material"))
 
 
 def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
@@ -155,7 +161,8 @@ def _in_table(tables: list[Any], section: str, place: str, override: str) -> str
     if not (dot and key and found is not None and "=" in override):
         names = ", ".join(str(table.get("name")) for table in tables if isinstance(table, dict))
         raise InputError(f"--set {override!r}: must read {section}.NAME.key=value, with a name among {names}.")
-    found.pop(key, None)
+    for other in (key, *_BROUGHT.get(key, ())):
+        found.pop(other, None)
     if text:
         found[key] = _value(text)
     return f'{section} "{name}".{key}'
@@ -169,7 +176,8 @@ def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) ->
     table = data.setdefault(section, {})
     if not isinstance(table, dict):
         raise InputError(f"{said}: {section} is not a section of the scene.")
-    for other in next((names for names in ALTERNATIVES.get(section, []) if name in names), (name,)):
+    instead = next((names for names in ALTERNATIVES.get(section, []) if name in names), (name,))
+    for other in (*instead, *_BROUGHT.get(name, ())):
         table.pop(other, None)
     if (section, name, value) == ("pin", "rigid", True):
         table.clear()

@@ -1,4 +1,4 @@
-"""How a body hardens, in the words of a scene: a number, a table, a named law."""
+"""How a body hardens, in the words of a scene: a number, a table, a named law, a named metal."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from archord.materials.hardening import Hardening, LinearHardening, SwiftHardening, TabularHardening, VoceHardening
+from archord.materials.named import metal
 from archord.scene.keys import Positive, Section, key
 
 _Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -43,6 +44,21 @@ HardeningKey = Annotated[
     | Annotated[HardeningLaw, Tag("law")],
     Discriminator(_kind),
 ]
+
+
+def with_material(data: Any, unit: str) -> Any:
+    """The keys ``data`` of a solid with those of the metal that ``material`` names, in the ``unit`` of stress, unless
+    they have their own; its hardening goes with its own yield stress alone. Raises ValueError."""
+    name = data.get("material") if isinstance(data, dict) else None
+    if not isinstance(name, str) or data.get("rigid"):
+        return data
+    try:
+        found = metal(name, unit)
+    except ValueError as error:
+        raise ValueError(f"material|{error}") from None
+    if "hardening" in data or "yield_stress" in data:
+        del found["hardening"]
+    return found | data
 
 
 def with_yield_stress(data: Any) -> Any:

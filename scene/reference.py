@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, get_args
 
+from archord.materials.named import metals
 from archord.report.table import Table
 from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
@@ -74,6 +75,16 @@ def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
 
 def _heading(section: str, info: Any) -> str:
     return f"[[{section}]]" if get_args(info.annotation) else f"[{section}]"
+
+
+def materials() -> str:
+    """The metals that a scene may name, as a Markdown table; stresses in MPa."""
+    table = Table("name", "what", "E", "nu", "yield", "tensile", "hardens from", "to", "at PEEQ", "source")
+    for name, m in metals().items():
+        (_, first), (peeq, last) = m["hardening"][0], m["hardening"][-1]
+        values = (f"{value:g}" for value in (m["E"], m["nu"], m["yield"], m["tensile"], first, last, peeq))
+        table.add(f"`{name}`", m["title"], *values, m["source"])
+    return table.markdown()
 
 
 def _keys(section: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:

@@ -43,7 +43,9 @@ class Checked(Section):
             said = f"is for a newer archord; this one reads format {self.newest}"
             raise InputError(f"{source}: format = {version} {said}.")
         try:
-            super().__init__(**data)
+            units = data.get("units")
+            context = {"stress": str(units.get("stress", "MPa"))} if isinstance(units, dict) else {}
+            self.__pydantic_validator__.validate_python(data, self_instance=self, context=context)
         except ValidationError as error:
             raise InputError(in_sentences(error.errors(), data, type(self), source, dict(origin or {}))) from None
 

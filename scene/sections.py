@@ -6,19 +6,20 @@ import math
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import Hardening
 from archord.materials.material import Material, Plane
 from archord.scene.keys import LINE, Positive, Section, key, require
-from archord.scene.plasticity import HardeningKey, hardening_law, with_yield_stress
+from archord.scene.plasticity import HardeningKey, hardening_law, with_material, with_yield_stress
 
 NotNegative = Annotated[float, Field(ge=0)]
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
 # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
 Ratio = Annotated[float, Field(ge=-0.999, le=0.499999)]
 _FORCE = {("MPa", "mm"): "N/mm", ("Pa", "m"): "N/m"}
+_E, _NU = "Young's modulus, unless a material brings it", "Poisson's ratio, unless a material brings it"
 MOST_STEPS = 10_000  # output steps
 Targets = float | Annotated[list[float], Field(min_length=1)]
 Steps = Annotated[int, Field(ge=1, le=MOST_STEPS)]
@@ -52,6 +53,14 @@ class Units(Section):
 class Solid(Section):
     """Isotropic elastic solid, elastic-plastic (J2) with a yield stress."""
 
+    material: str | None = key(
+        "metal of docs/materials.md that brings E, nu, yield_stress and hardening where they are not given",
+        default=None,
+        other="S355",
+        min_length=1,
+        pattern=LINE,
+        exclude=True,
+    )
     yield_stress: Positive | None = key("yield stress; elastic if absent", "stress", default=None, example=300.0)
     hardening: HardeningKey = key(
         "modulus d(yield stress)/d(PEEQ), 0: perfect plasticity; or points [PEEQ, true stress]; or a law: {saturation, "
@@ -66,13 +75,13 @@ class Solid(Section):
         min_length=1,
         max_length=3,
     )
-    E: Positive = key("Young's modulus", "stress", example=210000.0)
-    nu: Ratio = key("Poisson's ratio", example=0.3)
+    E: Positive = key(_E, "stress", example=210000.0)
+    nu: Ratio = key(_NU, example=0.3)
 
     @model_validator(mode="before")
     @classmethod
-    def _table(cls, data: Any) -> Any:
-        return with_yield_stress(data)
+    def _filled(cls, data: Any, info: ValidationInfo) -> Any:
+        return with_material(with_yield_stress(data), (info.context or {}).get("stress", "MPa"))
 
     @model_validator(mode="after")
     def _plasticity(self):
@@ -100,7 +109,7 @@ class Solid(Section):
         """The isotropic hardening of a solid with a yield stress."""
         return hardening_law(self.yield_stress or 0.0, self.hardening, self.E)
 
-    def material(self, plane: Plane) -> Material:
+    def constitutive(self, plane: Plane) -> Material:
         """The constitutive law: `Elastic` without a yield stress, `KinematicMaterial` with back stresses, `J2Material`
         else."""
         if self.yield_stress is None:
@@ -119,13 +128,14 @@ class Solid(Section):
 class Pin(Solid):
     """The pin: a solid like the block, or rigid."""
 
-    E: Positive | None = key("Young's modulus", "stress", default=None, example=210000.0)  # type: ignore[assignment]
-    nu: Ratio | None = key("Poisson's ratio", default=None, example=0.3)  # type: ignore[assignment]
+    E: Positive | None = key(_E, "stress", default=None, example=210000.0)  # type: ignore[assignment]
+    nu: Ratio | None = key(_NU, default=None, example=0.3)  # type: ignore[assignment]
     rigid: bool = key("a rigid pin: no mesh, no other key", default=False, other=True)
 
     @model_validator(mode="after")
     def _rigid_or_solid(self) -> Pin:
-        for name in ("hardening", "yield_stress", "back_stresses", "E", "nu"):  # a table brings the yield stress
+        # a table brings the yield stress
+        for name in ("material", "hardening", "yield_stress", "back_stresses", "E", "nu"):
             given = name in self.model_fields_set and getattr(self, name)
             require(not (self.rigid and given), name, "is not for a rigid pin")
         for name in ("E", "nu"):

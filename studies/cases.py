@@ -15,7 +15,7 @@ import numpy as np
 
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
-from archord.scene.file import ALTERNATIVES, parse_scene, put, read_targets, resolved
+from archord.scene.file import ALTERNATIVES, parse_scene, put, read_targets, resolved, set_later
 from archord.scene.scene import Scene
 from archord.studies.sweep_file import ABSENT, LatinHypercube, Overrides, SweepFile, flattened, load_sweep
 
@@ -180,8 +180,7 @@ def run_name(scene: Scene) -> str:
 def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:
     """The base with ``overrides``, checked. Raises `InputError`."""
     data = copy.deepcopy(base)
-    # a rigid pin first: it drops the keys of the base's pin, not those of other overrides
-    for key in sorted(overrides, key=lambda key: key != "pin.rigid"):
+    for key in sorted(overrides, key=set_later):
         section, _, name = key.partition(".")
         value = overrides[key]
         put(data, section, name, None if isinstance(value, str) and value == ABSENT else value, key)

@@ -56,6 +56,18 @@ def lug() -> dict:
     return tomllib.loads(LUG)
 
 
+def test_bodies_may_name_their_material(tmp_path):
+    """As in the scene of a joint, also by --set, which drops the body's own numbers."""
+    path = tmp_path / "scene.toml"
+    path.write_text(LUG.replace("E = 210000.0\nnu = 0.3\n", 'material = "S355"\n'))
+    pin, plate = load_scene(path, ["body.pin.material=6082-T6"]).body
+    assert (pin.E, pin.yield_stress) == (70000.0, 230.42)
+    assert (plate.E, plate.nu, plate.yield_stress, plate.perfectly_plastic) == (210000.0, 0.3, 300.0, True)
+    assert parse_any(tomllib.loads(resolved(load_scene(path)))).body[0].yield_stress == 355.0
+    with pytest.raises(InputError, match=r'body "lug"\.material.* is not a known material; did you mean S275'):
+        load_scene(path, ["body.lug.material=S253"])
+
+
 def changed(place: str, value) -> dict:
     """The data with the key at ``place``, like "load.0.force", replaced."""
     data = copy.deepcopy(lug())

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
+from archord.materials.named import metal
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
-from archord.scene.reference import example, reference
+from archord.scene.reference import example, materials, reference
 from archord.scene.scene import Scene
 
 
@@ -59,6 +60,9 @@ def basic() -> dict:
         ("block", "yield_stress", 1e-30, "must be at least 1e-07 times block.E."),
         ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
         ("pin", "rigid", True, "is not for a rigid pin."),
+        ("pin", None, {"rigid": True, "material": "S355"}, 'pin.material = "S355" is not for a rigid pin.'),
+        ("block", "material", "S335", 'block.material = "S335" is not a known material; did you mean S355? Materials'),
+        ("block", "material", 355, "block.material = 355 must be text."),
         (
             "pin",
             None,
@@ -177,13 +181,38 @@ def test_hardening_is_a_number_a_table_or_a_law(hardening, law):
     table = isinstance(law, TabularHardening)
     data = basic() | {"block": solid if table else solid | {"yield_stress": 3.0}}
     block = parse_scene(data).block
-    assert block.material("strain").hardening == law
+    assert block.constitutive("strain").hardening == law
     assert parse_scene(tomllib.loads(resolved(parse_scene(data)))).block == block
-    kinematic = parse_scene(data | {"block": data["block"] | {"back_stresses": [[50.0, 2.0]]}}).block.material("stress")
+    kinematic = parse_scene(data | {"block": data["block"] | {"back_stresses": [[50.0, 2.0]]}}).block.constitutive(
+        "stress"
+    )
     assert (kinematic.hardening, kinematic.back_stresses) == (law, ((50.0, 2.0),))
     if table or isinstance(law, VoceHardening):
         with pytest.raises(InputError, match=r"block\.hardening.* must (begin at yield_stress|not soften)"):
             parse_scene(data | {"block": solid | {"yield_stress": 6.0}})
+
+
+def test_a_material_brings_what_is_not_given(tmp_path):
+    """In the scene's unit of stress; the resolved scene holds its values alone, and --set replaces them all."""
+    data = basic() | {"pin": {"material": "S460", "E": 205000.0}, "block": {"material": "S355"}}
+    scene = parse_scene(data)
+    steel = metal("S355", "MPa")
+    assert (scene.block.E, scene.block.yield_stress, scene.block.hardening) == (210000.0, 355.0, steel["hardening"])
+    assert (scene.pin.E, scene.pin.nu, scene.pin.yield_stress) == (205000.0, 0.3, 460.0)
+    text = resolved(scene)
+    assert "material" not in text
+    assert parse_scene(tomllib.loads(text)).block.law == scene.block.law
+    assert parse_scene(data | {"units": {"length": "m", "stress": "Pa"}}).block.yield_stress == 355e6
+    own = {"hardening": 0.0}, {"yield_stress": 300.0}, {"hardening": {"saturation": 500.0, "rate": 10.0}}
+    blocks = [parse_scene(data | {"block": {"material": "S355"} | keys}).block for keys in own]
+    assert [block.yield_stress for block in blocks] == [355.0, 300.0, 355.0]
+    assert [block.perfectly_plastic for block in blocks] == [True, True, False]
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    found = load_scene(path, ["block.E=70000.0", "block.material=6082-T6"]).block
+    assert (found.E, found.nu, found.yield_stress) == (70000.0, 0.3, 230.42)
+    with pytest.raises(InputError, match=r"^--set block\.material=S335: block\.material is not .* did you mean S355\?"):
+        load_scene(path, ["block.material=S335"])
 
 
 def test_the_resolved_scene_is_the_same_scene():
@@ -207,6 +236,11 @@ def test_the_example_shows_every_key_and_loads():
         for key, field in getattr(info.annotation, "model_fields", {}).items():
             assert f"{key} = " in text
             assert field.description in text
+
+
+def test_the_page_of_materials_holds_their_table():
+    """docs/materials.md has what `archord scene --materials` prints."""
+    assert materials() in (Path(__file__).parents[2] / "docs" / "materials.md").read_text()
 
 
 def test_the_reference_page_is_that_of_the_model():

@@ -1,0 +1,31 @@
+"""Metals by name: elastic constants, strengths and hardening, as named.toml lists them."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+_PER_MPA = {"MPa": 1.0, "N/mm2": 1.0, "Pa": 1e6, "kPa": 1e3, "GPa": 1e-3}
+
+
+@cache
+def metals() -> dict[str, dict[str, Any]]:
+    """The tables of named.toml, in MPa."""
+    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+def metal(name: str, unit: str) -> dict[str, Any]:
+    """``E``, ``nu``, ``yield_stress`` and ``hardening``, points (PEEQ, true stress), of the metal ``name`` in a
+    ``unit`` of stress. Raises ValueError for a name or a unit that is not known."""
+    if name not in metals():
+        near = difflib.get_close_matches(name, metals(), 1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise ValueError(f"is not a known material; {hint}Materials are {', '.join(metals())}")
+    if unit not in _PER_MPA:
+        raise ValueError(f"needs a units.stress that is one of {', '.join(_PER_MPA)}, not {unit}")
+    found, scale = metals()[name], _PER_MPA[unit]
+    points = [[peeq, scale * stress] for peeq, stress in found["hardening"]]
+    return {"E": scale * found["E"], "nu": found["nu"], "yield_stress": points[0][1], "hardening": points}

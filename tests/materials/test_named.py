@@ -1,0 +1,83 @@
+"""Metals by name: the tables are those of the formulas, the formulas those of their sources."""
+
+import numpy as np
+import pytest
+
+from archord.materials.hardening import TabularHardening
+from archord.materials.named import metal, metals
+
+
+def quad_linear(fy: float, fu: float, E: float) -> np.ndarray:
+    """Yun and Gardner (2017): points (strain, stress) of hot-rolled steel, engineering."""
+    at_fu = max(0.6 * (1 - fy / fu), 0.06)
+    at_hardening = min(max(0.1 * fy / fu - 0.055, 0.015), 0.03)
+    kink = at_hardening + 0.25 * (at_fu - at_hardening)  # C1 times the strain at fu
+    slope = (fu - fy) / (0.4 * (at_fu - at_hardening))  # from the strain C2 times that at fu
+    strain = np.array([fy / E, *np.linspace(at_hardening, kink, 3), *np.linspace(kink, at_fu, 5)[1:]])
+    stress = np.interp(strain, [fy / E, at_hardening, kink, at_fu], [fy, fy, fy + slope * (kink - at_hardening), fu])
+    return np.stack([strain, stress], axis=1)
+
+
+def exponent(f: float, fu: float, strain: float) -> float:
+    """Ramberg and Osgood's n through 0.2 % at the stress ``f`` and ``strain`` at ``fu``."""
+    return np.log(strain / 0.002) / np.log(fu / f)
+
+
+def at_strength(f: float) -> float:
+    """EN 1999-1-1, annex E: strain at the strength of an aluminium alloy whose proof strength is below 400 MPa."""
+    return 0.30 - 0.22 * f / 400
+
+
+def ramberg_osgood(f: float, n: float, E: float, last: float) -> np.ndarray:
+    """Points (strain, stress) of plastic strains from 1e-4 to ``last``: ``strain = s/E + 0.002 (s/f)^n``."""
+    plastic = np.array([1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1])
+    plastic = np.append(plastic[plastic < last], last)
+    stress = f * (plastic / 0.002) ** (1 / n)
+    return np.stack([plastic + stress / E, stress], axis=1)
+
+
+@pytest.mark.parametrize("name", metals())
+def test_tables_are_those_of_the_formulas(name):
+    """To the digits printed; true stress over PEEQ, the first point at the stress of first yield itself."""
+    m = metals()[name]
+    f, fu = m["yield"], m["tensile"]
+    if name.startswith("S"):
+        points = quad_linear(f, fu, m["E"])
+    else:
+        strain = at_strength(f) if "EN 1999" in m["source"] else m["elongation"]
+        points = ramberg_osgood(f, exponent(f, fu, strain), m["E"], m["elongation"])
+    peeq, stress = np.array(TabularHardening.from_engineering(points, m["E"]).points).T
+    stress[0] = points[0, 1]
+    table = TabularHardening(tuple(map(tuple, m["hardening"])))
+    found = np.array(table.points).T
+    assert np.abs(found[0] - peeq).max() <= 0.5e-6 + 1e-12
+    assert np.abs(found[1] - stress).max() <= 0.5e-2 + 1e-9
+    assert points[-1, 1] <= fu * (1 + 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("f", "fu", "n"), [(110, 270, 5), (140, 170, 24), (160, 195, 24), (240, 260, 55), (225, 270, 25), (200, 280, 14)]
+)
+def test_the_exponent_is_that_of_the_standard(f, fu, n):
+    """EN 1999-1-1, table 3.2b: 5083-O, 6060-T6, 6063-T6, 6061-T6, 6005A-T6, 5083-H12."""
+    assert exponent(f, fu, at_strength(f)) == pytest.approx(n, abs=0.55)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("MPa", 1.0), ("N/mm2", 1.0), ("Pa", 1e6), ("kPa", 1e3), ("GPa", 1e-3)])
+def test_stresses_are_in_the_unit_asked_for(unit, scale):
+    found, m = metal("S355", unit), metals()["S355"]
+    assert (found["E"], found["nu"], found["yield_stress"]) == pytest.approx((210000 * scale, 0.3, 355 * scale))
+    assert np.array(found["hardening"]) == pytest.approx(np.array(m["hardening"]) * [1, scale])
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "said"),
+    [
+        ("S335", "MPa", r"is not a known material; did you mean S355\? Materials are S235, .*, Ti-6Al-4V$"),
+        ("cheese", "MPa", "is not a known material; Materials are S235"),
+        ("S355", "psi", "needs a units.stress that is one of MPa, N/mm2, Pa, kPa, GPa, not psi"),
+    ],
+)
+def test_unknown_names_and_units_are_refused(name, unit, said):
+    with pytest.raises(ValueError, match=said):
+        metal(name, unit)
