@@ -77,7 +77,7 @@ class _Builder:
         travel = sum(lengths) + max((i.interference + i.overlap for i in scene.interaction), default=0.0)
         problem = Problem(
             self.mesh,
-            [Body(body.name, body.material(analysis.plane), body.cells or body.name) for body in scene.body],
+            [Body(body.name, body.constitutive(analysis.plane), body.cells or body.name) for body in scene.body],
             [self._interaction(part, 0.0 if by_force else travel) for part in scene.interaction],
             self.supports,
             self.loads,
