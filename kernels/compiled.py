@@ -61,8 +61,7 @@ def pointer(array: npt.NDArray[Any]) -> Any:
 
 
 def cache_folder() -> Path:
-    """The user's folder for what is made once and used again; a temporary one of this process where that cannot be
-    written."""
+    """The user's folder for what is made once and used again; one of this process where that cannot be written."""
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "archord"
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)

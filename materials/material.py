@@ -37,9 +37,8 @@ class Material(Protocol):
         """Stress ``(n, 4)``, consistent tangent ``(n, 3, 3)`` and new state at ``strain`` ``(n, 3)`` from ``state``.
 
         The tangent equals `elastic_tangent` to the bit at points that do not flow; it may be a view, not to be written
-        to. If it is not symmetric, `TangentMatrix.border` takes it as such under force control, which leaves the
-        equilibrium as it is and may take more iterations. A stress that does not exist is not a number: the solver
-        takes the step back.
+        to. If it is not symmetric, `TangentMatrix.border` takes it as such under force control: more iterations, the
+        same equilibrium. A stress that does not exist is not a number: the solver takes the step back.
         """
         ...
 

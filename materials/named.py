@@ -21,8 +21,7 @@ def metal(name: str, unit: str) -> dict[str, Any]:
     """``E``, ``nu``, ``yield_stress`` and ``hardening``, points (PEEQ, true stress), of the metal ``name`` in a
     ``unit`` of stress. Raises ValueError for a name or a unit that is not known."""
     if name not in metals():
-        near = difflib.get_close_matches(name, metals(), 1)
-        hint = f"did you mean {near[0]}? " if near else ""
+        hint = "".join(f"did you mean {near}? " for near in difflib.get_close_matches(name, metals(), 1))
         raise ValueError(f"is not a known material; {hint}Materials are {', '.join(metals())}")
     if unit not in _PER_MPA:
         raise ValueError(f"needs a units.stress that is one of {', '.join(_PER_MPA)}, not {unit}")

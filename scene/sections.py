@@ -54,12 +54,7 @@ class Solid(Section):
     """Isotropic elastic solid, elastic-plastic (J2) with a yield stress."""
 
     material: str | None = key(
-        "metal of docs/materials.md that brings E, nu, yield_stress and hardening where they are not given",
-        default=None,
-        other="S355",
-        min_length=1,
-        pattern=LINE,
-        exclude=True,
+        "metal of docs/materials.md, for the keys that are not given", default=None, other="S355", exclude=True
     )
     yield_stress: Positive | None = key("yield stress; elastic if absent", "stress", default=None, example=300.0)
     hardening: HardeningKey = key(
