@@ -17,21 +17,21 @@ from archord.report.version import VERSION
 __version__ = VERSION
 
 if TYPE_CHECKING:
-    from archord.api import InputError, Run, Sweep, load, load_scene, solve
+    from archord.api import InputError, Problem, Run, Sweep, load, load_scene, solve
     from archord.geometry.meshes.fenicsx import gmsh_to_mesh
     from archord.materials.elasticity import Elastic
     from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
     from archord.materials.j2 import J2Material
     from archord.materials.kinematic import KinematicMaterial
+    from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Support
     from archord.scene.problem import ProblemScene
     from archord.scene.scene import Scene
-    from archord.solver.problem import Body, Drive, Interaction, Load, Mean, Problem, Rigid, Support
     from archord.solver.system import System
 
 
 __all__ = [
-    "Body", "Drive", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LinearHardening",
-    "Load", "Mean", "Problem", "ProblemScene", "Rigid", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System",
+    "Body", "Coupling", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LinearHardening",
+    "Load", "Mesh", "Problem", "ProblemScene", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System",
     "TabularHardening", "VoceHardening", "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
@@ -45,9 +45,7 @@ _HOME = {
     ),
     "Scene": "archord.scene.scene",
     "ProblemScene": "archord.scene.problem",
-    **dict.fromkeys(
-        ("Body", "Drive", "Interaction", "Load", "Mean", "Problem", "Rigid", "Support"), "archord.solver.problem"
-    ),
+    **dict.fromkeys(("Body", "Coupling", "Interaction", "Load", "Mesh", "Support"), "archord.scene.parts"),
 }
 
 

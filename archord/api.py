@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import signal
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,8 @@ from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.file import load_scene as load_scene_file
 from archord.scene.keys import toml_value
+from archord.scene.parts import Mesh
+from archord.scene.problem import LIVE, ProblemScene
 from archord.scene.scene import plain
 
 if TYPE_CHECKING:
@@ -38,6 +40,31 @@ def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> An
     """
     given = {key: "" if value is None else toml_value(plain(value)) for key, value in (changes or {}).items()}
     return load_scene_file(path, [f"{key}={value}" for key, value in given.items()])
+
+
+def Problem(
+    mesh: Any,
+    *,
+    bodies: Sequence[Any],
+    loads: Sequence[Any],
+    interactions: Sequence[Any] = (),
+    couplings: Sequence[Any] = (),
+    supports: Sequence[Any] = (),
+    **sections: Any,
+) -> ProblemScene:
+    """A general scene in the words of scene files: parts are of the classes `Body`, `Load` and so on, or tables.
+
+    ``mesh`` is a mesh file, gmsh with a model (meshed or not), a dolfinx mesh with tags ``(mesh, cells, facets)``, or a
+    `Mesh` or its table. Other ``sections`` are those of a scene: ``path``, ``analysis``, ... Raises `InputError`.
+    """
+    if isinstance(mesh, (str, Path)):
+        mesh = {"file": str(mesh)}
+    elif not isinstance(mesh, (Mapping, Mesh)):
+        name = f"mesh {len(LIVE) + 1} given from Python"
+        LIVE[name], mesh = mesh, {"file": name}
+    parts = {"body": bodies, "interaction": interactions, "coupling": couplings, "support": supports, "load": loads}
+    kind: Any = ProblemScene
+    return kind(mesh=mesh, **{name: list(part) for name, part in parts.items()}, **sections)
 
 
 def solve(

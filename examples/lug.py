@@ -14,17 +14,8 @@ from itertools import pairwise
 import numpy as np
 from mpi4py import MPI
 
-from archord import (
-    Body,
-    Elastic,
-    Interaction,
-    J2Material,
-    Problem,
-    Support,
-    System,
-    TabularHardening,
-    gmsh_to_mesh,
-)
+from archord import Elastic, J2Material, System, TabularHardening, gmsh_to_mesh
+from archord.solver.problem import Body, Interaction, Problem, Support
 
 E, NU, SIZE, GROWTH, STEP = 210000.0, 0.3, 0.5, 0.25, 0.02
 HARDENING = TabularHardening(((0.0, 355.0), (0.02, 400.0), (0.1, 500.0), (0.3, 550.0)))

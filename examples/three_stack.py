@@ -2,7 +2,8 @@
 
 from mpi4py import MPI
 
-from archord import Body, Elastic, Interaction, J2Material, LinearHardening, Problem, Support, System, gmsh_to_mesh
+from archord import Elastic, J2Material, LinearHardening, System, gmsh_to_mesh
+from archord.solver.problem import Body, Interaction, Problem, Support
 
 E, NU, SIGY, DEPTH, NAMES = 1.0, 0.3, 0.002, 0.02, ("lower", "middle", "upper")
 

@@ -2,7 +2,8 @@
 
 from mpi4py import MPI
 
-from archord import Body, Elastic, Interaction, Problem, Support, System, gmsh_to_mesh
+from archord import Elastic, System, gmsh_to_mesh
+from archord.solver.problem import Body, Interaction, Problem, Support
 
 E, NU, DEPTH = 1.0, 0.3, 0.01
 

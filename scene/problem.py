@@ -15,6 +15,7 @@ from archord.scene.scene import Checked
 from archord.scene.sections import MOST_STEPS, Output, Stepping, Units
 
 FORMAT = 2
+LIVE: dict[str, Any] = {}  # meshes given from Python, by what stands in the place of their file
 
 
 class ProblemScene(Checked):
