@@ -22,10 +22,9 @@ def squares(gmsh):
 steel, lead = Elastic(E, NU, "strain"), J2Material(E, NU, "strain", LinearHardening(SIGY))
 bodies = [Body(name, lead if name == "middle" else steel) for name in NAMES]
 contacts = [Interaction("low", ("middle b", "lower t")), Interaction("high", ("upper b", "middle t"))]
-supports = [Support("base", "lower b", 1), Support("lid", "upper t", 1, rate=-1.0)]
-supports += [Support("walls", f"{name} {side}", 0) for name in NAMES for side in "lr"]
-system = System(Problem(gmsh_to_mesh(MPI.COMM_WORLD, squares), bodies, contacts, supports))
-system.solve([DEPTH])
+walls = [Support("walls", f"{name} {side}", 0) for name in NAMES for side in "lr"]
+supports = [Support("base", "lower b", 1), Support("lid", "upper t", 1, rate=-1.0), *walls]
+(system := System(Problem(gmsh_to_mesh(MPI.COMM_WORLD, squares), bodies, contacts, supports))).solve([DEPTH])
 K, M = E / (3 * (1 - 2 * NU)), E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))  # moduli without and with shear
 pressure, exact = -system.reaction("lid")[1], (DEPTH + 2 * SIGY / (3 * K)) / (2 / M + 1 / K)
 print(f"pressure {pressure:.12g}, exact {exact:.12g}")
