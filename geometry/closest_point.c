@@ -1,4 +1,4 @@
-/* Closest points on a chain of polynomial facets: see geometry/curve.py for the meaning of every argument. */
+/* Closest points on polynomial facets: see geometry/curve.py for the meaning of every argument. */
 
 #include <math.h>
 
@@ -55,36 +55,37 @@ static double closest_on_facet(int p, const double *coefficients, const double *
     return xi;
 }
 
-int32_t closest_points(int32_t m, const double *x, const double *outward, int32_t n_facets, int32_t closed, int32_t p,
-                       const double *X, const double *coefficients, const int32_t *home, int32_t reach, double margin,
-                       double end_margin, int32_t steps, int32_t *facet, double *xi, double *point, double *normal, double *tangent,
-                       double *bend, double *shape, double *slope, uint8_t *slides, uint8_t *found, int32_t *lost)
+int32_t closest_points(int32_t m, const double *x, const double *outward, int32_t p, const double *X,
+                       const int32_t *before, const int32_t *after, const double *coefficients, const int32_t *home,
+                       int32_t reach, double margin, double end_margin, int32_t steps, int32_t *facet, double *xi,
+                       double *point, double *normal, double *tangent, double *bend, double *shape, double *slope,
+                       uint8_t *slides, uint8_t *found, int32_t *lost)
 {
     int32_t n_lost = 0;
     for (int32_t i = 0; i < m; i++, x += 2, outward += 2) {
+        const int32_t near[3] = {before[home[i]], home[i], after[home[i]]};
         double least = INFINITY, N[MOST], dN[MOST], low_best = 0, high_best = 1;
-        for (int32_t away = -reach; away <= reach; away++) {
-            const int32_t wanted = home[i] + away;
-            const int32_t inside = wanted < 0 ? 0 : wanted >= n_facets ? n_facets - 1 : wanted;
-            const int32_t k = closed ? (wanted + n_facets) % n_facets : inside;
-            const double low = k == 0 && !closed ? -end_margin : -margin;
-            const double high = 1 + (k == n_facets - 1 && !closed ? end_margin : margin);
-            const double start = k == home[i] ? 0.5 : away < 0 ? 1.0 : 0.0;
-            const double at = closest_on_facet(p, coefficients, X + 2 * p * k, x, start, low, high, steps);
-            const Frame f = frame(p, coefficients, X + 2 * p * k, at, N, dN);
+        facet[i] = -1;
+        for (int c = 1 - reach; c <= 1 + reach; c++) {
+            const int32_t k = near[c];
+            if (k < 0) continue;
+            const double low = before[k] < 0 ? -end_margin : -margin;
+            const double high = 1 + (after[k] < 0 ? end_margin : margin);
+            const double at = closest_on_facet(p, coefficients, X + 2 * (p + 1) * k, x, 1 - 0.5 * c, low, high, steps);
+            const Frame f = frame(p, coefficients, X + 2 * (p + 1) * k, at, N, dN);
             const double d2 = (x[0] - f.y[0]) * (x[0] - f.y[0]) + (x[1] - f.y[1]) * (x[1] - f.y[1]);
-            if (d2 < least || away == -reach) {
+            if (d2 < least || facet[i] < 0) {
                 least = d2, facet[i] = k, xi[i] = at, low_best = low, high_best = high;
             }
         }
         const int32_t k = facet[i];
-        const Frame f = frame(p, coefficients, X + 2 * p * k, xi[i], shape + i * (p + 1), slope + i * (p + 1));
+        const Frame f = frame(p, coefficients, X + 2 * (p + 1) * k, xi[i], shape + i * (p + 1), slope + i * (p + 1));
         const double speed = hypot(f.t[0], f.t[1]);
         const double d[2] = {x[0] - f.y[0], x[1] - f.y[1]};
         const double along = (d[0] * f.t[0] + d[1] * f.t[1]) / (speed * speed); /* what is left of the Newton step */
         const int clamped = xi[i] <= low_best || xi[i] >= high_best;
-        const int beyond = !closed && ((k == 0 && xi[i] <= -end_margin && along < 0)
-                                       || (k == n_facets - 1 && xi[i] >= 1 + end_margin && along > 0));
+        const int beyond = (before[k] < 0 && xi[i] <= -end_margin && along < 0)
+                           || (after[k] < 0 && xi[i] >= 1 + end_margin && along > 0);
         double *n = normal + 2 * i;
         n[0] = f.t[1] / speed, n[1] = -f.t[0] / speed;
         for (int j = 0; j < 2; j++) point[2 * i + j] = f.y[j], tangent[2 * i + j] = f.t[j];

@@ -1,7 +1,8 @@
 """Piecewise polynomial curves in the plane and the closest points on them.
 
-A curve is a chain of facets; facet ``k`` has nodes ``k p .. (k + 1) p`` of a polynomial of degree ``p`` in ``xi`` in
-[0, 1]. The body lies on the left of the direction of travel, so the outward normal is the tangent turned clockwise.
+A curve consists of facets, polynomials of degree ``p`` in ``xi`` in [0, 1], which follow each other in pieces: open
+ones with two free ends, and closed ones. The body lies on the left of the direction of travel, so the outward normal is
+the tangent turned clockwise.
 """
 
 from __future__ import annotations
@@ -53,15 +54,28 @@ def lagrange(degree: int) -> Array:
 
 
 class Curve:
-    """A chain of ``n`` polynomial facets with nodes ``X`` ``(n p + 1, 2)``; ``closed`` if the last is the first."""
+    """``n`` polynomial facets with nodes ``X`` ``(m, 2)``, piece by piece in the direction of travel.
 
-    def __init__(self, X: Array, degree: int) -> None:
-        self.X = X
-        self.degree = degree
-        self.n_facets = (len(X) - 1) // degree
-        self.closed = self.n_facets > 2 and np.array_equal(X[0], X[-1])
-        self.connectivity = (np.arange(self.n_facets)[:, None] * degree + np.arange(degree + 1)).astype(np.int32)
+    ``connectivity`` ``(n, p + 1)`` holds the nodes along each facet; without it, facet ``k`` of one open piece has the
+    nodes ``k p .. (k + 1) p``. ``before`` and ``after`` ``(n,)`` are the facets at both ends of each, -1 at free ends.
+    """
+
+    def __init__(self, X: Array, degree: int, connectivity: Index | None = None) -> None:
+        self.X, self.degree = X, degree
+        if connectivity is None:
+            connectivity = np.arange(0, len(X) - 1, degree)[:, None] + np.arange(degree + 1)
+        self.connectivity, self.n_facets = connectivity.astype(np.int32), len(connectivity)
+        first, last = self.connectivity[:, 0], self.connectivity[:, -1]
+        starting, ending = np.full((2, len(X)), -1, dtype=np.int32)
+        starting[first] = ending[last] = np.arange(self.n_facets)
+        self.before, self.after = ending[first], starting[last]
+        self._first = np.flatnonzero(self.before[1:] != np.arange(self.n_facets - 1)) + 1  # of each piece but one
         self._coefficients = lagrange(degree)
+
+    @property
+    def n_pieces(self) -> int:
+        """Number of pieces that do not touch."""
+        return 1 + len(self._first)
 
     def shapes(self, xi: Array) -> tuple[Array, Array]:
         """Shape functions and their derivatives, each ``(..., p + 1)``, at ``xi`` ``(...)``."""
@@ -72,14 +86,16 @@ class Curve:
         return value, slope
 
     def vertices(self) -> tuple[Array, Array]:
-        """Where facets meet or the curve ends ``(n + 1, 2)``, and the outward normals of the chords there."""
-        x = self.X[:: self.degree]
-        step = np.gradient(x, axis=0)
+        """Where facets meet or the curve ends ``(k, 2)``, and the outward normals of the chords there."""
+        ends = self.X[self.connectivity[:, [0, -1]]]
+        earlier, free = np.where(self.before < 0, np.arange(self.n_facets), self.before), self.after < 0
+        x = np.concatenate([ends[:, 0], ends[free, 1]])
+        step = np.concatenate([ends[:, 1] - ends[earlier, 0], ends[free, 1] - ends[free, 0]])
         outward = np.stack([step[:, 1], -step[:, 0]], axis=1)
         return x, outward / np.linalg.norm(outward, axis=1)[:, None]
 
     def arc_length(self, xi: Array) -> Array:
-        """Length ``(n, m)`` along the curve from its start to ``xi`` ``(m,)``, or ``(n, m)``, of each facet."""
+        """Length ``(n, m)`` along each piece from its start to ``xi`` ``(m,)``, or ``(n, m)``, of each facet."""
         xi = np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1]))
         ends = np.concatenate([xi, np.ones((self.n_facets, 1))], axis=1)
         q, w = np.polynomial.legendre.leggauss(8)
@@ -87,6 +103,8 @@ class Curve:
         speed = np.linalg.norm(np.einsum("fai,fmqa->fmqi", self.X[self.connectivity], slope), axis=-1)
         lengths = (speed @ w) * ends / 2
         start = np.concatenate([[0.0], np.cumsum(lengths[:, -1])[:-1]])
+        for first in self._first:
+            start[first:] -= start[first]
         return start[:, None] + lengths[:, :-1]
 
     def nearest_facet(self, x: Array, displacement: Array) -> Index:
@@ -105,19 +123,25 @@ class Curve:
 
         ``outward`` ``(m, 2)`` is the outward normal of the own body at ``x``; a partner must face it. ``start`` holds a
         facet for each point near its partner (by default `nearest_facet`, a search without a radius). Newton runs on
-        that facet and its two neighbours, kept within each, and the nearest result is taken; a point that leaves them
-        is searched for on the whole curve. Raises `ProjectionError` if one between the curve's ends gets no partner.
+        that facet and its two neighbours, kept within each, and the nearest result is taken; a point that leaves them,
+        or the piece that they belong to, is searched for on the whole curve. Raises `ProjectionError` if one between
+        the curve's ends gets no partner.
         """
         home = self.nearest_facet(x, displacement) if start is None else start
         found = self._project(x, outward, displacement, home)
-        step = found.facet - home
-        if self.closed:
-            step = (step + 1) % self.n_facets - 1
-        away = ((step == -1) & (found.xi <= 0)) | ((step == 1) & (found.xi >= 1))
+        before, after = self.before[home], self.after[home]
+        back, forth = (found.facet == before) & (found.xi <= 0), (found.facet == after) & (found.xi >= 1)
+        further = np.where(back, self.before[found.facet], np.where(forth, self.after[found.facet], -1))
+        away = (further >= 0) & (further != before) & (further != home) & (further != after)
         if away.any():
             if start is None:
                 raise ProjectionError(f"{away.sum()} contact points have closest points beyond the facets searched")
             return self.closest_point(x, outward, displacement)
+        lost = ~found.found
+        if start is not None and self.n_pieces > 1 and lost.any():
+            again = self.closest_point(x[lost], outward[lost], displacement)
+            for name, values in vars(found).items():
+                values[lost] = getattr(again, name)
         return found
 
     def continued(self, x: Array, outward: Array, displacement: Array, facet: Index) -> Projection:
@@ -133,23 +157,25 @@ class Curve:
         point, normal, tangent = np.empty((3, m, 2))
         slides, found = np.empty((2, m), dtype=bool)
         x, outward, home = np.ascontiguousarray(x), np.ascontiguousarray(outward), home.astype(np.int32, copy=False)
-        curve: tuple[np.ndarray, ...] = (self.X + displacement, self._coefficients, home)
+        nodes = (self.X + displacement)[self.connectivity]
+        curve: tuple[np.ndarray, ...] = (nodes, self.before, self.after, self._coefficients, home)
         results: tuple[np.ndarray, ...] = (facet, xi, point, normal, tangent, bend, shape, slope, slides, found, lost)
         n_lost = library(Path(__file__).with_name("closest_point.c")).closest_points(
-            m, pointer(x), pointer(outward), self.n_facets, self.closed, self.degree, *map(pointer, curve), reach,
-            margin, _END_MARGIN, _NEWTON_STEPS, *map(pointer, results),
+            m, pointer(x), pointer(outward), self.degree, *map(pointer, curve), reach, margin, _END_MARGIN,
+            _NEWTON_STEPS, *map(pointer, results),
         )  # fmt: skip
         if n_lost:
             at = "({:g}, {:g})".format(*x[lost[0]])
             raise ProjectionError(f"{n_lost} contact points found no closest point, the first at {at}")
-        nodes = self.connectivity[facet]
-        return Projection(found, point, normal, tangent, bend, slides, nodes, shape, slope, facet, xi)
+        of_facet = self.connectivity[facet]
+        return Projection(found, point, normal, tangent, bend, slides, of_facet, shape, slope, facet, xi)
 
 
 class RigidCircle:
     """A rigid disc of the given centre and radius, as an opposite curve of one facet with one node, which moves it."""
 
-    n_facets, closed = 1, False
+    n_facets = 1
+    before = after = np.full(1, -1, dtype=np.int32)
 
     def __init__(self, centre: Array, radius: float) -> None:
         self.centre = np.asarray(centre, dtype=float)

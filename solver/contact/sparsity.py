@@ -32,7 +32,7 @@ class Reach:
         if not self._comm.allreduce(len(new) > 0, op=MPI.LOR):
             return False
         facet, met = np.divmod(new, self._n)
-        which, near = neighbours(self._n, met, self._rings, self.pair.opposite.curve.closed)
+        which, near = neighbours(self.pair.opposite.curve, met, self._rings)
         parts = self._comm.allgather(facet[which] * self._n + near)
         self.keys = np.unique(np.concatenate([self.keys, *parts]))
         return True

@@ -16,6 +16,8 @@ from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_
 from archord.geometry.curve import Curve, RigidCircle
 from archord.materials.material import Material, Points
 
+_ASKEW = np.array([0.5257, 0.8507])  # a direction in which no two nodes of a closed piece should be equally far
+
 
 class Surface:
     """The boundary ``facets`` ``(n,)`` of the body with ``material`` in the displacement space ``V``.
@@ -24,13 +26,14 @@ class Surface:
     q)`` (measure of the curved edge), ``point`` and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own
     cell's basis, ``shape`` ``(n, q, a)`` and of it ``trace_shape`` ``(n, q, k)`` of the nodes on the facet, ``gamma``
     ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve, ``trace`` their nodes within the cell. The
-    ``curve``, its ``n_facets`` and ``curve_dofs``, the global dofs of its nodes, are those of all ranks.
+    ``curve``, its ``n_facets`` and ``curve_dofs``, the global dofs of its nodes, are those of all ranks. Collective;
+    raises ValueError for facets that are no boundary of the body, or branch.
     """
 
     def __init__(self, V: fem.FunctionSpace, facets: np.ndarray, material: Material, name: str = "") -> None:
         self.V, self.comm, self.material, self.name = V, V.mesh.comm, material, name
         self.degree, index_map = V.element.basix_element.degree, V.dofmap.index_map
-        cells, local_facets = _owned_facets(V.mesh, facets)
+        cells, local_facets, within = _owned_facets(V.mesh, facets)
         kind = V.mesh.basix_cell()
         corners, edges = basix.geometry(kind), np.array(basix.topology(kind)[1])
         closure = [V.dofmap.dof_layout.entity_closure_dofs(1, k) for k in range(len(edges))]
@@ -48,12 +51,16 @@ class Surface:
         on_facet = np.take_along_axis(cell_dofs, trace, axis=1)
         nodes = V.tabulate_dof_coordinates()[:, :2]
         x = nodes[on_facet]
-        gathered = self.comm.allgather((np.take_along_axis(global_dofs, trace, axis=1), x))
-        chain_dofs, chain_x = (np.concatenate(parts) for parts in zip(*gathered, strict=True))
-        order = _chain(chain_dofs[:, 0], chain_dofs[:, -1])
-        self.curve, self.n_facets = Curve(_join(chain_x[order]), self.degree), len(order)
-        self.curve_dofs = _join(chain_dofs[order, :, None])[:, 0]
-        start = sum(len(dofs) for dofs, _ in gathered[: self.comm.rank])
+        gathered = self.comm.allgather((np.take_along_axis(global_dofs, trace, axis=1), x, within))
+        all_dofs, all_x, within = (np.concatenate(parts) for parts in zip(*gathered, strict=True))
+        _refuse(name, all_dofs, all_x, within)
+        order = _pieces(all_dofs[:, 0], all_dofs[:, -1], all_x[:, 0] @ _ASKEW)
+        dofs, first, node = np.unique(all_dofs[order], return_index=True, return_inverse=True)
+        ranked = np.argsort(first)  # the nodes in the order in which the curve runs
+        self.curve_dofs, X = dofs[ranked], all_x[order].reshape(-1, 2)[first[ranked]]
+        self.curve = Curve(X, self.degree, np.argsort(ranked)[node].reshape(all_dofs.shape))
+        self.n_facets = len(order)
+        start = sum(len(part[0]) for part in gathered[: self.comm.rank])
         facet = np.argsort(order)[start : start + len(cells)]
         sort = np.argsort(facet)
         self.facet, self.cells = facet[sort], cells[sort]
@@ -108,10 +115,12 @@ class Surface:
         return np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ trace @ scaled)[:, -1]
 
     def arc_position(self, origin: Array) -> Array:
-        """Arc length ``(n_facets, q)`` of all points, from the end of the curve nearest to ``origin`` ``(2,)``."""
+        """Arc length ``(n_facets, q)`` of all points, from the end of an open curve nearest to ``origin`` ``(2,)``; on
+        closed curves, and on each of several pieces, from where it starts."""
         s = self.curve.arc_length(np.column_stack([self.curve_xi, np.ones(self.n_facets)]))
-        first, last = np.linalg.norm(self.curve.X[[0, -1]] - origin, axis=1)
-        return s[-1, -1] - s[:, :-1] if last < first else s[:, :-1]
+        ends = self.curve.connectivity[[0, -1], [0, -1]]
+        first, last = np.linalg.norm(self.curve.X[ends] - origin, axis=1)
+        return s[-1, -1] - s[:, :-1] if last < first and self.curve.n_pieces == 1 else s[:, :-1]
 
     def curve_displacement(self, u: Array) -> Array:
         """Displacement ``(n_nodes, 2)`` of the whole curve, from this rank's nodal displacements ``u`` ``(n, 2)``."""
@@ -129,7 +138,7 @@ class Surface:
 
     def add_to_owned(self, curve_force: Array, force: Array) -> None:
         """Add nodal forces ``(n_nodes, 2)`` of the whole curve to this rank's owned ``force`` ``(n, 2)``."""
-        np.add.at(force, self._owned_local, curve_force[self._owned])  # a closed curve ends with its first node
+        force[self._owned_local] += curve_force[self._owned]
 
     def deform(self, u: Array) -> tuple[Array, Array, Array]:
         """Own displacement ``(n q, 2)``, stress ``(n q, 4)`` and tangent ``(n q, 3, 3)`` at the contact points."""
@@ -156,43 +165,52 @@ class RigidSurface:
         return self.motion
 
 
-def neighbours(n: int, facets: np.ndarray, rings: int, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """``facets`` ``(m,)`` and those within some ``rings`` around, on a surface of ``n`` facets, perhaps a ``closed``
-    one: places ``(k,)`` in ``facets`` and neighbours."""
-    near = facets[:, None] + np.arange(-rings, rings + 1)
-    near = near % n if closed else near
-    inside = np.nonzero((near >= 0) & (near < n))
-    return inside[0], near[inside]
+def neighbours(curve: Curve | RigidCircle, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
+    """``facets`` ``(m,)`` of ``curve`` and those within some ``rings`` around: places ``(k,)`` in ``facets`` and
+    neighbours, some twice on short closed curves."""
+    near = [facets]
+    for adjacent in (curve.before, curve.after):
+        facet = facets
+        for _ in range(rings):
+            facet = np.where(facet < 0, -1, adjacent[facet])
+            near.append(facet)
+    ring, place = np.nonzero(np.array(near) >= 0)
+    return place, np.array(near)[ring, place]
 
 
-def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray]:
-    """Cells that this rank owns behind boundary ``facets``, and the facets' numbers within them."""
+def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells that this rank owns behind boundary ``facets``, the facets' numbers within them, and which of them lie
+    between two cells."""
     for dimensions in ((1, 2), (2, 1)):
         mesh.topology.create_connectivity(*dimensions)
     to_cell, to_facet = mesh.topology.connectivity(1, 2), mesh.topology.connectivity(2, 1)
     cells = np.array([to_cell.links(f)[0] for f in facets], dtype=np.int32).reshape(-1)
     keep = cells < mesh.topology.index_map(2).size_local
     cells, facets = cells[keep], np.asarray(facets)[keep]
-    n = mesh.ufl_cell().num_facets()
-    return cells, np.nonzero(to_facet.array.reshape(-1, n)[cells] == facets[:, None])[1]
+    n, within = mesh.ufl_cell().num_facets(), np.diff(to_cell.offsets)[facets] > 1
+    return cells, np.nonzero(to_facet.array.reshape(-1, n)[cells] == facets[:, None])[1], within
 
 
-def _chain(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Order that links facets end to start into one chain."""
-    by_start = {int(s): i for i, s in enumerate(start)}
-    first = sorted(set(by_start) - {int(e) for e in end}) or [min(by_start)]
-    if len(first) != 1:
-        raise ValueError(f"a contact edge must be one connected curve, this one has {len(first)} pieces")
-    order: list[int] = []
-    at = by_start.get(first[0])
-    while at is not None and len(order) < len(start):
-        order.append(at)
-        at = by_start.get(int(end[at]))
-    if len(set(order)) != len(start):
-        raise ValueError(f"a contact edge must be one curve, {len(start) - len(set(order))} facets are not part of it")
-    return np.array(order)
+def _refuse(name: str, dofs: np.ndarray, x: Array, within: np.ndarray) -> None:
+    """Raise ValueError unless the facets with nodes ``dofs`` ``(n, p + 1)`` at ``x`` are the boundary of a body."""
+    if not len(dofs):
+        raise ValueError(f"the contact surface {name!r} has no facets")
+    for a, b in x[within].mean(axis=1):
+        raise ValueError(f"the contact surface {name!r} has facets within its body, the first at ({a:g}, {b:g})")
+    for end in (0, -1):
+        _, first, count = np.unique(dofs[:, end], return_index=True, return_counts=True)
+        for a, b in x[first[count > 1], end]:
+            raise ValueError(f"the contact surface {name!r} branches at ({a:g}, {b:g}), where three of its facets meet")
 
 
-def _join(facet_nodes: np.ndarray) -> np.ndarray:
-    """Nodes ``(n p + 1, k)`` of a chain from those of its facets ``(n, p + 1, k)``."""
-    return np.concatenate([facet_nodes[:, :-1].reshape(-1, facet_nodes.shape[-1]), facet_nodes[-1, -1:]])
+def _pieces(start: np.ndarray, end: np.ndarray, height: Array) -> np.ndarray:
+    """Order that links facets end to start: open pieces first, closed ones from their facet of least ``height`` on."""
+    by_start, ends = {int(s): i for i, s in enumerate(start)}, set(end.tolist())
+    firsts = np.argsort(height, kind="stable")
+    order: dict[int, None] = {}  # a set that keeps its order
+    for first in [*(i for i in firsts if int(start[i]) not in ends), *firsts]:
+        at: int | None = int(first)
+        while at is not None and at not in order:
+            order[at] = None
+            at = by_start.get(int(end[at]))
+    return np.array(list(order), dtype=np.int64)

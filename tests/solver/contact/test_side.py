@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import basix.ufl
 import numpy as np
 import pytest
-from dolfinx.mesh import compute_midpoints
+from dolfinx.mesh import compute_midpoints, create_mesh, exterior_facet_indices
+from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, strain
 from archord.geometry.shapes.joint_mesh import Facets
-from archord.solver.contact.surface import Surface, _chain
-from tests.solver.parts import DR, ELASTIC, PERFECT, PLANE_STRESS, R, coordinates, joint_parts
+from archord.solver.contact.surface import Surface, _pieces, neighbours
+from tests.solver.parts import DR, ELASTIC, PERFECT, PLANE_STRESS, R, coordinates, joint_parts, space
 
 SIDES = {"pin": (0, R, np.array([0.0, -DR])), "hole": (1, R + DR, np.array([0.0, 0.0]))}
 BOTTOM = np.array([0.0, -R - DR])
@@ -151,33 +153,64 @@ def test_points_see_the_strain_of_their_own_cell(material):
     np.testing.assert_array_equal(tangent, np.broadcast_to(side.material.elastic_tangent, tangent.shape))
 
 
-def test_a_contact_edge_with_a_hole_in_it_is_an_error():
-    """A facet that is missing in the middle leaves two pieces: never a silent gap."""
+def test_a_gap_leaves_two_pieces():
+    """Of which each has its own arc length; neighbours and partners are found on both."""
     parts = joint_parts()
     hole = np.sort(parts.facets.find(Facets.HOLE_ARC))
     x = compute_midpoints(parts.V.mesh, 1, hole)
-    torn = np.delete(hole, np.argmin(np.abs(np.arctan2(x[:, 0], -x[:, 1]) - np.pi / 4)))
-    with pytest.raises(ValueError, match="2 pieces"):
-        Surface(parts.V, torn, ELASTIC)
+    cut = np.argmin(np.abs(np.arctan2(x[:, 0], -x[:, 1]) - np.pi / 4))
+    whole, torn = (Surface(parts.V, facets, ELASTIC) for facets in (hole, np.delete(hole, cut)))
+    assert torn.curve.n_pieces == 2
+    assert torn.n_facets == whole.n_facets - 1
+    assert (torn.curve.before < 0).sum() == (torn.curve.after < 0).sum() == 2
+    s = torn.curve.arc_length(np.array([0.0, 1.0]))
+    np.testing.assert_allclose(s[torn.curve.before < 0, 0], 0, atol=1e-15)
+    assert s[torn.curve.after < 0, 1].sum() == pytest.approx(whole.facet_lengths().sum() * (1 - 1 / whole.n_facets))
+    vertices, normal = torn.curve.vertices()
+    assert len(vertices) == torn.n_facets + 2
+    assert np.all((normal * vertices).sum(axis=1) < 0)
+    first = int(np.flatnonzero(torn.curve.after < 0)[0])
+    place, near = neighbours(torn.curve, np.array([first, first + 1]), 1)
+    assert sorted(zip(place, near, strict=True)) == [(0, first - 1), (0, first), (1, first + 1), (1, first + 2)]
+    y = torn.curve.X[torn.curve.connectivity[:, 1]]
+    found = torn.curve.closest_point(0.99 * y, y, np.zeros_like(torn.curve.X), np.zeros(len(y), dtype=int))
+    np.testing.assert_array_equal(found.facet, np.arange(torn.n_facets))
+    assert found.found.all()
 
 
-def test_facets_are_chained_end_to_start():
-    """Whatever their order; a closed curve starts somewhere."""
-    start, end = np.array([30, 10, 20]), np.array([40, 20, 30])
-    np.testing.assert_array_equal(_chain(start, end), [1, 2, 0])
-    np.testing.assert_array_equal(_chain(np.array([3, 1, 2]), np.array([1, 2, 3])), [1, 2, 0])
+def test_a_surface_lies_on_the_boundary():
+    """A line within a body, and none at all, are refused."""
+    parts = joint_parts()
+    parts.V.mesh.topology.create_connectivity(1, 2)
+    links = parts.V.mesh.topology.connectivity(1, 2)
+    inner = next(f for f in range(links.num_nodes) if len(links.links(f)) == 2)
+    for facets, said in ([inner], "within its body"), ([], "no facets"):
+        with pytest.raises(ValueError, match=f"'hole'.*{said}"):
+            Surface(parts.V, np.array(facets, dtype=np.int32), ELASTIC, "hole")
 
 
 @pytest.mark.parametrize(
-    ("start", "end"),
+    ("start", "end", "order"),
     [
-        pytest.param([1, 2, 7], [2, 3, 8], id="two pieces"),
-        pytest.param([1, 2, 7, 8, 9], [2, 3, 8, 9, 7], id="a piece and a ring"),
-        pytest.param([1, 2, 3, 7, 8, 9], [2, 3, 1, 8, 9, 7], id="two rings"),
-        pytest.param([1, 2, 2], [2, 3, 4], id="a fork"),
+        ([30, 10, 20], [40, 20, 30], [1, 2, 0]),
+        ([3, 1, 2], [1, 2, 3], [0, 1, 2]),
+        ([7, 1, 2], [8, 2, 3], [0, 1, 2]),
+        ([9, 1, 8, 7, 2], [7, 2, 9, 8, 3], [1, 4, 0, 3, 2]),
+        ([3, 7, 8, 1, 9, 2], [1, 8, 9, 2, 7, 3], [0, 3, 5, 1, 2, 4]),
     ],
+    ids=["a chain", "a ring", "two pieces", "a piece and a ring", "two rings"],
 )
-def test_facets_that_are_no_chain_are_an_error(start, end):
-    """None is left out in silence."""
-    with pytest.raises(ValueError, match="a contact edge must be one"):
-        _chain(np.array(start), np.array(end))
+def test_facets_are_ordered_end_to_start_by_pieces(start, end, order):
+    """Open ones first, and of each kind the lowest; a ring starts at its lowest."""
+    found = _pieces(np.array(start), np.array(end), np.arange(len(start), dtype=float))
+    np.testing.assert_array_equal(found, order)
+
+
+def test_a_fork_is_an_error():
+    """Two squares that touch at a corner: four facets meet there."""
+    x = np.array([[i, j] for j in range(3) for i in range(3)], dtype=float)
+    element = basix.ufl.element("P", "quadrilateral", 1, shape=(2,))
+    mesh = create_mesh(MPI.COMM_SELF, np.array([[0, 1, 3, 4], [4, 5, 7, 8]]), x, element)
+    mesh.topology.create_connectivity(1, 2)
+    with pytest.raises(ValueError, match=r"branches at \(1, 1\)"):
+        Surface(space(mesh), exterior_facet_indices(mesh.topology), ELASTIC)
