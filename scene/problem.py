@@ -15,6 +15,7 @@ from archord.scene.scene import Checked
 from archord.scene.sections import MOST_STEPS, Output, Stepping, Units
 
 FORMAT = 2
+CHOSEN = ("stepping", "initial"), ("stepping", "maximum")  # what an accuracy chooses, beside the mesh
 LIVE: dict[str, Any] = {}  # meshes given from Python, by what stands in the place of their file
 
 
@@ -53,6 +54,9 @@ class ProblemScene(Checked):
         many = [name for name, count in Counter(used).items() if count > 1]
         require(not many, "interaction", f"uses the facet sets {many} more than once")
         self._directions()
+        for section, name in CHOSEN if self.analysis.accuracy is not None else ():
+            free = name not in getattr(self, section).model_fields_set
+            require(free, f"{section}.{name}", "must not be given together with analysis.accuracy, which chooses it")
         steps = self.path.steps
         n = self.n_stages
         fits = not isinstance(steps, list) or len(steps) == n

@@ -29,10 +29,10 @@ from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.system import System
-from archord.studies.mesh_family import RATIO, MeshFamily
+from archord.studies.mesh_family import MeshFamily
+from archord.studies.problem_family import ProblemFamily
 
 MOST_SUBSTEPS = 64
-_FEWEST_FACETS = 3.0  # in contact: of a contact of fewer facets nothing can be learnt
 
 
 @dataclass(frozen=True)
@@ -72,13 +72,11 @@ def solve_as_asked(
     """`solve_to_accuracy` where ``scene`` asks for an accuracy and no run goes on, else `solve_scene`. Collective."""
     if scene.analysis.accuracy is None or start is not None:
         return solve_scene(scene, folder, comm, start=start, **options)
-    if not isinstance(scene, Scene):
-        raise InputError("analysis.accuracy: is for a [joint] as yet.")
     return solve_to_accuracy(scene, folder, comm, **options)
 
 
 def solve_to_accuracy(
-    scene: Scene,
+    scene: AnyScene,
     folder: Path,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
@@ -111,7 +109,7 @@ class _Search:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: AnyScene,
         folder: Path,
         comm: MPI.Comm,
         on_start: Callable[[System], None],
@@ -123,7 +121,11 @@ class _Search:
         self.scene, self.folder, self.comm, self.options = scene, folder, comm, options
         self.on_start, self.on_level = on_start, on_level
         self.asked = scene.analysis.accuracy
-        self.family = MeshFamily(scene, self.asked / 2 if scene.plastic else self.asked)
+        self.family: MeshFamily | ProblemFamily
+        if isinstance(scene, Scene):
+            self.family = MeshFamily(scene, self.asked / 2 if scene.plastic else self.asked)
+        else:
+            self.family = ProblemFamily(scene)
         self.begun = perf_counter()
         self.levels: list[Level] = []
         self.outcome: Outcome | None = None
@@ -143,7 +145,7 @@ class _Search:
             if self.step_error is None:
                 curve, level = self._choose_steps(mesh, curve, level)
             curves.append(curve)
-            self.mesh_error = mesh_error(curves, RATIO)
+            self.mesh_error = mesh_error(curves, self.family.ratio)
             self._tell(replace(level, mesh_error=self.mesh_error))
             left = max(self.asked - (self.step_error or 0.0), self.asked / 2)
             if self.mesh_error is not None and self.mesh_error <= left:
@@ -169,7 +171,7 @@ class _Search:
         """The curve on ``mesh``, None where that hardly notices the contact. Raises `_End`."""
         scene = self.family.scene_of(mesh, substeps)
         if scene is None and self.outcome is None:
-            raise InputError("analysis.accuracy: no mesh within the limits of the section joint would do.")
+            raise InputError("analysis.accuracy: no mesh within the limits of its element sizes would do.")
         received = self.comm.allreduce(self.options["interrupt"].received, op=MPI.MAX)
         if received and self.outcome is not None:
             message = f"{Interrupted(received)} between two meshes"
@@ -177,30 +179,26 @@ class _Search:
             raise _End
         if scene is None:
             raise _End
-        begun, geometry = perf_counter(), scene.joint
+        begun, (size, growth) = perf_counter(), self.family.sizes(scene)
         self.outcome = outcome = solve_scene(scene, self.folder, self.comm, on_start=self._started, **self.options)
         steps = outcome.steps
         if outcome.status != "done" and outcome.message != UNSEEN:
             raise _End
-        area = max(m.contact_area for m in steps)
-        # P is round-off where nothing touches
-        values = [m.delta if scene.force_controlled else m.P if area else 0.0 for m in steps]
-        curve = self.comm.bcast(values)
+        curve = self.comm.bcast(self.family.curve(steps))
         level = Level(
             mesh=mesh + 1,
-            element_size=geometry.h / geometry.radius,
-            growth=geometry.growth,
+            element_size=size,
+            growth=growth,
             substeps=substeps,
             dofs=self.dofs,
             last=curve[-1],
             seconds=round(perf_counter() - begun, 4),
             iterations=sum(m.iterations for m in steps),
         )
-        resolved = area / 2 / geometry.h / max(1.0, geometry.size_ratio) >= _FEWEST_FACETS
-        return curve if resolved or max(m.delta for m in steps) <= 0 else None, level
+        return curve if self.family.resolved(scene, steps) else None, level
 
     def _started(self, system: System) -> None:
-        self.dofs = system.n_dofs
+        self.dofs = self.family.dofs = system.n_dofs
         self.on_start(system)
 
     def _tell(self, level: Level) -> None:
@@ -249,5 +247,5 @@ class _Search:
         else:
             said = f"the error is estimated at {accuracy.estimated:.1e}, not below analysis.accuracy = {self.asked:g}"
         if accuracy.step_error is not None and 2 * accuracy.step_error > self.asked:
-            return f"accuracy: {said}: {self.substeps} steps an output step are too few; increase load.steps"
-        return f"accuracy: {said}: a finer mesh would be beyond the limits of joint.element_size; ask for less accuracy"
+            return f"accuracy: {said}: {self.substeps} steps an output step are too few; increase the number of steps"
+        return f"accuracy: {said}: a finer mesh would be too large; ask for less accuracy"

@@ -7,9 +7,12 @@ is, by elements that are as much smaller as it is and grow as fast.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 from pydantic import ValidationError
 
+from archord.presets.measures import Measures
 from archord.scene.geometry import JointGeometry
 from archord.scene.scene import Scene
 from archord.scene.sections import Stepping
@@ -22,11 +25,16 @@ _CONSTANTS = {2: 1.4, 3: 0.15}  # error of P over (h/R)^3 by degree (docs/accura
 _MARGIN = 2.0  # an estimate over the error itself, where the order is 3 and the estimate assumes 2
 _SMALLEST = 1e-4  # element size over R that a scene may ask for
 _LEVELS = 3  # meshes that should do
+_FEWEST_FACETS = 3.0  # in contact: of a contact of fewer facets nothing can be learnt
 
 
 class MeshFamily:
     """The meshes ``0, 1, 2, ...`` for ``scene`` (with ``analysis.accuracy``) that are to make the error of the mesh
-    fall below ``accuracy`` with the third, or with the second if that is coarse."""
+    fall below ``accuracy`` with the third, or with the second if that is coarse; each by ``ratio`` finer.
+
+    Whoever solves them notes their ``dofs``."""
+
+    ratio, dofs = RATIO, 0
 
     def __init__(self, scene: Scene, accuracy: float) -> None:
         self.scene = scene
@@ -52,6 +60,21 @@ class MeshFamily:
             return None
         analysis = self.scene.analysis.model_copy(update={"accuracy": None})
         return self.scene.model_copy(update={**sections, "analysis": analysis})
+
+    def sizes(self, scene: Any) -> tuple[float, float]:
+        """Element size over R and growth of ``scene``."""
+        return scene.joint.h / scene.joint.radius, scene.joint.growth
+
+    def curve(self, steps: Sequence[Measures]) -> list[float]:
+        """P at every step, under a force delta; P is round-off where nothing touches."""
+        touching = any(m.contact_area for m in steps)
+        return [m.delta if self.scene.force_controlled else m.P if touching else 0.0 for m in steps]
+
+    def resolved(self, scene: Any, steps: Sequence[Measures]) -> bool:
+        """Whether enough facets are in contact to learn from, if any are to be."""
+        area, joint = max(m.contact_area for m in steps), scene.joint
+        facets = area / 2 / joint.h / max(1.0, joint.size_ratio)
+        return facets >= _FEWEST_FACETS or max(m.delta for m in steps) <= 0
 
 
 def expected_angle(scene: Scene) -> float:

@@ -12,6 +12,7 @@ from archord.output.run import solve_scene
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import parse_any
+from archord.studies.accuracy import solve_to_accuracy
 
 STEEL = {"E": 210000.0, "nu": 0.3}
 
@@ -104,6 +105,19 @@ def test_a_run_goes_on_with_further_stages(tmp_path):
     whole, again = (Run(tmp_path / name).columns for name in ("whole", "parts"))
     for name in ("press force", "lug peeq_max", "work"):
         assert again[name] == pytest.approx(whole[name], rel=1e-9), name
+
+
+def test_an_accuracy_is_reached_by_finer_meshes(tmp_path):
+    """Of the force, against a mesh of three times as many dofs."""
+    coarse, fine = scene(), pressed(0.1, steps=[1])
+    asked = coarse.model_copy(update={"analysis": coarse.analysis.model_copy(update={"accuracy": 3e-3})})
+    asked = asked.model_copy(update={"load": fine.load, "path": fine.path})
+    outcome = solve_to_accuracy(asked, tmp_path, MPI.COMM_SELF)
+    assert outcome.accuracy.estimated < 3e-3
+    assert len(outcome.accuracy.levels) >= 2
+    sizes = [level.element_size for level in outcome.accuracy.levels]
+    assert sizes == sorted(sizes, reverse=True)
+    assert outcome.steps[-1].values["press force"] == pytest.approx(3829.4, rel=0.03)
 
 
 def test_another_load_is_refused(run):

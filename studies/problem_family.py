@@ -1,0 +1,57 @@
+"""Meshes of a general scene from coarse to fine: a shape with smaller elements, a file with its cells cut in four."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from archord.presets.general import Record
+from archord.scene.problem import ProblemScene
+from archord.scene.sections import Stepping
+
+_OF_SHAPES, _OF_FILES = 1.5, 2.0  # ratios of element sizes from one mesh to the next
+_COARSEST = 2.0  # first element size of a shape over that of its scene
+_MOST_DOFS = 1_500_000
+
+
+class ProblemFamily:
+    """The meshes ``0, 1, 2, ...`` for ``scene`` (with ``analysis.accuracy``), each by ``ratio`` finer."""
+
+    def __init__(self, scene: ProblemScene) -> None:
+        self.scene, self.shape = scene, scene.mesh.shape
+        self.ratio = _OF_FILES if self.shape is None else _OF_SHAPES
+        load = scene.load[-1]
+        self.column = f"{load.name} {'displacement' if load.kind == 'force' else 'force'}"
+        self.dofs = 0  # of the last mesh that was solved
+
+    def scene_of(self, level: int, substeps: int) -> ProblemScene | None:
+        """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would be too large."""
+        if level and self.dofs * self.ratio**2 > _MOST_DOFS:
+            return None
+        changes: dict[str, Any] = {"refine": self.scene.mesh.refine + level}
+        if self.shape is not None:
+            factor = _COARSEST / self.ratio**level
+            sizes = {name: float(f"{factor * self.shape[name]:.4g}") for name in ("element_size", "growth")}
+            changes = {"shape": self.shape | sizes}
+        length, stepping = 1 / substeps, self.scene.stepping.model_dump()
+        stepping |= {"initial": length, "maximum": length, "minimum": min(stepping["minimum"], length)}
+        sections = {
+            "mesh": self.scene.mesh.model_copy(update=changes),
+            "stepping": Stepping.model_validate(stepping),
+            "analysis": self.scene.analysis.model_copy(update={"accuracy": None}),
+        }
+        return self.scene.model_copy(update=sections)
+
+    def sizes(self, scene: Any) -> tuple[float, float]:
+        """Element size and growth of ``scene``; of a file, the size over that of its own cells."""
+        if scene.mesh.shape is None:
+            return 0.5**scene.mesh.refine, 0.0
+        return scene.mesh.shape["element_size"], scene.mesh.shape["growth"]
+
+    def curve(self, steps: Sequence[Record]) -> list[float]:
+        """The force of the last load at every step, or its displacement where it is a force."""
+        return [m.values[self.column] for m in steps]
+
+    def resolved(self, scene: Any, steps: Sequence[Record]) -> bool:
+        """Whether something is in contact at the end, if anything is to be."""
+        return steps[-1].contact_area > 0 or not self.scene.interaction
