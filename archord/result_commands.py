@@ -11,7 +11,7 @@ from archord.options import SCENE, argument, file, flag, output, overrides, pict
 from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
-    from archord.postprocess.deck import Elements
+    from archord.postprocess.decks.mesh import Elements
 
 
 @click.command()
@@ -106,25 +106,26 @@ def picture(folder: Path, output: Path | None) -> int:
     "--elements",
     type=click.Choice(["quadratic", "linear"]),
     default="quadratic",
-    help="six-node triangles, archord's own mesh, or each cut into four of three nodes",
+    help="archord's own mesh, with midpoints on edges, or each element cut into four without",
 )
 @overrides()
 @flag("--force", "overwrite a file that is there")
 def export_deck(scene: Path, output: Path | None, elements: Elements, overrides: tuple[str, ...], force: bool) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
     from archord.output.user_file import check_target, writing
-    from archord.postprocess.deck import deck, deck_mesh
-    from archord.scene.file import files_read, load_joint
+    from archord.postprocess.decks.deck import deck, system_of
+    from archord.postprocess.decks.mesh import deck_mesh
+    from archord.scene.file import files_read, load_scene
 
-    checked = load_joint(scene, overrides)
-    if not checked.joint.is_block:
-        raise InputError(f'{scene}: joint.model = "{checked.joint.model}" cannot be exported; only "block" can.')
-    for name, body in checked.solids.items():
-        if body.back_stresses:
-            raise InputError(f"{scene}: {name}.back_stresses cannot be exported.")
+    checked = load_scene(scene, overrides)
     path = output or Path(f"{scene.stem}.inp")
     check_target(path, files_read(scene, overrides), force=force)
+    system = system_of(checked)
+    try:
+        text = deck(system, deck_mesh(system, elements), checked.targets, f"{scene.stem} in {checked.units.length}")
+    except ValueError as error:
+        raise InputError(f"{scene}: {error}.") from error
     with writing(path):
-        path.write_text(deck(checked, deck_mesh(checked, elements)), encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
     print(path)
     return 0

@@ -94,7 +94,7 @@ class JointGeometry(Section):
 
     @property
     def is_block(self) -> bool:
-        """Whether it is the paper's joint, for which there are laws and decks."""
+        """Whether it is the paper's joint, for which there are laws."""
         return self.model == "block"
 
     @property

@@ -26,6 +26,7 @@ ROOMS = [
     "output",
     "postprocess",
     "postprocess.laws",
+    "postprocess.decks",
     "studies",
     "benchmarks",
     "benchmarks.paper",

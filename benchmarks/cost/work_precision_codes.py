@@ -28,7 +28,6 @@ from archord.benchmarks.peers.installed import Peer, installed
 from archord.benchmarks.timing import Failure, Process
 from archord.geometry.basis import Array
 from archord.output.history import read_history
-from archord.postprocess.deck import deck_mesh
 from archord.postprocess.run import Run
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
@@ -127,13 +126,12 @@ def _archord(scene: Scene, folder: Path) -> Process:
 
 
 def _calculix(scene: Scene, elements: Any, folder: Path) -> Process:
-    mesh = deck_mesh(scene, elements)
-    process = calculix.process(scene, mesh, folder)
+    process = calculix.process(scene, elements, folder)
 
     def read() -> dict[str, Any]:
         opinion = process.read()
         # neither contact angle nor profile: pressures at the nodes near the edge scatter too much
-        found = {"P": opinion.P, "p0": opinion.p0, "dofs": 2 * len(mesh.x), "iterations": opinion.iterations}
+        found = {"P": opinion.P, "p0": opinion.p0, "dofs": opinion.dofs, "iterations": opinion.iterations}
         if scene.pin.yield_stress:
             # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
             found["dissipation"] = scene.pin.yield_stress * opinion.peeq_integral

@@ -11,9 +11,11 @@ import numpy as np
 
 from archord.benchmarks.timing import Failure, Process
 from archord.geometry.basis import Array
-from archord.geometry.shapes.joint_mesh import Facets
-from archord.postprocess.deck import PlaneMesh, deck, loaded_nodes, thickness
+from archord.postprocess.decks.deck import deck, moved_sets, system_of, thickness
+from archord.postprocess.decks.mesh import DeckMesh, Elements, deck_mesh, label, surface_name
+from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
+from archord.solver.system import System
 
 _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")
 _EXPONENT = re.compile(r"(?<=\d)(?=[+-]\d{3}$)")  # Fortran leaves out the E before three digits
@@ -24,42 +26,65 @@ Printed = list[tuple[str, str, float, Array]]  # tables of a ``.dat`` file: quan
 
 @dataclass(frozen=True)
 class SecondOpinion:
-    """CalculiX's results for the whole joint at the last step, as in `archord.presets.measures.Measures`; iterations
-    of all steps."""
+    """CalculiX's results: the ``forces`` ``(steps,)`` on drives by name; at the last step the pressure on the axis of a
+    joint and the integral of PEEQ over the whole; iterations of all steps."""
 
-    P: float
+    forces: dict[str, Array]
     p0: float
     peeq_integral: float
     iterations: int
+    dofs: int
+
+    @property
+    def P(self) -> float:
+        """The last force on the first drive."""
+        return float(next(iter(self.forces.values()))[-1])
 
 
-def process(scene: Scene, mesh: PlaneMesh, folder: Path) -> Process:
-    """CalculiX on the deck of ``scene`` on ``mesh``, which is written into ``folder``; its result is a
-    `SecondOpinion`."""
+def process(scene: AnyScene, elements: Elements, folder: Path) -> Process:
+    """CalculiX on the deck of ``scene``, which is written into ``folder``; its result is a `SecondOpinion`."""
+    system = system_of(scene)
+    mesh = deck_mesh(system, elements)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "joint.inp").write_text(deck(scene, mesh), encoding="utf-8")
-    old = tuple(f"joint.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d"))
-    return Process(("ccx", "joint"), folder, lambda: read_opinion(scene, mesh, folder), clear=old)
+    (folder / "deck.inp").write_text(deck(system, mesh, scene.targets), encoding="utf-8")
+    old = tuple(f"deck.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d"))
+    return Process(("ccx", "deck"), folder, lambda: read_opinion(scene, system, mesh, folder), clear=old)
 
 
-def read_opinion(scene: Scene, mesh: PlaneMesh, folder: Path) -> SecondOpinion:
+def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) -> SecondOpinion:
     """CalculiX's results in ``folder``. Raises `Failure` if it did not reach the last step."""
-    printed = read_printed((folder / "joint.dat").read_text()) if (folder / "joint.dat").exists() else []
-    forces = step_forces(printed, loaded_nodes(scene))
-    if len(forces) != len(scene.targets):
+    printed = read_printed((folder / "deck.dat").read_text()) if (folder / "deck.dat").exists() else []
+    forces = drive_forces(system, mesh, printed)
+    reached = min(map(len, forces.values()))
+    if reached != len(scene.targets):
         said = (folder / "stdout.txt").read_text(errors="replace").splitlines()
         errors = [line.strip() for line in said if "*ERROR" in line]
-        raise Failure("; ".join([f"CalculiX ended after step {len(forces)} of {len(scene.targets)}", *errors]))
-    arc = np.unique(mesh.edge_nodes(Facets.PIN_ARC))
-    angle = np.arctan2(mesh.x[arc, 0], -mesh.x[arc, 1] - scene.joint.dR)
-    pressure = read_contact_pressure((folder / "joint.frd").read_text(), len(mesh.x))[arc]
-    increments = [line.split() for line in (folder / "joint.sta").read_text().splitlines()]
+        raise Failure("; ".join([f"CalculiX ended after step {reached} of {len(scene.targets)}", *errors]))
+    p0 = math.nan
+    if isinstance(scene, Scene):
+        arc = np.unique(mesh.surfaces[surface_name(system.problem.interactions[0], 0)].nodes)
+        angle = np.arctan2(mesh.x[arc, 0], -mesh.x[arc, 1] - scene.joint.dR)
+        p0 = axis_pressure(angle, read_contact_pressure((folder / "deck.frd").read_text(), len(mesh.x))[arc])
+    increments = [line.split() for line in (folder / "deck.sta").read_text().splitlines()]
     return SecondOpinion(
-        float(forces[-1]) / thickness(scene),
-        axis_pressure(angle, pressure),
-        peeq_integral(printed, mesh),
+        forces,
+        p0,
+        peeq_integral(printed, mesh) * system.problem.symmetry,
         sum(int(row[3]) for row in increments if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()),
+        2 * len(mesh.x),
     )
+
+
+def drive_forces(system: System, mesh: DeckMesh, printed: Printed) -> dict[str, Array]:
+    """Force ``(steps,)`` of the whole on every drive of supports and discs at the end of each step, per unit thickness;
+    nan where the nodes of a set do not move alike."""
+    share = system.problem.symmetry / thickness(system.problem, mesh)
+    forces: dict[str, Array] = {}
+    for m in moved_sets(system, mesh):
+        for drive, rate in m.rates.items():
+            factor = share * rate[0] if m.whole and np.ptp(rate) == 0 else math.nan
+            forces[drive] = factor * step_forces(printed, label(m.node_set))[:, m.axis] + forces.get(drive, 0.0)
+    return forces
 
 
 def axis_pressure(angle: Array, pressure: Array) -> float:
@@ -82,41 +107,45 @@ def read_printed(text: str) -> Printed:
 
 
 def step_forces(printed: Printed, nodes: str) -> Array:
-    """Downward force ``(steps,)`` of the whole joint on the set ``nodes`` at the end of each step.
+    """Forces ``(steps, 3)`` on the set ``nodes`` at the end of each step.
 
     Steps last one unit of time. CalculiX prints increments too, and sometimes the end of a step twice: the last counts.
     """
-    forces: dict[int, float] = {}
+    forces = {}
     for quantity, name, time, rows in printed:
         if (quantity, name) == ("total force", nodes) and abs(time - round(time)) < 1e-4:
-            forces[round(time)] = -2 * float(rows[0, 1])
-    return np.array([forces[k] for k in sorted(forces)])
+            forces[round(time)] = rows[0]
+    return np.array([forces[k] for k in sorted(forces)]).reshape(-1, 3)
 
 
-def peeq_integral(printed: Printed, mesh: PlaneMesh) -> float:
-    """The integral of PEEQ over the whole joint at the last time printed.
+def peeq_integral(printed: Printed, mesh: DeckMesh) -> float:
+    """The integral of PEEQ over the deck's model at the last time printed.
 
     Means of the elements times their areas: the points of a triangle have equal weights where its edges are straight.
     """
     latest = {name: rows for quantity, name, _, rows in printed if quantity == "equivalent plastic strain"}
     rows = np.concatenate([np.zeros((0, 3)), *latest.values()])
+    area = np.concatenate([areas(mesh.x[nodes]) for nodes in mesh.elements.values()])
     element = rows[:, 0].astype(int) - 1
-    count = np.bincount(element, minlength=len(mesh.elements))
-    total = np.bincount(element, rows[:, 2], minlength=len(mesh.elements))
-    return 2 * float((total / np.maximum(count, 1)) @ areas(mesh))
+    count = np.bincount(element, minlength=len(area))
+    total = np.bincount(element, rows[:, 2], minlength=len(area))
+    return float((total / np.maximum(count, 1)) @ area)
 
 
-def areas(mesh: PlaneMesh) -> Array:
-    """Areas ``(m,)``, counting the curved edges' parabolic segments; positive if counterclockwise."""
+def areas(x: Array) -> Array:
+    """Areas ``(m,)`` of elements by their nodes ``(m, 3, 4, 6 or 8, 2)``, counting curved edges' parabolic segments;
+    positive if counterclockwise."""
 
     def polygons(order: list[int]) -> Array:
-        x, y = np.moveaxis(mesh.x[mesh.elements[:, order]], 2, 0)
-        return 0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
+        x0, x1 = np.moveaxis(x[:, order], 2, 0)
+        return 0.5 * (x0 * np.roll(x1, -1, axis=1) - x1 * np.roll(x0, -1, axis=1)).sum(axis=1)
 
-    corners = polygons([0, 1, 2])
-    if mesh.elements.shape[1] == 3:
+    n = 3 if x.shape[1] in (3, 6) else 4
+    corners = polygons(list(range(n)))
+    if x.shape[1] == n:
         return corners
-    return corners + 4 / 3 * (polygons([0, 3, 1, 4, 2, 5]) - corners)  # Archimedes: a segment has 4/3 of its triangle
+    around = [k for corner in range(n) for k in (corner, n + corner)]
+    return corners + 4 / 3 * (polygons(around) - corners)  # Archimedes: a segment has 4/3 of its triangle
 
 
 def read_contact_pressure(text: str, n_nodes: int) -> Array:

@@ -10,12 +10,19 @@ import pytest
 
 from archord.benchmarks.case import Case, paper_joint
 from archord.benchmarks.peers import calculix
-from archord.benchmarks.peers.calculix import areas, axis_pressure, peeq_integral, read_printed, step_forces
+from archord.benchmarks.peers.calculix import (
+    areas,
+    axis_pressure,
+    drive_forces,
+    peeq_integral,
+    read_printed,
+    step_forces,
+)
 from archord.benchmarks.timing import run_once
-from archord.geometry.shapes.joint_mesh import Facets
-from archord.postprocess.deck import contact_stiffness, deck_mesh
+from archord.postprocess.decks.deck import contact_stiffness, system_of
+from archord.postprocess.decks.mesh import deck_mesh
 
-# Written by CalculiX 2.20 for this scene, quadratic elements; the .frd from its displacements on.
+# Written by CalculiX 2.20 for this scene, quadratic elements; of the .frd displacements and contact.
 REFERENCE = Path(__file__).parents[1] / "reference"
 SCENE = paper_joint(0.4, 2, 0.002, joint={"element_size": 0.4, "block_size": 4.0, "growth": 1.0})
 
@@ -26,26 +33,30 @@ def printed():
 
 
 @pytest.fixture(scope="module")
-def mesh():
-    return deck_mesh(SCENE, "quadratic")
+def system():
+    return system_of(SCENE)
+
+
+@pytest.fixture(scope="module")
+def mesh(system):
+    return deck_mesh(system)
 
 
 def test_tables_have_their_names_times_and_rows(printed, mesh):
-    """Two reactions a step, then PEEQ at nine points of every element."""
-    reactions = [["total force", name, t] for t in (1.0, 2.0) for name in ("PIN_TOP", "BLOCK_HELD")]
+    """The reactions of a step, then PEEQ at nine points of every element."""
+    reactions = [["total force", name, t] for t in (1.0, 2.0) for name in ("SYMMETRY", "BLOCK_HELD", "PIN_TOP")]
     strains = [["equivalent plastic strain", name, 2.0] for name in ("PIN", "BLOCK")]
     assert [key for *key, _ in printed] == reactions + strains
-    assert {rows.shape for *_, rows in printed[:4]} == {(1, 3)}
-    assert sum(len(rows) for *_, rows in printed[4:]) == 9 * len(mesh.elements)
+    assert {rows.shape for *_, rows in printed[:6]} == {(1, 3)}
+    assert sum(len(rows) for *_, rows in printed[6:]) == 9 * sum(map(len, mesh.elements.values()))
 
 
-def test_forces_are_the_whole_joints_and_balance(printed):
+def test_forces_are_the_whole_joints_and_balance(printed, system, mesh):
     """Twice the printed reaction, downward positive; pin and block opposite; growing with the steps."""
-    pin, block = step_forces(printed, "PIN_TOP"), step_forces(printed, "BLOCK_HELD")
-    line = next(line for line in (REFERENCE / "calculix.dat").read_text().splitlines() if "E-03" in line)
-    assert pin[0] == -2 * float(line.split()[1])
-    np.testing.assert_allclose(pin, -block, rtol=1e-6)
-    assert 0 < pin[0] < pin[1]
+    (P,) = drive_forces(system, mesh, printed).values()
+    np.testing.assert_array_equal(P, -2 * step_forces(printed, "PIN_TOP")[:, 1])
+    np.testing.assert_allclose(P, 2 * step_forces(printed, "BLOCK_HELD")[:, 1], rtol=1e-6)
+    assert 0 < P[0] < P[1]
 
 
 def test_of_increments_the_end_of_the_step_counts():
@@ -54,29 +65,31 @@ def test_of_increments_the_end_of_the_step_counts():
         f"\n total force (fx,fy,fz) for set TOP and time  {time}\n\n   1.0-101 {force} -2.5E-20\n"
         for time, force in (("0.2500000E+00", -9.0), ("0.9999990E+00", -1.0), ("0.1000000E+01", -2.0), ("2.0", -3.0))
     )
-    assert step_forces(read_printed(text), "TOP").tolist() == [4.0, 6.0]
+    assert step_forces(read_printed(text), "TOP")[:, 1].tolist() == [-2.0, -3.0]
     assert step_forces(read_printed(text), "BOTTOM").size == 0
     assert read_printed(text)[0][3][0, 0] == 1e-101
 
 
 def test_uniform_plastic_strain_integrates_to_the_area(printed, mesh):
-    """PEEQ 1 everywhere gives twice the area of the half model; an elastic run has none."""
-    ones = [(*key, np.c_[rows[:, :2], np.ones(len(rows))]) for *key, rows in printed[4:]]
-    assert peeq_integral(ones, mesh) == pytest.approx(2 * areas(mesh).sum())
-    assert peeq_integral(printed[:4], mesh) == 0
-    assert 0 < peeq_integral(printed, mesh) < max(rows[:, 2].max() for *_, rows in printed[4:]) * 2 * areas(mesh).sum()
+    """PEEQ 1 everywhere gives the area of the half model; an elastic run has none."""
+    ones = [(*key, np.c_[rows[:, :2], np.ones(len(rows))]) for *key, rows in printed[6:]]
+    area = sum(areas(mesh.x[nodes]).sum() for nodes in mesh.elements.values())
+    assert peeq_integral(ones, mesh) == pytest.approx(area)
+    assert peeq_integral(printed[:6], mesh) == 0
+    assert 0 < peeq_integral(printed, mesh) < max(rows[:, 2].max() for *_, rows in printed[6:]) * area
 
 
-def test_contact_pressure_is_the_penetration_times_the_slope(mesh):
+def test_contact_pressure_is_the_penetration_times_the_slope(system, mesh):
     """On the pin's arc, where CalculiX writes the gap three columns before; zero elsewhere."""
     text = (REFERENCE / "calculix.frd").read_text()
     pressure = calculix.read_contact_pressure(text, len(mesh.x))
     pressed = np.flatnonzero(pressure)
     assert len(pressed) >= 3
-    assert set(pressed) <= set(mesh.edge_nodes(Facets.PIN_ARC).ravel())
+    assert set(pressed) <= set(mesh.surfaces["pin"].nodes.ravel())
     contact = text[text.index("CONTACT") :].splitlines()
     gap = {int(line[3:13]) - 1: float(line[13:25]) for line in contact if line.startswith(" -1")}
-    np.testing.assert_allclose(pressure[pressed], [-contact_stiffness(SCENE) * gap[n] for n in pressed], rtol=1e-5)
+    slope = contact_stiffness(system.problem, mesh, system.problem.interactions[0])
+    np.testing.assert_allclose(pressure[pressed], [-slope * gap[n] for n in pressed], rtol=1e-5)
 
 
 def test_the_axis_pressure_of_an_even_parabola_is_its_top():
@@ -100,7 +113,7 @@ def test_calculix_agrees(tmp_path, elements, yield_stress, pin, plane, tolerance
     """The force of the joint, on the same coarse mesh."""
     sections = {"joint": {"block_size": 10.0}, "analysis": {"plane": plane}} | ({"pin": pin} if pin else {})
     scene = paper_joint(0.08, 4, yield_stress, **sections)
-    opinion = run_once(calculix.process(scene, deck_mesh(scene, elements), tmp_path)).result
+    opinion = run_once(calculix.process(scene, elements, tmp_path)).result
     last = Case("run", scene).solve(tmp_path).steps[-1]
     assert pytest.approx(last.P, rel=tolerance) == opinion.P
     if elements == "quadratic":

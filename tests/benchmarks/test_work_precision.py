@@ -122,8 +122,8 @@ def test_every_series_makes_scenes(tmp_path, monkeypatch):
         assert cells == sorted(cells)
     (deck,) = points(["elastic: CalculiX, CPE3, 0.06 R"])
     process = deck.process(tmp_path, 20.0)
-    assert (process.command, process.limit) == (("ccx", "joint"), 20.0)
-    assert (process.folder / "joint.inp").is_file()
+    assert (process.command, process.limit) == (("ccx", "deck"), 20.0)
+    assert (process.folder / "deck.inp").is_file()
 
 
 def test_patterns_choose_points(monkeypatch, refused):

@@ -1,0 +1,276 @@
+"""A problem as an input deck for CalculiX, and but for lines that say so for Abaqus: ``archord export-deck``.
+
+The deck is the modelled part, in unit thickness or, in plane stress, a thin slice: plane elements, small strains,
+contact on the deformed curves by a stiff linear penalty, one ``*STEP`` per load on the path. A rigid disc is a ring of
+elements that moves as a whole. What a force drives hangs on a node of its own, which the force pulls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from mpi4py import MPI
+
+from archord.geometry.basis import Array
+from archord.materials.elasticity import Elastic, contact_modulus
+from archord.materials.j2 import J2Material
+from archord.postprocess.decks.mesh import DeckMesh, Ints, label, surface_name
+from archord.presets.account import account_of
+from archord.scene.file import AnyScene
+from archord.solver.contact.law import LAWS, Frictionless, Tied
+from archord.solver.problem import Interaction, Problem, Rigid
+from archord.solver.system import System
+
+PENETRATION = 1e-4  # over the size of the surfaces, under a pressure of the contact modulus
+_YIELDING = 4.0  # times as deep where bodies yield: P hardly depends on it there, and CalculiX converges
+SLICE = 0.1  # thickness of a slice in plane stress, in the shortest edge of a surface
+_WEAK = 1e-7  # stiffness of the springs that hold floating bodies, over Young's modulus
+
+
+def system_of(scene: AnyScene) -> System:
+    """The problem of ``scene`` with nodes of quadratic elements, on this rank alone. Raises `InputError`."""
+    analysis = scene.analysis.model_copy(update={"degree": 2})
+    return account_of(scene.model_copy(update={"analysis": analysis}), MPI.COMM_SELF).system
+
+
+def contact_stiffness(problem: Problem, mesh: DeckMesh, interaction: Interaction) -> float:
+    """Slope of pressure over penetration, in stress per length.
+
+    The pressure of a conformal joint is about ``E* dR/R``; the slope lets it go 1e-4 dR deep, which is as if delta were
+    smaller by that much: P is too small by 3e-4 (by 3e-3 at a tenth of the slope), or half as much where bodies yield.
+    """
+    names = [name for name in interaction.surfaces if not isinstance(name, Rigid)]
+    size = min(np.ptp(mesh.x[mesh.surfaces[name].nodes.ravel()], axis=0).max() for name in names)
+    materials = [problem.body_of(name).material for name in names]
+    depth = PENETRATION * size * (_YIELDING if any(m.yields for m in materials) else 1.0)
+    return 1 / sum(depth / contact_modulus(m.E, m.nu, m.plane) for m in materials)
+
+
+def thickness(problem: Problem, mesh: DeckMesh) -> float:
+    """Thickness of the deck's model, by which its forces are to be divided.
+
+    One in plane strain. CalculiX makes bricks of plane elements, with faces free to move in plane stress; a thick one
+    resists, by shear, a thickness strain that varies in the plane. Only thin against the elements it is plane stress.
+    """
+    if problem.bodies[0].material.plane == "strain":
+        return 1.0
+    ends = [mesh.x[s.nodes[:, :2]] for s in mesh.surfaces.values()] or [
+        mesh.x[nodes[:, :2]] for nodes in mesh.elements.values()
+    ]
+    return SLICE * min(float(np.linalg.norm(np.diff(x, axis=1), axis=2).min()) for x in ends)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """The component ``axis`` of the ``nodes`` ``(k,)`` of ``node_set``: the sum over drives of ``rates`` ``(k,)`` times
+    their values; ``whole`` if these are all nodes of the set."""
+
+    node_set: str
+    axis: int
+    nodes: Ints
+    rates: dict[str, Array]
+    whole: bool
+
+    def boundary(self, values: dict[str, float]) -> Iterator[str]:
+        """Rows of ``*BOUNDARY`` at these values of the drives."""
+        moved = sum((values[drive] * rate for drive, rate in self.rates.items()), np.zeros(len(self.nodes)))
+        names = [label(self.node_set)] if self.whole and np.ptp(moved) == 0 else list(map(str, self.nodes + 1))
+        for name, value in zip(names, moved, strict=False):
+            yield f"{name}, {self.axis + 1}, {self.axis + 1}, {number(value)}"
+
+
+def moved_sets(system: System, mesh: DeckMesh) -> list[Moved]:
+    """What supports and rigid discs move or hold."""
+    out: dict[tuple[str, int], Moved] = {}
+    drives = system.equilibrium.drives
+    for s in system.problem.supports:
+        nodes = mesh.node_sets[s.facets]
+        own = drives.held_by(s.name)[mesh.dofs[nodes], s.axis]
+        rates = dict(zip(drives.names, drives.rate[:, mesh.dofs[nodes[own]], s.axis], strict=False))
+        rates = {drive: rate for drive, rate in rates.items() if rate.any()}
+        if own.any():
+            out[s.facets, s.axis] = Moved(s.facets, s.axis, nodes[own], rates, bool(own.all()))
+    for i in system.problem.interactions:
+        if isinstance(disc := i.surfaces[0], Rigid):
+            name = surface_name(i, 0)
+            nodes = mesh.node_sets[name]
+            for axis in (0, 1):
+                rates = {drive: np.full(len(nodes), rate[axis]) for drive, rate in disc.moved_by().items()}
+                out[name, axis] = Moved(name, axis, nodes, {d: r for d, r in rates.items() if r.any()}, True)
+    return list(out.values())
+
+
+def deck(system: System, mesh: DeckMesh, targets: Sequence[float], heading: str = "", thick: float = 0.0) -> str:
+    """The input deck of the problem of ``system`` on ``mesh`` with a step to each of the ``targets``, load factors on
+    the path; ``thick`` replaces `thickness`.
+
+    Raises ValueError for what a deck cannot say.
+    """
+    names = {*mesh.elements, *mesh.node_sets, *mesh.surfaces}
+    if len({label(name) for name in names}) < len(names):
+        raise ValueError(f"names must differ in more than case and signs for a deck: {', '.join(sorted(names))}")
+    writer = _Writer(system, mesh, thick or thickness(system.problem, mesh))
+    lines = [*writer.mesh_lines(heading), *writer.model_lines(), *writer.step_lines(targets)]
+    return "\n".join(lines) + "\n"
+
+
+class _Writer:
+    """What the parts of a deck share: sets that are moved, nodal forces, and drives that have a node of their own."""
+
+    def __init__(self, system: System, mesh: DeckMesh, thick: float) -> None:
+        self.system, self.problem, self.mesh, self.thick = system, system.problem, mesh, thick
+        drives, self.moved = system.equilibrium.drives, moved_sets(system, mesh)
+        by_force = {drive.name for drive in self.problem.all_drives if drive.control == "force"}
+        applied = {name: mesh.forces(forces) for name, forces in zip(drives.names, drives.applied, strict=False)}
+        means = [mean.drive for mean in self.problem.means if mean.drive not in by_force]
+        self.means = {name: self.problem.symmetry * applied[name] for name in means}
+        self.loads = {name: thick * f for name, f in applied.items() if f.any() and name not in means}
+        self.hung = [m for m in self.moved if by_force & set(m.rates)]
+        self.held = [m for m in self.moved if not by_force & set(m.rates)]
+        own = dict.fromkeys([*(drive for m in self.hung for drive in m.rates), *means])
+        self.own = {drive: len(mesh.x) + k for k, drive in enumerate(own, 1)}  # labels of their nodes
+        self.pulled = by_force & set(own)
+
+    def mesh_lines(self, heading: str) -> Iterator[str]:
+        """Nodes, elements, sets and surfaces."""
+        problem, mesh = self.problem, self.mesh
+        yield "*HEADING"
+        yield f"archord: {heading}; thickness {number(self.thick)}, 1/{number(problem.symmetry)} of the whole"
+        yield "*NODE, NSET=ALL_NODES"
+        x = self._drawn()
+        yield from (f"{i}, {number(a)}, {number(b)}" for i, (a, b) in enumerate(zip(*x.T, strict=True), 1))
+        if self.own:
+            yield "*NODE, NSET=DRIVES"
+            yield from (f"{node}, 0., 0." for node in self.own.values())
+        first, family = 1, "CPE" if problem.bodies[0].material.plane == "strain" else "CPS"
+        for name, nodes in mesh.elements.items():
+            yield f"*ELEMENT, TYPE={family}{nodes.shape[1]}, ELSET={label(name)}"
+            numbered = np.column_stack([first + np.arange(len(nodes)), nodes + 1])
+            yield from (", ".join(map(str, row)) for row in numbered)
+            first += len(nodes)
+        sets = {name: s.nodes for name, s in mesh.surfaces.items()} | mesh.node_sets
+        for name, nodes in sets.items():
+            yield f"*NSET, NSET={label(name)}"
+            listed = np.unique(nodes) + 1
+            yield from (", ".join(map(str, listed[i : i + 10])) for i in range(0, len(listed), 10))
+        for name, s in mesh.surfaces.items():
+            yield f"*SURFACE, NAME={label(name)}_SURFACE, TYPE=ELEMENT"
+            yield from (f"{e + 1}, S{edge + 1}" for e, edge in zip(s.elements, s.edges, strict=True))
+
+    def _drawn(self) -> Array:
+        """Nodes ``(n, 2)`` that overlap by the interferences."""
+        x = self.mesh.x.copy()
+        for i in self.problem.interactions:
+            surface = self.mesh.surfaces[surface_name(i, 0)]
+            along = np.diff(self.mesh.x[surface.nodes[:, :2]], axis=1)
+            normal = np.zeros_like(x)
+            np.add.at(normal, surface.nodes, along[..., ::-1] * [1.0, -1.0])
+            at = np.unique(surface.nodes)
+            x[at] += i.interference * normal[at] / np.linalg.norm(normal[at], axis=1)[:, None]
+        return x
+
+    def model_lines(self) -> Iterator[str]:
+        """Materials, sections, interactions, and what is held in all steps."""
+        problem = self.problem
+        materials = {body.name: body.material for body in problem.bodies}
+        for i in problem.interactions:
+            if isinstance(i.surfaces[0], Rigid):
+                m = problem.body_of(i.surfaces[1]).material
+                materials[surface_name(i, 0)] = Elastic(m.E, m.nu, m.plane)
+        for name, material in materials.items():
+            yield from _material(name, material)
+            yield from (f"*SOLID SECTION, ELSET={label(name)}, MATERIAL={label(name)}", number(self.thick))
+        for i in problem.interactions:
+            pair = ", ".join(f"{label(surface_name(i, side))}_SURFACE" for side in (0, 1))
+            law = LAWS[i.law] if isinstance(i.law, str) else i.law
+            if isinstance(law, Tied):
+                yield from (f"*TIE, NAME={label(i.name)}, ADJUST=NO", pair)
+            elif isinstance(law, Frictionless):
+                yield f"*SURFACE INTERACTION, NAME={label(i.name)}_LAW"
+                yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
+                yield number(contact_stiffness(problem, self.mesh, i))
+                yield f"*CONTACT PAIR, INTERACTION={label(i.name)}_LAW, TYPE=SURFACE TO SURFACE"
+                yield pair
+            else:
+                raise ValueError(f"the law of {i.name!r} cannot be exported; frictionless and tied contact can")
+        for m in self.hung:
+            for k, node in enumerate(m.nodes):
+                terms = [(self.own[drive], 1, -rate[k]) for drive, rate in m.rates.items() if rate[k]]
+                yield from _equation([(node + 1, m.axis + 1, 1.0), *terms])
+        yield from self._mean_lines()
+        held = [row for m in self.held if not m.rates for row in m.boundary({})]
+        yield from ["*BOUNDARY", *held] if held else []
+
+    def _mean_lines(self) -> Iterator[str]:
+        """Equations of mean displacements, each solved for another displacement that nothing else prescribes."""
+        if not self.means:
+            return
+        free = np.ones((len(self.mesh.x), 2), dtype=bool)
+        for m in self.moved:
+            free[m.nodes, m.axis] = False
+        rows = np.array([motion.ravel() for motion in self.means.values()])
+        first = scipy.linalg.qr(np.where(free.ravel(), rows, 0.0), mode="r", pivoting=True)[1][: len(rows)]
+        inverse = np.linalg.inv(rows[:, first])
+        for k, row in enumerate(inverse @ rows):
+            others = np.setdiff1d(np.flatnonzero(row), first)
+            terms = [(n // 2 + 1, n % 2 + 1, row[n]) for n in (first[k], *others)]
+            yield from _equation([*terms, *((self.own[d], 1, -f) for d, f in zip(self.means, inverse[k], strict=True))])
+
+    def step_lines(self, targets: Sequence[float]) -> Iterator[str]:
+        """A step to each of the ``targets``: displacements, forces, and what is to be printed."""
+        printed = dict.fromkeys(label(m.node_set) for m in self.moved)
+        plastic = any(body.material.yields for body in self.problem.bodies)
+        for k, target in enumerate(targets, 1):
+            values = {drive.name: drive.value(target) for drive in self.problem.all_drives}
+            yield from ("*STEP, INC=1000", "*STATIC", "1., 1.")
+            if k == 1 and self.problem.fit:
+                for i in self.problem.interactions:
+                    pair = ", ".join(f"{label(surface_name(i, side))}_SURFACE" for side in (0, 1))
+                    yield from ("** Abaqus alone, without the stars: *CONTACT INTERFERENCE, SHRINK", f"** {pair}")
+            rows = [row for m in self.held if m.rates for row in m.boundary(values)]
+            rows += [f"{n}, 1, 1, {number(values[d])}" for d, n in self.own.items() if d not in self.pulled]
+            yield from ["*BOUNDARY", *rows] if rows else []
+            forces = sum((values[drive] * f for drive, f in self.loads.items()), np.zeros_like(self.mesh.x))
+            rows = [f"{n + 1}, {axis + 1}, {number(forces[n, axis])}" for n, axis in np.argwhere(forces)]
+            share = self.thick / self.problem.symmetry
+            rows += [
+                f"{self.own[drive]}, 1, {number(values[drive] * share)}" for drive in self.own if drive in self.pulled
+            ]
+            yield from ["*CLOAD", *rows] if rows else []
+            for name in printed:
+                yield from (f"*NODE PRINT, NSET={name}, TOTALS=ONLY", "RF")
+            if self.own:
+                yield from ("*NODE PRINT, NSET=DRIVES", "U")
+            if k == len(targets):
+                yield from ("*NODE FILE, OUTPUT=2D", "U", "*EL FILE, OUTPUT=2D", "S", "*CONTACT FILE", "CSTR")
+                for body in self.problem.bodies if plastic else ():
+                    yield from (f"*EL PRINT, ELSET={label(body.name)}", "PEEQ")
+            yield "*END STEP"
+
+
+def _material(name: str, material: Any) -> Iterator[str]:
+    if type(material) not in (Elastic, J2Material):
+        raise ValueError(f"the material of {name!r} cannot be exported: decks know no such law (back stresses are one)")
+    yield from (f"*MATERIAL, NAME={label(name)}", "*ELASTIC", f"{material.E!r}, {material.nu!r}")
+    if isinstance(material, J2Material):
+        yield "*PLASTIC"
+        peeq = material.hardening.knots()
+        for stress, at in zip(material.hardening.stress(peeq), peeq, strict=True):
+            yield f"{number(stress)}, {number(at)}"
+
+
+def _equation(terms: Sequence[tuple[int, int, float]]) -> Iterator[str]:
+    """Terms whose sum is zero, four a line: node, component, factor."""
+    words = [word for node, axis, factor in terms for word in (str(node), str(axis), number(factor))]
+    yield from ("*EQUATION", str(len(terms)))
+    yield from (", ".join(words[i : i + 12]) for i in range(0, len(words), 12))
+
+
+def number(value: Any) -> str:
+    """As many digits as fit into the 20 characters that CalculiX reads."""
+    text = repr(float(value))
+    return text if len(text) <= 20 else f"{value:.13e}"
