@@ -14,12 +14,13 @@ import basix.ufl
 import numpy as np
 from dolfinx.cpp.graph import AdjacencyList_int32
 from dolfinx.io import distribute_entity_data
-from dolfinx.mesh import create_mesh, meshtags, meshtags_from_entities
+from dolfinx.mesh import create_mesh, entities_to_geometry, meshtags, meshtags_from_entities
 from mpi4py import MPI
+from scipy.spatial import cKDTree
 
 from archord.geometry.basis import Array, cell_kind
 from archord.geometry.meshes.mesh_cache import kept_mesh
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_of
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 try:
@@ -27,7 +28,9 @@ try:
 except ImportError:
     from dolfinx.la import create_petsc_vector as create_vector
 
-__all__ = ["create_vector", "distribute", "gmsh_to_mesh"]
+__all__ = ["create_vector", "distribute", "gathered", "gmsh_to_mesh", "strips"]
+
+Cut = Callable[[Array, np.ndarray, int], np.ndarray]
 
 
 _ALL_QUADS = 3  # gmsh's number of the recombination that leaves no triangles; it halves the edges of all lines
@@ -120,14 +123,15 @@ def _meshed(gmsh, adjust, order: int, refinements: int, quads: bool, curved: boo
     return mesh
 
 
-def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None) -> TaggedMesh:
-    """The mesh that rank 0 ``made`` and its sets, on all ranks, whose own one is None. Collective."""
+def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None, cut: Cut | None = None) -> TaggedMesh:
+    """The mesh that rank 0 ``made`` and its sets, on all ranks, whose own one is None; cut in `sectors`, if not as
+    ``cut`` or ``partitioner`` say. Collective."""
     nodes = comm.bcast(made and made.cells.shape[1])
     made, (cell, order) = made or PlaneMesh.empty(nodes), cell_kind(nodes)
 
     def in_sectors(comm, n_parts: int, cell_types, cells) -> AdjacencyList_int32:
         vertices = cells[0].reshape(-1, len(basix.topology(cell)[0]))
-        return AdjacencyList_int32(sectors(made.x, vertices, n_parts).reshape(-1, 1))
+        return AdjacencyList_int32((cut or sectors)(made.x, vertices, n_parts).reshape(-1, 1))
 
     partitioner = partitioner or (in_sectors if comm.size > 1 else None)
     equispaced = basix.LagrangeVariant.equispaced
@@ -138,7 +142,30 @@ def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None) -> Tagg
     edges, tags = distribute_entity_data(mesh, 1, made.edges, made.tags)
     mesh.topology.create_connectivity(1, 2)
     facets = meshtags_from_entities(mesh, 1, AdjacencyList_int32(edges), tags)
-    return TaggedMesh(mesh, cells, facets, *comm.bcast((made.cell_sets, made.facet_sets)))
+    points = {name: made.x[nodes] for name, nodes in made.point_sets.items()}
+    return TaggedMesh(mesh, cells, facets, *comm.bcast((made.cell_sets, made.facet_sets, points)))
+
+
+def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
+    """The inverse of `distribute`: the whole mesh on rank 0, None elsewhere. Collective."""
+    mesh, topology = tagged.mesh, tagged.mesh.topology
+    node, n = np.asarray(mesh.geometry.input_global_indices), topology.index_map(2).size_local
+    body = np.zeros(n + topology.index_map(2).num_ghosts, dtype=np.int32)
+    body[tagged.cells.indices] = tagged.cells.values
+    owned = tagged.facets.indices < topology.index_map(1).size_local
+    facets, tags = tagged.facets.indices[owned], tagged.facets.values[owned]
+    ends = entities_to_geometry(mesh, 1, facets)[:, :2] if len(facets) else np.zeros((0, 2), dtype=np.int32)
+    number, cells = np.asarray(topology.original_cell_index)[:n], node[mesh.geometry.dofmap[:n]]
+    parts = mesh.comm.gather((number, cells, body[:n], node[ends], tags, node, mesh.geometry.x[:, :2]))
+    if parts is None:
+        return None
+    number, cells, body, ends, tags, node, x = map(np.concatenate, zip(*parts, strict=True))
+    nodes, first = np.unique(node, return_index=True)
+    cells, ends, order = np.searchsorted(nodes, cells), np.searchsorted(nodes, ends), np.argsort(number)
+    edges = sides_of(cells)[sides_between(cells, ends)]
+    points = {name: cKDTree(x[first]).query(places)[1] for name, places in tagged.point_sets.items()}
+    sets = dict(tagged.cell_sets), dict(tagged.facet_sets)
+    return PlaneMesh(x[first], cells[order], body[order], edges, tags, *sets, points)
 
 
 def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
@@ -149,7 +176,15 @@ def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
     every run, unlike that of a graph partitioner whose input arrives in any order.
     """
     middle = x[cells].mean(axis=1)
-    order = np.argsort(np.arctan2(middle[:, 1], middle[:, 0]), kind="stable")
-    part = np.empty(len(cells), dtype=np.int32)
-    part[order] = np.arange(len(cells)) * n_parts // max(len(cells), 1)
+    return _in_turn(np.arctan2(middle[:, 1], middle[:, 0]), n_parts)
+
+
+def strips(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:
+    """As `sectors`, but in strips across the mesh's longest extent: in contact wherever, points stay together."""
+    return _in_turn(x[cells].mean(axis=1)[:, np.argmax(np.ptp(x, axis=0)) if len(x) else 0], n_parts)
+
+
+def _in_turn(along: Array, n_parts: int) -> np.ndarray:
+    part = np.empty(len(along), dtype=np.int32)
+    part[np.argsort(along, kind="stable")] = np.arange(len(along)) * n_parts // max(len(along), 1)
     return part

@@ -3,22 +3,26 @@ it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import basix
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 from dolfinx.mesh import CellType, to_type
 
-from archord.geometry.basis import Array, cell_kind
+from archord.geometry.basis import Array, cell_kind, lagrange_element
+
+_FAR = 1e30  # coordinates beyond overflow
+_THICK = 1e-6  # difference of z over the mesh's size
 
 
 @dataclass(frozen=True)
 class PlaneMesh:
     """Nodes ``x`` ``(n, 2)``, ``cells`` ``(m, a)`` of the ``bodies`` ``(m,)`` and ``edges`` ``(k, b)`` of the curves
     ``tags`` ``(k,)``; the nodes of cells and edges come in basix' order. ``cell_sets`` and ``facet_sets`` name bodies
-    and tags, of which a set has several where sets overlap."""
+    and tags, of which a set has several where sets overlap; ``point_sets`` are node numbers."""
 
     x: Array
     cells: np.ndarray
@@ -27,6 +31,7 @@ class PlaneMesh:
     tags: np.ndarray
     cell_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
     facet_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    point_sets: dict[str, np.ndarray] = field(default_factory=dict)
 
     @classmethod
     def empty(cls, nodes: int) -> PlaneMesh:
@@ -39,18 +44,58 @@ class PlaneMesh:
     def from_gmsh(cls, gmsh) -> PlaneMesh:
         """What gmsh's model has in physical groups. Raises ValueError if that is not one kind of cells."""
         numbers, x, _ = gmsh.model.mesh.getNodes()
-        cells, bodies, cell_sets = _elements(gmsh, 2)
-        edges, tags, facet_sets = _elements(gmsh, 1)
-        used, of_cells = np.unique(cells, return_inverse=True)  # no centres of arcs, which dolfinx does not expect
-        place = np.empty(int(numbers.max()) + 1, dtype=np.int64)
-        place[numbers] = np.arange(len(numbers))
-        nodes, cells = x.reshape(-1, 3)[place[used], :2], of_cells.reshape(cells.shape)
-        if cells.shape[1] == 8:
-            nodes, cells = with_middle_nodes(nodes, cells)
-        cell, order = cell_kind(cells.shape[1])
-        cells = cells[:, perm_gmsh(to_type(cell.name), cells.shape[1])]
-        edges = edges.reshape(-1, order + 1)[:, perm_gmsh(CellType.interval, order + 1)]
-        return cls(nodes, cells, bodies, np.searchsorted(used, edges), tags, cell_sets, facet_sets)
+        points, edges, faces = (_groups(gmsh, dim) for dim in range(3))
+        kind = one_kind({group.nodes.shape[1] for group in faces.values() if len(group.nodes)})
+        of_groups = np.concatenate([group.nodes.reshape(-1, kind) for group in faces.values()])
+        alike = of_groups.view(f"V{of_groups.dtype.itemsize * kind}").ravel()  # whole rows
+        _, first, which = np.unique(alike, return_index=True, return_inverse=True)
+        cells, place_of = of_groups[np.sort(first)], np.argsort(np.argsort(first))[which]
+        parts = np.split(place_of, np.cumsum([len(group.nodes) for group in faces.values()])[:-1])
+        order = np.argsort(numbers)
+
+        def place(found: np.ndarray) -> np.ndarray:
+            return np.searchsorted(numbers[order], found)
+
+        return cls.of_sets(
+            *in_basix_order(x.reshape(-1, 3)[order], place(cells), perm_gmsh),
+            dict(zip(faces, parts, strict=True)),
+            {name: place(group.nodes[:, :2]) for name, group in edges.items()},
+            {name: place(group.nodes[:, 0]) for name, group in points.items()},
+            ({name: group.tag for name, group in faces.items()}, {name: group.tag for name, group in edges.items()}),
+        )
+
+    @classmethod
+    def of_sets(
+        cls,
+        x: Array,
+        cells: np.ndarray,
+        cell_sets: Mapping[str, np.ndarray],
+        facet_sets: Mapping[str, np.ndarray],
+        point_sets: Mapping[str, np.ndarray],
+        tags: tuple[Mapping[str, int], Mapping[str, int]] | None = None,
+    ) -> PlaneMesh:
+        """The mesh of ``cells``, in basix' order, with those of the nodes ``x`` ``(n, 2 or 3)`` that they use.
+
+        Sets are given by cells ``(k,)``, by the ends ``(k, 2)`` of facets, and by nodes. ``tags`` number those of cells
+        and facets, else from 1. Raises ValueError for what is not plane, and for facets that no cell has.
+        """
+        used, of_cells = np.unique(cells, return_inverse=True)
+        new = np.full(len(x) + 1, -1)
+        new[used] = np.arange(len(used))
+        x, cells, bodies = _flat(x[used]), of_cells.reshape(cells.shape), np.zeros(len(cells), dtype=np.int32)
+        cell_sets = cell_sets or {"all": np.arange(len(cells))}
+        numbers = tags or [{name: k for k, name in enumerate(sets, 1)} for sets in (cell_sets, facet_sets)]
+        cell, tag = _members(cell_sets, numbers[0], ())
+        first, one, named_cells = one_tag_each(cell, tag, numbers[0])
+        bodies[cell[first]] = one
+        sides, (ends, tag) = sides_of(cells), _members(facet_sets, numbers[1], (2,))
+        side = sides_between(cells, new[ends])
+        for name, number in numbers[1].items():
+            if lost := (side[tag == number] >= len(sides)).sum():
+                raise ValueError(f"{lost} of the edges of the facet set {name!r} are not edges of cells")
+        first, one, named_facets = one_tag_each(side, tag, numbers[1])
+        points = {name: new[nodes][new[nodes] >= 0] for name, nodes in point_sets.items()}
+        return cls(x, cells, bodies, sides[side[first]], one, named_cells, named_facets, points)
 
     def second_order(self) -> PlaneMesh:
         """This mesh of straight cells with nodes on the middles of edges and of quadrilaterals, behind the others."""
@@ -112,20 +157,71 @@ def one_tag_each(
     return first[order], one[order], sets
 
 
-def _elements(gmsh, dim: int) -> tuple[np.ndarray, np.ndarray, dict[str, tuple[int, ...]]]:
-    """gmsh's numbers of the nodes ``(n, a)`` of elements in physical groups of dimension ``dim``, their tags ``(n,)``,
-    and the tags of the groups by their names, by their numbers where they have none."""
-    nodes, numbers, tags, names = [], [np.zeros(0, dtype=np.uint64)], [np.zeros(0, dtype=np.int32)], {}
+class _Group(NamedTuple):
+    tag: int
+    nodes: np.ndarray  # (k, a) gmsh's numbers
+
+
+def _groups(gmsh, dim: int) -> dict[str, _Group]:
+    """gmsh's physical groups of dimension ``dim`` by their names, by their tags where they have none."""
+    groups = {}
     for _, tag in gmsh.model.getPhysicalGroups(dim):
-        names[gmsh.model.getPhysicalName(dim, tag) or str(tag)] = tag
+        nodes = []
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
-            for _, found, of_found in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
-                nodes.append(of_found.reshape(len(found), -1))
-                numbers.append(found)
-                tags.append(np.full(len(found), tag, dtype=np.int32))
-    counts = sorted({part.shape[1] for part in nodes})
-    if len(counts) > 1 or (dim == 2 and not counts):
-        held = f"elements of {' and '.join(map(str, counts))} nodes" if counts else "no elements"
-        raise ValueError(f"the physical groups of dimension {dim} hold {held}, and must hold one kind")
-    first, one, sets = one_tag_each(np.concatenate(numbers), np.concatenate(tags), names)
-    return np.concatenate(nodes or [np.zeros((0, 0), dtype=np.uint64)])[first], one, sets
+            _, numbers, found = gmsh.model.mesh.getElements(dim, entity)
+            nodes += [of_kind.reshape(len(number), -1) for number, of_kind in zip(numbers, found, strict=True)]
+        if nodes:
+            one_kind({part.shape[1] for part in nodes})
+        name = gmsh.model.getPhysicalName(dim, tag) or str(tag)
+        groups[name] = _Group(tag, np.concatenate(nodes or [np.zeros((0, dim + 1), dtype=np.uint64)]))
+    return groups
+
+
+def _members(
+    sets: Mapping[str, np.ndarray], numbers: Mapping[str, int], shape: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The members of all ``sets``, of this ``shape`` each, and the number of the set of each."""
+    members = [np.zeros((0, *shape), dtype=np.int64), *sets.values()]
+    repeated = np.repeat([0, *(numbers[name] for name in sets)], [len(found) for found in members])
+    return np.concatenate(members).astype(np.int64), repeated.astype(np.int32)
+
+
+def _flat(x: Array) -> Array:
+    """The first two coordinates of ``x`` ``(n, 2 or 3)``. Raises ValueError where the third differs, and for nan."""
+    if not np.isfinite(x).all() or not np.abs(x).max(initial=0) < _FAR:
+        raise ValueError("some nodes have coordinates that are not finite or beyond 1e30")
+    size = np.ptp(x, axis=0)
+    if len(size) == 3 and size[2] > _THICK * size[:2].max():
+        raise ValueError(f"the mesh is not plane: z differs by {size[2]:g}, and must be the same for all nodes")
+    return x[:, :2]
+
+
+def one_kind(nodes: set[int]) -> int:
+    """The number of ``nodes`` of all cells. Raises ValueError if there is not one."""
+    if len(nodes) == 1:
+        return nodes.pop()
+    held = f"cells of {' and '.join(map(str, sorted(nodes)))} nodes" if nodes else "no plane cells in named sets"
+    raise ValueError(f"the mesh has {held}; it must have one kind: all triangles or all quadrilaterals, of one order")
+
+
+def in_basix_order(
+    x: Array, cells: np.ndarray, order: Callable[[CellType, int], list[int]]
+) -> tuple[Array, np.ndarray]:
+    """Nodes and ``cells`` ``(m, a)`` whose nodes come in the ``order`` of another program, with middle nodes in
+    quadrilaterals of 8 nodes."""
+    if cells.shape[1] == 8:
+        x, cells = with_middle_nodes(x, cells)
+    return x, cells[:, order(to_type(cell_kind(cells.shape[1])[0].name), cells.shape[1])]
+
+
+def sides_of(cells: np.ndarray) -> np.ndarray:
+    """Nodes ``(m s, b)`` of the sides of ``cells`` ``(m, a)``, those of a cell after each other; ends come first."""
+    kind, order = cell_kind(cells.shape[1])
+    return cells[:, lagrange_element(kind, order).entity_closure_dofs[1]].reshape(-1, order + 1)
+
+
+def sides_between(cells: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Which of `sides_of` ``cells`` has each pair of ``ends`` ``(k, 2)``; a number beyond them where none has."""
+    sides = sides_of(cells)
+    first, which = distinct_edges(np.concatenate([sides[:, :2], ends]))
+    return first[which[len(sides) :]]

@@ -35,7 +35,7 @@ class TaggedMesh:
 
     def cell_tags(self, name: str) -> tuple[int, ...]:
         """Tags of the cell set ``name``. Raises ValueError, also for a set without cells."""
-        return _tags("cell", self.cell_sets, name)
+        return tags_of("cell", self.cell_sets, name)
 
     def cells_in(self, name: str) -> np.ndarray:
         """Cells ``(n,)`` of the cell set ``name`` on this rank, ghosts included. Raises ValueError."""
@@ -43,7 +43,7 @@ class TaggedMesh:
 
     def facets_in(self, name: str) -> np.ndarray:
         """Facets ``(n,)`` of the facet set ``name`` on this rank, ghosts included. Raises ValueError."""
-        return self.facets.indices[np.isin(self.facets.values, _tags("facet", self.facet_sets, name))]
+        return self.facets.indices[np.isin(self.facets.values, tags_of("facet", self.facet_sets, name))]
 
     def dofs_in(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
         """Block dofs ``(n,)`` of ``V`` on this rank, ghosts included, in the facet, point or cell set ``name``: the
@@ -85,7 +85,8 @@ def unknown(kind: str, name: str, known: list[str]) -> str:
     return f"there is no {kind} {name!r}{hint}; there are {', '.join(map(repr, known)) or 'none'}"
 
 
-def _tags(kind: str, sets: Sets, name: str) -> tuple[int, ...]:
+def tags_of(kind: str, sets: Sets, name: str) -> tuple[int, ...]:
+    """Tags of the set ``name`` of a ``kind``. Raises ValueError if there is none, or if it is empty."""
     if name not in sets:
         raise ValueError(unknown(f"{kind} set", name, list(sets)))
     if not sets[name]:

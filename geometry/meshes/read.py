@@ -1,0 +1,114 @@
+"""Meshes from files, from gmsh and from dolfinx, with the names of their sets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from dolfinx.mesh import Mesh, MeshTags, meshtags
+from mpi4py import MPI
+
+from archord.geometry.meshes.abaqus import read_abaqus
+from archord.geometry.meshes.check import faults
+from archord.geometry.meshes.fenicsx import distribute, gathered, strips
+from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.refine import Circle, refined
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.xdmf import read_xdmf
+
+Source = str | Path | ModuleType | TaggedMesh
+
+
+def read_mesh(
+    source: Source,
+    comm: MPI.Comm,
+    *,
+    scale: float = 1.0,
+    order: int | None = None,
+    circles: Sequence[Circle] = (),
+    refine: int = 0,
+    partitioner=None,
+) -> TaggedMesh:
+    """The mesh of ``source`` times ``scale``, `refined` with ``circles`` in scaled lengths, on the ranks of ``comm``.
+
+    A source is a .msh file of gmsh, an .inp file of Abaqus or CalculiX, an .xdmf file of dolfinx, the module gmsh with
+    a model on rank 0, or a mesh as `tagged` returns it. Sets have the names of physical groups, of sets and surfaces,
+    or the values of tags. Collective; raises ValueError on all ranks for what is no mesh of plane cells of one kind.
+    """
+    made: Any = gathered(source) if isinstance(source, TaggedMesh) else None
+    failure = ""
+    if comm.rank == 0:
+        name = str(source) if isinstance(source, str | Path) else "the mesh"
+        try:
+            if not isinstance(source, TaggedMesh):
+                made = _read(source, order or 2)
+            made = refined(replace(made, x=made.x * scale), refine, order, circles)
+            failure = next(iter(faults(made)), "")
+        except ValueError as error:
+            failure = str(error)
+        except OSError as error:
+            failure = error.strerror or str(error)
+        except Exception as error:  # whatever a damaged file makes of it, raised on all ranks below
+            failure = f"cannot be read as a mesh ({error!r})"
+        failure = failure and f"{name}: {failure}"
+    if failure := comm.bcast(failure):
+        raise ValueError(failure)
+    return distribute(comm, made, partitioner, strips)
+
+
+def tagged(
+    mesh: Mesh,
+    cells: MeshTags | None = None,
+    facets: MeshTags | None = None,
+    cell_sets: Mapping[str, int] | None = None,
+    facet_sets: Mapping[str, int] | None = None,
+) -> TaggedMesh:
+    """A dolfinx ``mesh`` with its tags, named by ``cell_sets`` and ``facet_sets`` or else by their numbers; without
+    tags, all cells are "all". Collective."""
+    mesh.topology.create_connectivity(1, 2)
+    index_map, none = mesh.topology.index_map(2), np.zeros(0, dtype=np.int32)
+    if cells is None:
+        every = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+        cells, cell_sets = meshtags(mesh, 2, every, np.ones(len(every), dtype=np.int32)), {"all": 1}
+    facets = meshtags(mesh, 1, none, none) if facets is None else facets
+    sets = []
+    for tags, names in ((cells, cell_sets), (facets, facet_sets)):
+        values = sorted(set().union(*mesh.comm.allgather(set(tags.values.tolist()))))
+        names = names or {str(value): value for value in values}
+        sets.append({name: (tag,) if tag in values else () for name, tag in names.items()})
+    return TaggedMesh(mesh, cells, facets, sets[0], sets[1])
+
+
+def _read(source: str | Path | ModuleType, order: int) -> PlaneMesh:
+    if isinstance(source, ModuleType):
+        if not len(source.model.mesh.getElementTypes(2)):
+            source.model.mesh.generate(2)
+            source.model.mesh.setOrder(order)
+        return PlaneMesh.from_gmsh(source)
+    path = Path(source)
+    readers = {".msh": _read_gmsh, ".inp": read_abaqus, ".xdmf": read_xdmf}
+    if path.suffix.lower() not in readers:
+        raise ValueError(f"is none of the files of meshes that are read: {', '.join(readers)}")
+    path.open("rb").close()  # or gmsh would say something else of a file that is not there
+    return readers[path.suffix.lower()](path)
+
+
+def _read_gmsh(path: Path) -> PlaneMesh:
+    import gmsh
+
+    in_use = gmsh.isInitialized()
+    if not in_use:
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+    try:
+        gmsh.model.add(path.name)
+        gmsh.merge(str(path))
+        return PlaneMesh.from_gmsh(gmsh)
+    finally:
+        with suppress(Exception):
+            (gmsh.model.remove if in_use else gmsh.finalize)()

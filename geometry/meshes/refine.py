@@ -1,0 +1,106 @@
+"""Meshes cut finer or given a higher order, with nodes on given circles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import basix.ufl
+import numpy as np
+from dolfinx import fem
+from dolfinx.mesh import create_mesh
+from mpi4py import MPI
+
+from archord.geometry.basis import TRIANGLE, cell_kind, lagrange_element
+from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between
+from archord.geometry.meshes.tagged_mesh import tags_of
+
+_OFF_CIRCLE = 0.05  # of the radius
+_SAME = 1e-9  # distance in a reference cell
+
+
+class Circle(NamedTuple):
+    """The circle that the nodes of a facet set lie on."""
+
+    facets: str
+    centre: tuple[float, float]
+    radius: float
+
+
+def refined(mesh: PlaneMesh, times: int = 0, order: int | None = None, circles: Sequence[Circle] = ()) -> PlaneMesh:
+    """``mesh`` with each cell cut in four so many ``times``, then of a higher ``order``; the nodes of ``circles`` are
+    moved onto them along their rays. Without a circle, new nodes lie on the curved edges that are there.
+
+    Raises ValueError if a node is far from its circle.
+    """
+    for circle in circles:
+        nodes = _nodes_on(mesh, circle)
+        off = np.abs(np.linalg.norm(mesh.x[nodes] - circle.centre, axis=1) - circle.radius)
+        if off.max() > _OFF_CIRCLE * circle.radius:
+            x, y = mesh.x[nodes[off.argmax()]]
+            said = f"the node ({x:g}, {y:g}) of the facet set {circle.facets!r} is {off.max():.3g} off its circle"
+            raise ValueError(f"{said}, whose centre or radius {circle.radius:g} must be wrong")
+    mesh = _on_circles(mesh, circles)
+    for _ in range(times):
+        mesh = _on_circles(_cut(mesh), circles)
+    own = cell_kind(mesh.cells.shape[1])[1]
+    if order is None or order == own:
+        return mesh
+    if order < own:
+        raise ValueError(f"the mesh is of order {own}, which cannot be lowered to {order}")
+    return _on_circles(_raised(mesh, order), circles)
+
+
+def _nodes_on(mesh: PlaneMesh, circle: Circle) -> np.ndarray:
+    return np.unique(mesh.edges[np.isin(mesh.tags, tags_of("facet", mesh.facet_sets, circle.facets))])
+
+
+def _on_circles(mesh: PlaneMesh, circles: Sequence[Circle]) -> PlaneMesh:
+    mesh = replace(mesh, x=mesh.x.copy())
+    for circle in circles:
+        nodes = _nodes_on(mesh, circle)
+        ray = mesh.x[nodes] - circle.centre
+        mesh.x[nodes] = circle.centre + ray * (circle.radius / np.linalg.norm(ray, axis=1))[:, None]
+    if circles:
+        mesh.centre()
+    return mesh
+
+
+def _lattice(mesh: PlaneMesh, order: int) -> tuple[PlaneMesh, np.ndarray]:
+    """Nodes of a higher ``order`` on the cells of ``mesh`` as they are curved, and those on the tagged edges
+    ``(k, order + 1)`` from end to end."""
+    (kind, own), equispaced = cell_kind(mesh.cells.shape[1]), basix.LagrangeVariant.equispaced
+    elements = [basix.ufl.element("P", kind, p, equispaced, shape=s) for p, s in ((own, (2,)), (order, ()))]
+    made = create_mesh(MPI.COMM_SELF, cells=mesh.cells, x=mesh.x, e=elements[0])
+    V = fem.functionspace(made, elements[1])
+    cells = np.empty(V.dofmap.list.shape, dtype=np.int64)
+    cells[made.topology.original_cell_index] = V.dofmap.list
+    sides = cells[:, lagrange_element(kind, order).entity_closure_dofs[1]].reshape(-1, order + 1)
+    along = sides[sides_between(mesh.cells, mesh.edges[:, :2])][:, [0, *range(2, order + 1), 1]]
+    apart = np.abs(lagrange_element(kind, order).points[:, None] - lagrange_element(kind, own).points).max(axis=2)
+    there, here = np.nonzero(apart < _SAME)
+    place = np.full(len(mesh.x), -1)
+    place[mesh.cells[:, here]] = cells[:, there]
+    points = {name: place[nodes] for name, nodes in mesh.point_sets.items()}
+    if any((nodes < 0).any() for nodes in points.values()):
+        raise ValueError(f"point sets have nodes of order {own} that a mesh of order {order} has not")
+    return replace(mesh, x=V.tabulate_dof_coordinates()[:, :2].copy(), cells=cells, point_sets=points), along
+
+
+def _raised(mesh: PlaneMesh, order: int) -> PlaneMesh:
+    made, along = _lattice(mesh, order)
+    return replace(made, edges=along[:, [0, order, *range(1, order)]])
+
+
+def _cut(mesh: PlaneMesh) -> PlaneMesh:
+    """Each cell of order p cut in four, whose nodes are those of a cell of order 2 p."""
+    kind, p = cell_kind(mesh.cells.shape[1])
+    made, along = _lattice(mesh, 2 * p)
+    corner = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [0.5, 0.5]])  # of each part; the last triangle is turned
+    size = np.array([0.5, 0.5, 0.5, -0.5 if kind == TRIANGLE else 0.5])
+    parts = corner[:, None] + size[:, None, None] * lagrange_element(kind, p).points
+    nodes = np.abs(parts[:, :, None] - lagrange_element(kind, 2 * p).points).max(axis=3).argmin(axis=2)
+    halves = np.stack([along[:, : p + 1], along[:, p:]], axis=1).reshape(-1, p + 1)[:, [0, p, *range(1, p)]]
+    cells, bodies, tags = made.cells[:, nodes].reshape(-1, nodes.shape[1]), mesh.bodies.repeat(4), mesh.tags.repeat(2)
+    return replace(made, cells=cells, bodies=bodies, edges=halves, tags=tags)

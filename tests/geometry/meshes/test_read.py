@@ -1,0 +1,294 @@
+"""Meshes from files: one disc in a plate in every format, with the same areas, lengths and sets."""
+
+import gmsh
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem, io
+from dolfinx.mesh import meshtags
+from mpi4py import MPI
+
+from archord.geometry.meshes.fenicsx import gathered
+from archord.geometry.meshes.read import read_mesh, tagged
+from archord.geometry.meshes.refine import Circle
+
+CIRCLES = [Circle("arc", (0.0, 0.0), 1.0), Circle("hole", (0.0, 0.0), 1.01)]
+
+
+def draw(order, quads=False):
+    """A disc "pin" with its edge "arc" in a "plate" with a "hole", and the disc's point "east"."""
+    model = gmsh.model
+    disc, plate, hole = model.occ.addDisk(0, 0, 0, 1, 1), model.occ.addRectangle(-2, -2, 0, 4, 4), 9
+    model.occ.addDisk(0, 0, 0, 1.01, 1.01, hole)
+    model.occ.cut([(2, plate)], [(2, hole)])
+    model.occ.synchronize()
+    arc, edges = model.getBoundary([(2, disc)])[0][1], [abs(line) for _, line in model.getBoundary([(2, plate)])]
+    hole = [line for line in edges if np.ptp(model.getBoundingBox(1, line)) < 3]
+    for name, faces in {"pin": [disc], "plate": [plate], "all": [disc, plate]}.items():
+        model.addPhysicalGroup(2, faces, name=name)
+    for name, lines in {"arc": [arc], "hole": hole, "rim": sorted(set(edges) - set(hole)), "plate": edges}.items():
+        model.addPhysicalGroup(1, lines, name=name)
+    model.addPhysicalGroup(0, [model.getBoundary([(1, arc)], combined=False)[0][1]], name="east")
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+    if quads:
+        gmsh.option.setNumber("Mesh.RecombineAll", 1)
+        gmsh.option.setNumber("Mesh.RecombinationAlgorithm", 3)
+    gmsh.model.mesh.generate(2)
+    gmsh.model.mesh.setOrder(order)
+
+
+@pytest.fixture
+def module():
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    yield gmsh
+    gmsh.finalize()
+
+
+def content(mesh):
+    """Kind and order, and of every set the number of its entities and their measure; over all ranks."""
+    dolfinx_mesh, comm, found = mesh.mesh, mesh.mesh.comm, {}
+
+    def total(measure):
+        return comm.allreduce(fem.assemble_scalar(fem.form(fem.Constant(dolfinx_mesh, 1.0) * measure)))
+
+    n = dolfinx_mesh.topology.index_map(2).size_local
+    for name in mesh.cell_sets:
+        cells = mesh.cells_in(name)[mesh.cells_in(name) < n]
+        dx = ufl.Measure("dx", dolfinx_mesh, subdomain_data=[(1, cells)], metadata={"quadrature_degree": 8})
+        found["cells", name] = comm.allreduce(len(cells)), total(dx(1))
+    for name in mesh.facet_sets:
+        facets = np.sort(mesh.facets_in(name))
+        tags = meshtags(dolfinx_mesh, 1, facets, np.ones(len(facets), dtype=np.int32))
+        ds = ufl.Measure("ds", dolfinx_mesh, subdomain_data=tags, metadata={"quadrature_degree": 8})
+        owned = facets < dolfinx_mesh.topology.index_map(1).size_local
+        found["facets", name] = comm.allreduce(int(owned.sum())), total(ds(1))
+    return dolfinx_mesh.topology.cell_name(), dolfinx_mesh.geometry.cmap.degree, found
+
+
+def like(measures):
+    return {key: (n, pytest.approx(value, rel=1e-9)) for key, (n, value) in measures.items()}
+
+
+@pytest.mark.parametrize("quads", [False, True])
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_every_format_gives_the_same_mesh(module, tmp_path, order, quads):
+    """All versions of gmsh's files, its live model, dolfinx's meshes and files, and Abaqus' input."""
+    draw(order, quads)
+    expected = read_mesh(gmsh, MPI.COMM_WORLD)
+    kind, degree, measures = content(expected)
+    assert (kind, degree) == ("quadrilateral" if quads else "triangle", order)
+    assert measures["cells", "all"][0] == measures["cells", "pin"][0] + measures["cells", "plate"][0]
+    np.testing.assert_allclose(expected.point_sets["east"], [[1, 0]], atol=1e-12)
+    for version, binary in ((4.1, 0), (4.1, 1), (2.2, 0)):
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.write(str(tmp_path / "disc.msh"))
+        assert content(read_mesh(tmp_path / "disc.msh", MPI.COMM_WORLD)) == (kind, degree, like(measures))
+    assert content(read_mesh(expected, MPI.COMM_WORLD)) == (kind, degree, like(measures))
+    if order == 3:
+        return  # dolfinx writes no tags of cubic lines
+    flat = meshtags(expected.mesh, 2, expected.cells.indices, expected.cells.values)
+    flat.name, expected.facets.name = "cell_tags", "facet_tags"
+    for encoding in (io.XDMFFile.Encoding.HDF5, io.XDMFFile.Encoding.ASCII):
+        with io.XDMFFile(MPI.COMM_WORLD, tmp_path / "disc.xdmf", "w", encoding=encoding) as file:
+            file.write_mesh(expected.mesh)
+            file.write_meshtags(flat, expected.mesh.geometry)
+            file.write_meshtags(expected.facets, expected.mesh.geometry)
+        _, _, found = content(read_mesh(tmp_path / "disc.xdmf", MPI.COMM_WORLD, scale=2.0))
+        for dim, name, factor in (("cells", "pin", 4), ("facets", "arc", 2)):
+            sets = {"cells": expected.cell_sets, "facets": expected.facet_sets}[dim]
+            n, measure = measures[dim, name]
+            assert found[dim, str(sets[name][0])] == (n, pytest.approx(factor * measure, rel=1e-6))
+
+
+@pytest.mark.parametrize(("order", "quads"), [(1, False), (2, False), (1, True)])
+def test_abaqus_input_has_the_sets_of_gmsh(module, tmp_path, order, quads):
+    draw(order, quads)
+    expected = content(read_mesh(gmsh, MPI.COMM_WORLD))[2]
+    gmsh.option.setNumber("Mesh.SaveGroupsOfNodes", 1)
+    gmsh.write(str(tmp_path / "disc.inp"))
+    mesh = read_mesh(tmp_path / "disc.inp", MPI.COMM_WORLD)
+    found = content(mesh)[2]
+    assert {key: found[key] for key in expected} == like(expected)
+    np.testing.assert_allclose(mesh.point_sets["east"], [[1, 0]], atol=1e-9)
+
+
+INPUT = """*HEADING
+two squares
+*NODE, NSET=Nall
+ 1, 0., 0.
+ 2, 1., 0.
+ 3, 2., 0.
+ 11, 0., 1.
+ 12, 1., 1.
+*INCLUDE, INPUT=more.inp
+** five nodes come from there
+*ELEMENT, TYPE=CPE8R, ELSET=Left
+ 7, 1, 2, 12, 11, 21,
+ 23, 24, 25
+*Element, type=cpe8r
+ 8, 2, 3, 13, 12, 22, 26, 27, 23
+*ELSET, ELSET=right
+ 8,
+*ELSET, ELSET=BOTH, GENERATE
+ 7, 8, 1
+*ELSET, ELSET=again
+ left, 8
+*NSET, NSET=floor
+ 1, 2, 3, 21, 22
+*NSET, NSET=mixed
+ 1, 24, 25, 11, 13
+*NSET, NSET=rnodes, ELSET=Right
+*SURFACE, NAME=Top, TYPE=ELEMENT
+ Both, S3
+*SURFACE, NAME=seam
+ 7, S2
+*STEP
+*STATIC
+*END STEP
+"""
+MORE = """ 13, 2., 1.
+ 21, .5, 0.
+ 22, 1.5, 0.
+ 23, 1., .5
+ 24, .5, 1.
+*NODE
+ 25, 0., .5
+ 26, 2.1, .5
+ 27, 1.5, 1., 0.
+"""
+
+
+@pytest.fixture
+def deck(tmp_path):
+    (tmp_path / "more.inp").write_text(MORE)
+
+    def write(*changes):
+        text = INPUT
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "deck.inp").write_text(text)
+        return tmp_path / "deck.inp"
+
+    return write
+
+
+@pytest.mark.mpi
+def test_an_input_deck_of_sets_and_surfaces(comm, deck):
+    """Eight nodes become nine; names in any case, by number, by set, generated; sides as curved as their nodes say."""
+    mesh = read_mesh(deck(), comm)
+    kind, order, found = content(mesh)
+    assert (kind, order) == ("quadrilateral", 2)
+    area = 1 + 2 / 3 * 0.1
+    assert found["cells", "Left"] == (1, pytest.approx(1.0))
+    assert found["cells", "right"] == (1, pytest.approx(area))
+    assert found["cells", "BOTH"] == found["cells", "again"]
+    assert found["cells", "BOTH"] == (2, pytest.approx(1 + area))
+    assert found["facets", "floor"] == found["facets", "Top"]
+    assert found["facets", "floor"] == (2, pytest.approx(2.0))
+    assert found["facets", "seam"][0] == 1
+    assert found["facets", "mixed"][0] == 1
+    assert found["facets", "rnodes"][0] == 3
+    assert sorted(map(tuple, mesh.point_sets["mixed"].tolist())) == [(0.5, 1.0), (2.0, 1.0)]
+    assert set(mesh.point_sets) == {"Nall", "mixed", "rnodes"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("cpe8r", "C3D20R", "elements of type C3D20R are not read"),
+        ("cpe8r", "CPE4", "type CPE4 have 9 numbers, no multiple of 5"),
+        (" Both, S3", " Bath, S3", "there is no .ELSET 'BATH'"),
+        (" Both, S3", " Both, S5", "surface 'Top' has the face 'S5', which is none of S1 to S4"),
+        (" 8, 2, 3,", " 8, 2, 99,", "no node with the number 99"),
+        ("*ELSET, ELSET=right\n 8,", "*ELSET, ELSET=right\n 9,", "no element of the set 'right' with the number 9"),
+        ("*HEADING", "*PART, NAME=P", "parts and instances are not read"),
+        ("more.inp", "deck.inp", "deck.inp includes itself"),
+        ("more.inp", "mroe.inp", "No such file"),
+        (" 12, 1., 1.", " 12, 1., 1., 0.5", "not plane: z differs"),
+        (" 3, 2., 0.", " 3, 2., nan", "not finite"),
+    ],
+)
+def test_a_deck_gone_wrong_is_refused_in_a_sentence(comm, deck, old, new, said):
+    path = deck((old, new))
+    with pytest.raises(ValueError, match=said) as refusal:
+        read_mesh(path, comm)
+    assert str(refusal.value).startswith(str(path))
+
+
+def test_cells_of_two_kinds_and_other_files_are_refused(module, tmp_path, comm):
+    (tmp_path / "mesh.stl").touch()
+    for path, said in ((tmp_path / "mesh.stl", "none of the files"), (tmp_path / "no.msh", "No such file")):
+        with pytest.raises(ValueError, match=said):
+            read_mesh(path, comm)
+    draw(1)
+    gmsh.model.mesh.clear()
+    gmsh.model.mesh.setRecombine(2, 1)
+    gmsh.model.mesh.generate(2)
+    with pytest.raises(ValueError, match="cells of 3 and 4 nodes; it must have one kind"):
+        read_mesh(gmsh, comm)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("quads", [False, True])
+def test_refined_and_raised_meshes_become_round(comm, quads, tmp_path):
+    """The area of the disc: second-order arcs are off by h^4, and straight ones by h^2; other sets keep theirs."""
+    path = tmp_path / "disc.msh"
+    if comm.rank == 0:
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+        draw(1, quads)
+        gmsh.write(str(path))
+        gmsh.finalize()
+    path = comm.bcast(path)
+    off = {}
+    for order in (1, 2, 3):
+        for times in (0, 1):
+            mesh = read_mesh(path, comm, refine=times, order=order, circles=CIRCLES)
+            _, degree, found = content(mesh)
+            assert degree == order
+            assert found["facets", "rim"] == (found["facets", "rim"][0], pytest.approx(16.0))
+            off[order, times] = abs(found["cells", "pin"][1] / np.pi - 1), found["cells", "pin"][0]
+        assert off[order, 1][1] == 4 * off[order, 0][1]
+        assert off[order, 0][0] / off[order, 1][0] == pytest.approx(4 if order == 1 else 16, rel=0.1)
+    np.testing.assert_allclose(mesh.point_sets["east"], [[1, 0]], atol=1e-9)
+
+
+@pytest.mark.mpi
+def test_a_mesh_is_gathered_as_it_was_read(comm, deck):
+    mesh = read_mesh(deck(), comm, refine=2)
+    whole, again = gathered(mesh), gathered(read_mesh(mesh, comm))
+    assert (whole is None) == (comm.rank > 0)
+    if whole is not None:
+        assert len(whole.cells) == 32
+        np.testing.assert_array_equal(whole.x[whole.cells], again.x[again.cells])
+        np.testing.assert_array_equal(whole.bodies, again.bodies)
+        assert whole.cell_sets == again.cell_sets
+
+
+def test_wrong_circles_and_orders_are_refused(comm, deck):
+    path = deck()
+    with pytest.raises(ValueError, match=r"node \(2, 0\) of the facet set 'floor' is 1.8 off its circle"):
+        read_mesh(path, comm, circles=[Circle("floor", (0.5, 1.0), 1e-3)])
+    with pytest.raises(ValueError, match=r"no facet set 'flor' .did you mean 'floor'"):
+        read_mesh(path, comm, circles=[Circle("flor", (0.5, 1.0), 1.0)])
+    with pytest.raises(ValueError, match="of order 2, which cannot be lowered to 1"):
+        read_mesh(path, comm, order=1)
+
+
+def test_a_dolfinx_mesh_keeps_its_tags_under_names(comm):
+    from dolfinx.mesh import create_unit_square, exterior_facet_indices
+
+    square = create_unit_square(comm, 3, 3)
+    whole = tagged(square)
+    assert content(read_mesh(whole, comm, order=2))[2]["cells", "all"] == (18, pytest.approx(1.0))
+    square.topology.create_connectivity(1, 2)
+    facets = exterior_facet_indices(square.topology)
+    tags = meshtags(square, 1, facets, np.full(len(facets), 7, dtype=np.int32))
+    assert list(tagged(square, facets=tags).facet_sets) == ["7"]
+    named = tagged(square, facets=tags, facet_sets={"rim": 7})
+    assert content(read_mesh(named, comm, scale=2.0))[2]["facets", "rim"] == (12, pytest.approx(8.0))
+    with pytest.raises(ValueError, match="'none' is empty"):
+        tagged(square, facets=tags, facet_sets={"none": 8}).facets_in("none")
