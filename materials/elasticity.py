@@ -15,14 +15,23 @@ def contact_modulus(E: float, nu: float, plane: Plane) -> float:
 
 
 def von_mises(stress: Array) -> Array:
-    """Von Mises stress ``(n,)`` of ``(n, 4)`` stresses."""
-    xx, yy, zz, xy = stress.T
+    """Von Mises stress ``(...,)`` of ``(..., 4)`` stresses."""
+    xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
 
 
 def mean_stress(stress: Array) -> Array:
-    """Mean stress ``(s_xx + s_yy + s_zz) / 3`` ``(n,)`` of ``(n, 4)`` stresses, tension positive."""
-    return stress[:, :3].sum(axis=1) / 3
+    """Mean stress ``(s_xx + s_yy + s_zz) / 3`` ``(...,)`` of ``(..., 4)`` stresses, tension positive."""
+    return stress[..., :3].sum(axis=-1) / 3
+
+
+def principal_stresses(stress: Array) -> tuple[Array, Array]:
+    """Principal stresses ``(..., 3)`` of ``(..., 4)`` stresses, the largest first, and the angle ``(...,)`` from the x
+    axis of the larger one in the plane, in (-pi/2, pi/2]."""
+    xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
+    middle, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    values = np.sort(np.stack([middle + radius, middle - radius, zz], axis=-1), axis=-1)
+    return values[..., ::-1], np.arctan2(2 * xy, xx - yy) / 2
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.floating]
 Plane = Literal["strain", "stress"]
 State = Any
+COMPONENTS = ("xx", "yy", "zz", "xy")  # of stresses and plastic strains
 
 
 class Material(Protocol):

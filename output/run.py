@@ -126,9 +126,14 @@ class _Output:
         self._on_root = partial(agreed, comm)
         self._scene, self._last = resolved(account.scene), perf_counter()
         self.steps: list[Any] = comm.bcast(start.done if start else [])
+        asked = account.scene.output
+        self._at_points = asked.stress or asked.points
         with self.system.timer("output"):
             self._order = MeshOrder(self.system)
-            self._bodies = self._order.bodies()
+            if asked.fields:
+                from archord.output.fields import collect_mesh
+
+                self._mesh = collect_mesh(self._order, self._at_points)
         self._fields: Any = None  # a `FieldWriter` with the first step, on rank 0
         self._contact: StepFile | None = None
         if comm.rank == 0:
@@ -175,12 +180,14 @@ class _Output:
             if scene.output.fields:
                 from archord.output.fields import FieldWriter, collect_fields
 
-                fields = collect_fields(self._order)
+                fields = collect_fields(self._order, self._at_points)
 
             def write() -> None:
                 if scene.output.fields:
                     if not self._fields:
-                        self._fields = FieldWriter(self.folder, self._order, self._bodies, after, scene.steps_numbered)
+                        self._fields = FieldWriter(
+                            self.folder, self._order, self._mesh, after, scene.steps_numbered, scene.output.points
+                        )
                     self._fields.write(m.at, fields)
                 if not self._contact:
                     self._contact = StepFile(self.folder / "contact.h5", _arrays(profiles, account.fixed), after)

@@ -30,12 +30,14 @@ class StepFile:
 
     ``apart`` puts the arrays into files of their own, NAME/0000.h5 for the fixed ones. The file appears with the next
     step, the first one or that ``after`` some steps that are there, as this version or version 0.1 wrote them. Raises
-    `OSError`, and `InputError` if a file that should go on is missing, damaged or does not hold these steps.
+    `OSError`, and `InputError` if a file that should go on is missing, damaged or does not hold these steps. ``loads``
+    and ``names`` are those of all steps and their arrays.
     """
 
     def __init__(self, path: Path, fixed: Arrays, after: int = 0, *, apart: bool = False) -> None:
         self.path, self._apart = path, apart
         self.loads: list[float] = []
+        self.names: list[set[str]] = []
         earlier = self._read(fixed, after) if after else []
         self._file = hdf5_in_memory()
         self._file["accepted"] = 0
@@ -52,6 +54,7 @@ class StepFile:
 
     def _add_step(self, load: float, arrays: Arrays) -> None:
         self.loads.append(load)
+        self.names.append(set(arrays))
         self._add(len(self.loads), arrays)
         self._file["accepted"][()] = len(self.loads)
         self._file["load"].resize((len(self.loads),))
@@ -78,7 +81,8 @@ class StepFile:
         steps: dict[str, Arrays] = {}
         try:
             with h5py.File(self.path) as file:
-                if file["accepted"][()] < after or any(file[name].shape != a.shape for name, a in fixed.items()):
+                fits = all(name not in file or file[name].shape == a.shape for name, a in fixed.items())
+                if file["accepted"][()] < after or not fits:
                     raise ValueError(f"it does not hold the first {after} steps of this run")
                 for path, array in all_arrays(file):
                     name, _, step = path.rpartition("/")

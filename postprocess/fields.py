@@ -9,7 +9,9 @@ one body has slid by s along the other.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,8 +19,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from archord.materials.material import Array
-from archord.output.step_file import step_name
+from archord.materials.elasticity import principal_stresses, von_mises
+from archord.materials.material import COMPONENTS, Array
+from archord.output.step_file import all_arrays, step_name
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
@@ -37,24 +40,30 @@ _NEAR = 3.0  # radii within which displacements count
 
 @dataclass(frozen=True)
 class Fields:
-    """Half of the joint (x >= 0) at one step: ``n`` nodes and ``m`` curved cells of second order.
+    """Bodies (of the paper's joint the half x >= 0) at one step: ``n`` nodes and ``m`` curved cells of second order.
 
     ``cells`` has VTK's order: three or four corners, then the nodes between the first two, the next two, and the last
-    and the first, and that in the middle of four. Stress is positive in tension, contact pressure in compression;
-    `peeq` is None where no body can yield. All in the scene's units.
+    and the first, and that in the middle of four. Stress is positive in tension, contact pressure in compression; PEEQ
+    and plastic strain are None where no body can yield, and all that is recovered at nodes where `output.stress` is
+    off. All in the scene's units.
     """
 
     step: int
     delta: float
     coordinates: Array  # (n, 2) undeformed
     cells: np.ndarray  # (m, 6), or (m, 9) of quadrilaterals
-    body: np.ndarray  # (m,) 1 pin, 2 block
+    body: np.ndarray  # (m,) the tag of the cell's body
     displacement: Array  # (n, 2)
     von_mises: Array  # (m,) means of cells, like the following
     mean_stress: Array  # (m,) third of the trace
     peeq: Array | None  # (m,) equivalent plastic strain
     contact_state: Array  # (m,) share of the cell's contact edge that is in contact, 0 elsewhere
     contact_pressure: Array  # (m,) mean over that edge
+    stress: Array | None = None  # (n, 4) xx, yy, zz, xy: recovered at the nodes, like the following
+    plastic_strain: Array | None = None  # (n, 4)
+    peeq_nodal: Array | None = None  # (n,)
+    bodies: Mapping[str, int] = field(default_factory=lambda: BODIES)  # their tags by name
+    edges: Mapping[str, np.ndarray] = field(default_factory=dict)  # (k, 3) nodes along each edge of a named set
 
     @property
     def deformed(self) -> Array:
@@ -67,6 +76,19 @@ class Fields:
         found = np.zeros(len(self.coordinates), dtype=self.body.dtype)
         found[self.cells] = self.body[:, None]
         return found
+
+    def nodal_fields(self) -> dict[str, Array]:
+        """The recovered fields of the nodes by name ``(n,)``, with the principal stresses "p1" to "p3" (the largest
+        first), "principal_angle" (of the larger one in the plane, from the x axis) and "von_mises" of their tensor."""
+        found: dict[str, Array] = {}
+        for name, tensor in (("stress", self.stress), ("plastic_strain", self.plastic_strain)):
+            if tensor is not None:
+                found |= {f"{name}_{c}": tensor[:, k] for k, c in enumerate(COMPONENTS)}
+        if self.stress is not None:
+            values, angle = principal_stresses(self.stress)
+            found |= {f"p{k + 1}": values[:, k] for k in range(3)}
+            found |= {"principal_angle": angle, "von_mises": von_mises(self.stress)}
+        return found if self.peeq_nodal is None else found | {"peeq": self.peeq_nodal}
 
     def cell_fields(self) -> dict[str, Array]:
         """The fields of the cells by name; `peeq` only where a body can yield."""
@@ -85,32 +107,61 @@ class Fields:
         return edges[first[count == 1]]
 
 
-def read_fields(folder: str | Path, scene: Scene, step: int) -> Fields:
-    """The fields at ``step`` (from 1) of the run of ``scene`` in ``folder``.
+def read_fields(folder: str | Path, scene: Scene, step: int, bodies: Mapping[str, int] = BODIES) -> Fields:
+    """The fields at ``step`` (from 1) of the run of ``scene`` in ``folder``, whose ``bodies`` have these tags.
 
     Raises `InputError` if the run wrote none, or the file is missing, damaged or does not hold the step.
     """
+    at = step_name(step)
+    with _opened(folder, scene, step) as file:
+        mesh = file["mesh"]
+        means: dict[str, Any] = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
+        nodal: dict[str, Any] = {}
+        for name in ("stress", "plastic_strain"):
+            if f"{name}_xx/{at}" in file:
+                nodal[name] = np.stack([file[f"{name}_{c}/{at}"][()] for c in COMPONENTS], axis=1)
+        if f"peeq_nodal/{at}" in file:
+            nodal["peeq_nodal"] = file[f"peeq_nodal/{at}"][()]
+        return Fields(
+            step,
+            float(file["load"][step - 1]),
+            mesh["coordinates"][:, :2],
+            mesh["cells"][()],
+            mesh["body"][()],
+            file[f"displacement/{at}"][:, :2],
+            **means,
+            **nodal,
+            bodies=bodies,
+            edges=dict(all_arrays(file["edges"])) if "edges" in file else {},
+        )
+
+
+def read_points(folder: str | Path, scene: Scene, step: int) -> dict[str, Array]:
+    """What `output.points` writes at ``step``: "coordinates" ``(m, q, 2)`` of the integration points, "stress"
+    ``(m, q, 4)`` and, where a body can yield, "plastic_strain" and "peeq" ``(m, q)``. Raises `InputError`."""
+    with _opened(folder, scene, step) as file:
+        if "points" not in file:
+            raise InputError(f"{folder}: has no integration points: it was solved with output.points = false.")
+        points, at = file["points"], step_name(step)
+        steps = {name: points[f"{name}/{at}"][()] for name in points if name != "coordinates"}
+        return {"coordinates": points["coordinates"][()]} | steps
+
+
+@contextmanager
+def _opened(folder: str | Path, scene: Scene, step: int) -> Iterator[h5py.File]:
+    """The open fields.h5 of a run, which holds the step. What it lacks and cannot be read becomes an `InputError`."""
     path = Path(folder) / "fields.h5"
     if not scene.output.fields:
         raise InputError(f"{folder}: has no fields: it was solved with output.fields = false.")
     if not path.is_file():
         raise InputError(f"{folder}: is not a complete run folder: fields.h5 is missing.")
-    at = step_name(step)
     try:
         with h5py.File(path) as file:
             if int(file["accepted"][()]) < step:
                 raise KeyError(step)
-            mesh = file["mesh"]
-            means: dict[str, Any] = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
-            return Fields(
-                step,
-                float(file["load"][step - 1]),
-                mesh["coordinates"][:, :2],
-                mesh["cells"][()],
-                mesh["body"][()],
-                file[f"displacement/{at}"][:, :2],
-                **means,
-            )
+            yield file
+    except InputError:
+        raise
     except (OSError, KeyError, RuntimeError, TypeError, ValueError, IndexError):
         raise InputError(f"{path}: cannot be read as the fields of a run at step {step}.") from None
 

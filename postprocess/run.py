@@ -16,7 +16,7 @@ from archord.output.folder import is_sweep
 from archord.output.history import read_history
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.curve import CURVES, RunCurve
-from archord.postprocess.fields import Fields, read_fields
+from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
 from archord.presets.arc import ArcProfile
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
@@ -111,7 +111,12 @@ class Run:
 
         Raises `InputError` without such a step, and if the run wrote no fields.
         """
-        return read_fields(self.folder, self.scene, self.number(step))
+        return read_fields(self.folder, self.scene, self.number(step), self.summary.get("bodies", BODIES))
+
+    def points(self, step: int | None = None) -> dict[str, np.ndarray]:
+        """The integration points at ``step`` (the last) by name: "coordinates", "stress" and, where a body can yield,
+        "plastic_strain" and "peeq". Raises `InputError` without such a step, and if the run did not write them."""
+        return read_points(self.folder, self.scene, self.number(step))
 
     def number(self, step: int | None) -> int:
         """``step``, or that of the last accepted one. Raises `InputError` if the run has none such."""

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from archord.scene.keys import key, require
 from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Path, ProblemAnalysis, Support
 from archord.scene.scene import Checked
-from archord.scene.sections import MOST_STEPS, Output, Stepping, Units
+from archord.scene.sections import MOST_STEPS, ProblemOutput, Stepping, Units
 
 FORMAT = 2
 CHOSEN = ("stepping", "initial"), ("stepping", "maximum")  # what an accuracy chooses, beside the mesh
@@ -37,7 +37,7 @@ class ProblemScene(Checked):
     path: Path = Field(default_factory=Path, description="stages and steps of the loads")
     analysis: ProblemAnalysis = Field(default_factory=ProblemAnalysis, description="model and solver")
     stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
-    output: Output = Field(default_factory=Output, description="what is written")
+    output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
     @model_validator(mode="after")
     def _consistent(self) -> ProblemScene:

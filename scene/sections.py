@@ -254,3 +254,11 @@ class Output(Section):
     """What a run writes besides its curves."""
 
     fields: bool = key("write the fields of every step to fields.xdmf and fields.h5", default=True)
+    stress: bool = key("write stress and plastic strain at the nodes with the fields", default=False)
+    points: bool = key("write stress and plastic strain at the integration points with the fields", default=False)
+
+
+class ProblemOutput(Output):
+    """What a run of a general scene writes."""
+
+    stress: bool = key("write stress and plastic strain at the nodes with the fields", default=True)

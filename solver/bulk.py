@@ -6,7 +6,7 @@ tangent that changes; without them nothing of it is compiled or stored.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import basix.ufl
 import numpy as np
@@ -77,11 +77,27 @@ class _PlasticBody:
         basis = cell_basis(V.mesh, degree, cells, X)
         self.cells = cells
         self.dofs = V.dofmap.list[cells]
-        self.gradient = basis.gradient
+        self.gradient, self.point = basis.gradient, basis.point
         self.weight = basis.measure * w
         self.points = Points(material, self.weight.size)
         self.stress: Array = np.zeros((self.weight.size, 4))
         self.yielding = cells[:0]  # cells that had a point off its elastic tangent at the last update
+
+
+class PointFields:
+    """Stress ``(n, q, 4)``, ``plastic_strain`` ``(n, q, 4)`` and ``peeq`` ``(n, q)`` at the integration points
+    ``coordinates`` ``(n, q, 2)`` of a body's ``cells`` ``(n,)``, which have the ``weight`` ``(n, q)``."""
+
+    def __init__(
+        self, cells: np.ndarray, coordinates: Array, weight: Array, stress: Array, history: Points | None = None
+    ) -> None:
+        n, q = weight.shape
+        self.cells, self.coordinates, self.weight, self.stress = cells, coordinates, weight, stress.reshape(n, q, 4)
+        self.peeq: Array = np.zeros((n, q))
+        self.plastic_strain: Array = np.zeros((n, q, 4))
+        if history is not None:
+            self.peeq = history.peeq.reshape(n, q)
+            self.plastic_strain = getattr(history.trial, "plastic_strain", self.plastic_strain).reshape(n, q, 4)
 
 
 def _check_elastic_tangent(material: Material) -> None:
@@ -216,25 +232,27 @@ class Bulk:
             integral += float(data.weight.ravel() @ peeq)
         return largest, integral
 
-    def cell_fields(self, u: Array) -> dict[str, Array]:
-        """Means over each cell of this rank ``(n_cells,)`` at ``u`` ``(n_nodes, 2)``: "von_mises", "mean_stress" and,
-        where a body can yield, "peeq"."""
+    def at_points(self, u: Array) -> Iterator[PointFields]:
+        """The state at the integration points of this rank, body by body, at the last update, whose nodal displacements
+        ``u`` ``(n_nodes, 2)`` are."""
         X, w = bulk_quadrature(self.V.mesh.basix_cell(), self.degree)
-        fields: dict[str, Array] = {}
         for tag, cells in self.cells.items():
             if tag in self._plastic:
                 body = self._plastic[tag]
-                weight, stress, peeq = body.weight, body.stress, np.asarray(body.points.peeq)
+                yield PointFields(cells, body.point, body.weight, body.stress, body.points)
             else:
                 material, basis = self.materials[tag], cell_basis(self.V.mesh, self.degree, cells, X)
                 eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)
-                weight, (stress, _, _) = basis.measure * w, material.update(eps, material.state(len(eps)))
-                peeq = np.zeros(len(eps))
-            for name, at_points in {
-                "von_mises": von_mises(stress),
-                "mean_stress": mean_stress(stress),
-                "peeq": peeq,
-            }.items():
-                whole = fields.setdefault(name, np.zeros(self.V.mesh.topology.index_map(2).size_local))
-                whole[cells] = (weight * at_points.reshape(weight.shape)).sum(axis=1) / weight.sum(axis=1)
-        return {name: values for name, values in fields.items() if self.plastic or name != "peeq"}
+                stress, _, _ = material.update(eps, material.state(len(eps)))
+                yield PointFields(cells, basis.point, basis.measure * w, stress)
+
+    def cell_fields(self, parts: Iterable[PointFields]) -> dict[str, Array]:
+        """Means over each cell of this rank ``(n_cells,)`` of what `at_points` yields: "von_mises", "mean_stress" and,
+        where a body can yield, "peeq"."""
+        names = ("von_mises", "mean_stress", *(["peeq"] if self.plastic else []))
+        fields = {name: np.zeros(self.V.mesh.topology.index_map(2).size_local) for name in names}
+        for part in parts:
+            values = {"von_mises": von_mises(part.stress), "mean_stress": mean_stress(part.stress), "peeq": part.peeq}
+            for name, whole in fields.items():
+                whole[part.cells] = (part.weight * values[name]).sum(axis=1) / part.weight.sum(axis=1)
+        return fields

@@ -151,7 +151,7 @@ class Drives:
                 found.append(np.zeros((self._n_local, 2)))
                 found[-1][here, axis] = 1.0
                 self._holder[here, axis] = len(self._supports)
-        return np.array(found).reshape(-1, self._n_local, 2)
+        return np.array(found).reshape(len(found), self._n_local, 2)
 
     def _measure(self, cells: str, facets: str) -> Any:
         """The measure of a set of cells, or of facets."""

@@ -8,12 +8,15 @@ that of a contact edge's points along the curve depends on the ranks.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 
 import numpy as np
+from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 
 from archord.geometry.basis import Array, tabulate
 from archord.materials.material import Points
+from archord.solver.bulk import PointFields
 from archord.solver.system import System
 
 Arrays = dict[str, np.ndarray]
@@ -83,6 +86,27 @@ class MeshOrder:
             cells = problem.cells_of(body)
             of_cells[cells[cells < self.n_cells]] = problem.tag(body)
         return self.cells(of_cells)
+
+    def facet_sets(self) -> dict[str, np.ndarray]:
+        """Both vertices ``(k, 2)`` of every facet of the named sets, as nodes of the mesh, on rank 0. Collective."""
+        tagged, comm = self.system.problem.mesh, self.system.comm
+        mesh, found = tagged.mesh, {}
+        for name in tagged.facet_sets:
+            facets = tagged.facets_in(name)
+            ends = np.zeros((0, 2), dtype=np.int32)
+            if len(facets):  # dolfinx divides by their number
+                ends = entities_to_geometry(mesh, 1, facets)[:, :2]
+            parts = comm.gather(np.sort(self._index[ends], axis=1))
+            if parts is not None:
+                found[name] = np.searchsorted(self._nodes.unique, np.unique(np.concatenate(parts), axis=0))
+        return found
+
+    def at_points(self, name: str, parts: Iterable[PointFields]) -> np.ndarray:
+        """The attribute ``name`` of `PointFields` of all cells ``(n, q, ...)`` on rank 0. Collective."""
+        cells, values = zip(*((part.cells, getattr(part, name)) for part in parts), strict=True)
+        whole = np.zeros((self.n_cells, *values[0].shape[1:]))
+        whole[np.concatenate(cells)] = np.concatenate(values)
+        return self.cells(whole)
 
     def collect(self, u: Array) -> Array:
         """Nodal values ``(n_local, k)`` of all ranks on rank 0, nothing elsewhere. Collective."""

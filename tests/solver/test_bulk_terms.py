@@ -91,7 +91,7 @@ def test_patch(material, amount, comm):
     if material.yields:
         assert (state.peeq[0] > 0) == (amount > 1)
         assert bulk.peeq()[0] == pytest.approx(state.peeq[0], rel=1e-10)
-    fields = bulk.cell_fields(u)
+    fields = bulk.cell_fields(bulk.at_points(u))
     np.testing.assert_allclose(fields["von_mises"], von_mises(expected)[0], rtol=1e-10)
     np.testing.assert_allclose(fields["mean_stress"], expected[0, :3].mean(), rtol=1e-10)
     inside = np.ones(len(force), dtype=bool)
