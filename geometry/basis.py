@@ -79,10 +79,12 @@ def tabulate(cell: basix.CellType, degree: int, X: Array) -> Array:
 def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
     """Degree of the bulk rule for displacements of the given ``degree``: full rank, and no volumetric locking.
 
-    Plastic flow in plane strain keeps the volume at every point. A quadrilateral of degree p adds ``2 p^2`` dofs to a
-    mesh; its divergence spans ``(p + 1)^2 - 1`` functions, which are as many conditions at the ``(p + 1)^2`` points of
-    Gauss taken here: 8 for p = 2, no more than there are dofs, as Nagtegaal, Parks and Rice (1974) ask. With ``p^2``
-    points the divergence is freer, but the strains of three deformations vanish at all of them.
+    Plastic flow in plane strain keeps the volume at every point, which must be fewer conditions than a mesh has dofs
+    (Nagtegaal, Parks and Rice 1974). A quadrilateral of degree p adds ``2 p^2`` dofs; the divergence on a parallelogram
+    spans ``(p + 1)^2 - 1`` functions, just 8 for p = 2, as many conditions at the ``(p + 1)^2`` points of Gauss here.
+    With ``p^2`` points it is freer, but the strains of three deformations vanish at all of them. Distorted second-order
+    quadrilaterals have 9 conditions, and are somewhat stiff where they are large: meshed by gmsh, they put the collapse
+    pressure of a thick cylinder 0.1 % too high with 1300 dofs, triangles 0.01 %; both converge.
     """
     return 2 * degree - 2 if cell == TRIANGLE else 2 * degree
 

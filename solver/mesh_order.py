@@ -74,6 +74,9 @@ class MeshOrder:
                 self.nodes_of_cell = np.searchsorted(np.sort(first), first[of_cells])
             self._index = system.comm.bcast(first)[numbers]
         self._nodes = Gather(system.comm, self._index[: self._n_owned])
+        corners = slice(mesh.ufl_cell().num_vertices())  # come first in every cell
+        self._dof_of_vertex = np.zeros(len(geometry.x), dtype=np.int64)
+        self._dof_of_vertex[geometry.dofmap[:, corners]] = dofs[:, corners]
 
     def mesh_digest(self) -> str:
         """SHA-256 of coordinates and cells, on rank 0."""
@@ -96,7 +99,7 @@ class MeshOrder:
             ends = np.zeros((0, 2), dtype=np.int32)
             if len(facets):  # dolfinx divides by their number
                 ends = entities_to_geometry(mesh, 1, facets)[:, :2]
-            parts = comm.gather(np.sort(self._index[ends], axis=1))
+            parts = comm.gather(np.sort(self._index[self._dof_of_vertex[ends]], axis=1))
             if parts is not None:
                 found[name] = np.searchsorted(self._nodes.unique, np.unique(np.concatenate(parts), axis=0))
         return found
