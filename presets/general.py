@@ -16,7 +16,7 @@ from archord.materials.material import Array
 from archord.presets.edge import SurfaceProfile, surface_profiles
 from archord.presets.joint_report import sizes
 from archord.presets.problem import as_input_error, general_problem
-from archord.scene.problem import ProblemScene
+from archord.scene.problem import LIVE, ProblemScene
 from archord.solver.stepping import Step
 from archord.solver.system import System
 from archord.solver.timer import Timer
@@ -140,8 +140,9 @@ class GeneralAccount:
     def facts(self) -> dict[str, Any]:
         """Sizes of the mesh, and what was made of the scene."""
         mesh, problem = self.scene.mesh, self.system.problem
-        content = Path(mesh.file).read_bytes() if mesh.file and self.system.comm.rank == 0 else b""
-        source = {"file": mesh.file, "sha256": sha256(content).hexdigest()} if mesh.file else {}
+        source = {"file": mesh.file} if mesh.file else {}
+        if mesh.file and mesh.file not in LIVE:
+            source["sha256"] = sha256(Path(mesh.file).read_bytes()).hexdigest()
         shares = {i.interaction.name: [pair.share for pair in i.pairs] for i in self.system.contact.interfaces}
         bodies = {body.name: list(problem.mesh.cell_sets[body.cells or body.name]) for body in problem.bodies}
         return {"mesh": sizes(self.system) | source, "model": {"contact_shares": shares}, "bodies": bodies}

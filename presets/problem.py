@@ -10,12 +10,14 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
+from archord.geometry.meshes.read import read_mesh, tagged
+from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.lug import lug
 from archord.materials.material import Array
 from archord.scene import parts
 from archord.scene.errors import InputError
-from archord.scene.problem import ProblemScene
+from archord.scene.problem import LIVE, ProblemScene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
 
 _SHAPES = {"lug": lug}
@@ -37,15 +39,20 @@ def as_input_error(scene: ProblemScene) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        raise InputError(f"{scene.mesh.file or 'mesh.shape'}: {str(error).rstrip('.')}.") from None
+        source, said = scene.mesh.file or "mesh.shape", str(error).rstrip(".")
+        raise InputError(f"{said}." if said.startswith(source) else f"{source}: {said}.") from None
 
 
 def scene_mesh(scene: ProblemScene, comm: MPI.Comm, partitioner=None) -> TaggedMesh:
     """The mesh of ``scene``. Collective; raises ValueError."""
-    if scene.mesh.shape is None:
-        raise ValueError("mesh files cannot be read yet")
-    shape = dict(scene.mesh.shape)
-    return _SHAPES[shape.pop("kind")](comm, degree=scene.analysis.degree, partitioner=partitioner, **shape)
+    mesh = scene.mesh
+    if mesh.shape is not None:
+        shape = dict(mesh.shape)
+        return _SHAPES[shape.pop("kind")](comm, degree=scene.analysis.degree, partitioner=partitioner, **shape)
+    source = LIVE.get(mesh.file or "", mesh.file)
+    circles = [Circle(circle.facets, (circle.centre[0], circle.centre[1]), circle.radius) for circle in mesh.circle]
+    options = {"scale": mesh.scale, "order": mesh.order, "refine": mesh.refine, "partitioner": partitioner}
+    return read_mesh(tagged(*source) if isinstance(source, tuple) else source, comm, circles=circles, **options)
 
 
 class _Builder:

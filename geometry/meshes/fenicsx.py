@@ -4,10 +4,12 @@ to the process."""
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
+from tempfile import TemporaryDirectory
 from types import ModuleType
+from typing import Any
 
 import basix
 import basix.ufl
@@ -16,7 +18,6 @@ from dolfinx.cpp.graph import AdjacencyList_int32
 from dolfinx.io import distribute_entity_data
 from dolfinx.mesh import create_mesh, entities_to_geometry, meshtags, meshtags_from_entities
 from mpi4py import MPI
-from scipy.spatial import cKDTree
 
 from archord.geometry.basis import Array, cell_kind
 from archord.geometry.meshes.mesh_cache import kept_mesh
@@ -83,19 +84,40 @@ def _made(
 ) -> PlaneMesh:
     if isinstance(build, ModuleType):
         return _meshed(build, adjust, order, refinements, quads, curved=True)
-    import gmsh
-
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    try:
+    with own_gmsh() as gmsh:
         for option in ("FromPoints", "FromCurvature", "ExtendFromBoundary"):
             gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
-        for name, value in (("General.Terminal", 0), ("Mesh.Algorithm", 6), ("Mesh.HighOrderOptimize", 0)):
+        for name, value in (("Mesh.Algorithm", 6), ("Mesh.HighOrderOptimize", 0)):
             gmsh.option.setNumber(name, value)
         build(gmsh)
         return _meshed(gmsh, adjust, order, refinements, quads, curved=False)
-    finally:
-        with suppress(Exception):
-            gmsh.finalize()  # or the next mesh would start from what is left of this one
+
+
+@contextmanager
+def own_gmsh() -> Iterator[Any]:
+    """gmsh with its defaults and an empty model; a user's model and options come back at the end."""
+    import gmsh
+
+    with TemporaryDirectory() as folder:
+        in_use, options = gmsh.isInitialized(), f"{folder}/gmsh.opt"
+        if in_use:
+            current = gmsh.model.getCurrent()
+            gmsh.write(options)
+            gmsh.option.restoreDefaults()
+        else:
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
+        try:
+            gmsh.option.setNumber("General.Terminal", 0)
+            gmsh.model.add("archord")
+            yield gmsh
+        finally:
+            with suppress(Exception):
+                if in_use:
+                    gmsh.model.remove()
+                    gmsh.merge(options)
+                    gmsh.model.setCurrent(current)
+                else:
+                    gmsh.finalize()  # or the next mesh would start from what is left of this one
 
 
 def _meshed(gmsh, adjust, order: int, refinements: int, quads: bool, curved: bool) -> PlaneMesh:
@@ -148,6 +170,8 @@ def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None, cut: Cu
 
 def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
     """The inverse of `distribute`: the whole mesh on rank 0, None elsewhere. Collective."""
+    from scipy.spatial import cKDTree  # a solve without a mesh from Python does not pay for it
+
     mesh, topology = tagged.mesh, tagged.mesh.topology
     node, n = np.asarray(mesh.geometry.input_global_indices), topology.index_map(2).size_local
     body = np.zeros(n + topology.index_map(2).num_ghosts, dtype=np.int32)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -15,7 +14,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.abaqus import read_abaqus
 from archord.geometry.meshes.check import faults
-from archord.geometry.meshes.fenicsx import distribute, gathered, strips
+from archord.geometry.meshes.fenicsx import distribute, gathered, own_gmsh, strips
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.refine import Circle, refined
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
@@ -99,16 +98,6 @@ def _read(source: str | Path | ModuleType, order: int) -> PlaneMesh:
 
 
 def _read_gmsh(path: Path) -> PlaneMesh:
-    import gmsh
-
-    in_use = gmsh.isInitialized()
-    if not in_use:
-        gmsh.initialize(readConfigFiles=False, interruptible=False)
-        gmsh.option.setNumber("General.Terminal", 0)
-    try:
-        gmsh.model.add(path.name)
+    with own_gmsh() as gmsh:
         gmsh.merge(str(path))
         return PlaneMesh.from_gmsh(gmsh)
-    finally:
-        with suppress(Exception):
-            (gmsh.model.remove if in_use else gmsh.finalize)()
