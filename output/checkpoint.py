@@ -57,6 +57,7 @@ def halt(order: MeshOrder, scene: str, m: Any, step: Step, position: Position, w
         "work": asdict(work),
         "position": {name: value for name, value in vars(position).items() if name != "increment"},
         "largest_reaction": system.equilibrium.largest_reaction,
+        "stabilisation_energy": springs.energy if (springs := system.equilibrium.springs) else 0.0,
         "gamma_by_and_by": system.solver.continues_gamma,
         "level": levels.tolist(),
     }
@@ -87,6 +88,8 @@ def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple
     position = Position(**scalars["position"])
     if "level_increment" in scalars:
         position.increment = state("fields/increment", "level_increment")
+    if springs := order.system.equilibrium.springs:
+        springs.energy = scalars["stabilisation_energy"]
     order.system.solver.continues_gamma = scalars["gamma_by_and_by"]
     order.system.equilibrium.resume(position.load, state("fields/displacement", "level"), scalars["largest_reaction"])
     step = Step(**scalars["step"])

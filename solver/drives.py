@@ -153,7 +153,7 @@ class Drives:
                 self._holder[here, axis] = len(self._supports)
         return np.array(found).reshape(len(found), self._n_local, 2)
 
-    def _measure(self, cells: str, facets: str) -> Any:
+    def measure(self, cells: str = "", facets: str = "") -> Any:
         """The measure of a set of cells, or of facets."""
         mesh, sets = self.V.mesh, self.problem.mesh
         entities = np.unique(sets.cells_in(cells) if cells else sets.facets_in(facets))
@@ -161,7 +161,8 @@ class Drives:
         rule = {"quadrature_degree": _LOAD_DEGREE}
         return ufl.Measure("dx" if cells else "ds", mesh, subdomain_data=tags, metadata=rule)(1)
 
-    def _integral(self, form: Any) -> float:
+    def integral(self, form: Any) -> float:
+        """The ``form`` without arguments, over all ranks."""
         return self.comm.allreduce(fem.assemble_scalar(fem.form(form)))
 
     def _vector(self, form: Any) -> Array:
@@ -172,23 +173,23 @@ class Drives:
 
     def _nodal_forces(self, load: Load) -> Array:
         """Forces ``(n_owned, 2)`` on the modelled part per unit of the drive."""
-        mesh, v, measure = self.V.mesh, ufl.TestFunction(self.V), self._measure(load.cells, load.facets)
+        mesh, v, measure = self.V.mesh, ufl.TestFunction(self.V), self.measure(load.cells, load.facets)
         if load.pressure:
             normal = ufl.FacetNormal(mesh)
             return self._vector(-fem.Constant(mesh, load.pressure) * ufl.inner(normal, v) * measure)
         force = fem.Constant(mesh, np.array(load.force))
         density = fem.Constant(mesh, 1.0) if load.density is None else load.density(ufl.SpatialCoordinate(mesh))
-        total = self._integral(density * measure)
+        total = self.integral(density * measure)
         return self._vector(density * ufl.inner(force, v) * measure) / (self.problem.symmetry * total)
 
     def _mean_motion(self, mean: Mean) -> Array:
         """Derivative ``(n_owned, 2)`` of the mean motion by the displacements of the nodes."""
-        mesh, v, ds = self.V.mesh, ufl.TestFunction(self.V), self._measure("", mean.facets)
+        mesh, v, ds = self.V.mesh, ufl.TestFunction(self.V), self.measure(facets=mean.facets)
         x, one = ufl.SpatialCoordinate(mesh), fem.Constant(mesh, 1.0)
-        length = self._integral(one * ds)
-        centre = np.array([self._integral(x[i] * ds) for i in (0, 1)]) / length
+        length = self.integral(one * ds)
+        centre = np.array([self.integral(x[i] * ds) for i in (0, 1)]) / length
         arm = x - fem.Constant(mesh, centre)
         lever = np.array(mean.point) - centre
-        rotation = np.array([-lever[1], lever[0], 1.0])[mean.axis] / self._integral(ufl.inner(arm, arm) * ds)
+        rotation = np.array([-lever[1], lever[0], 1.0])[mean.axis] / self.integral(ufl.inner(arm, arm) * ds)
         shift, turn = (fem.Constant(mesh, c) for c in (np.eye(3)[mean.axis, :2] / length, rotation))
         return self._vector((ufl.inner(shift, v) + turn * (arm[0] * v[1] - arm[1] * v[0])) * ds)

@@ -28,6 +28,7 @@ from archord.solver.linear.bordered import Bordered
 from archord.solver.linear.choose import choose
 from archord.solver.linear.strategy import Facts
 from archord.solver.problem import Problem
+from archord.solver.stabilisation import Springs
 from archord.solver.tangent import TangentMatrix
 from archord.solver.timer import BEFORE_SOLVING, Timer
 
@@ -71,7 +72,10 @@ class Equilibrium:
         self.choice = choose(facts)
         self._factoriser = partial(self.choice.factoriser, V)  # of tangents of all displacements
         condense = self.choice.uses("condensed")
-        self.tangent = TangentMatrix(bulk, contact, drives, timer, condense=condense)
+        loose = [body for body in problem.bodies if problem.stabilise and not drives.held(body, alone=False)]
+        discs = problem.stabilise and any(disc.rate[drives.unknown].any() for disc in contact.rigid)
+        self.springs = Springs(drives, contact, loose, self._stiffest) if loose or discs else None
+        self.tangent = TangentMatrix(bulk, contact, drives, self.springs, timer, condense=condense)
         self.border: Bordered | None = None
         with timer(BEFORE_SOLVING):
             if facts.by_force:
@@ -154,6 +158,9 @@ class Equilibrium:
             self.contact.add_force(self._force.array.reshape(-1, 2))
         applied = np.tensordot(self.levels, self.drives.applied, 1)
         self._force.array[:] -= applied.ravel()
+        if self.springs:
+            self.springs.evaluate(self.u.x.array[: 2 * self.n_owned], self.levels)
+            self._force.array[:] += self.springs.forces
         self._reaction = np.where(self.fixed[: self.n_owned], self._force.array_r.reshape(-1, 2), 0.0)
         totals = np.array(
             [
@@ -188,7 +195,8 @@ class Equilibrium:
         u, drives = self.u.x.array[: 2 * self.n_owned], self.drives
         rates = drives.rate[:, : self.n_owned].reshape(len(self.levels), -1)
         own = rates @ self._reaction.ravel() + drives.applied.reshape(rates.shape) @ u
-        return self.comm.allreduce(own) + self.contact.force_on_drives()
+        on_levels = self.springs.on_levels if self.springs else 0.0
+        return self.comm.allreduce(own) + self.contact.force_on_drives() + on_levels
 
     def points(self) -> list[Points]:
         """The points of bulk and contact, of materials and of contact laws."""
@@ -222,6 +230,8 @@ class Equilibrium:
         """Go back to an accepted state; the history was never touched."""
         self.load, self.levels = load, state[2 * self.n_local :].copy()
         self.u.x.array[:] = state[: 2 * self.n_local]
+        if self.springs:
+            self.springs.last = state[: 2 * self.n_owned].copy(), self.levels.copy()
 
     def resume(self, load: float, state: Array, largest_reaction: float) -> None:
         """Take up an accepted state of an earlier process, whose history the points have already, and evaluate it."""
@@ -234,5 +244,7 @@ class Equilibrium:
     def commit(self) -> None:
         """Accept the last solve: bulk and contact keep their trial history."""
         self.largest_reaction = max(self.largest_reaction, self.reaction_norm)
+        if self.springs:
+            self.springs.commit()
         for points in self.points():
             points.commit()

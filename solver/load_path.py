@@ -94,7 +94,8 @@ class LoadPath:
         """Go to ``load``, where the last attempt has found equilibrium, and keep its history."""
         at, new = self.at, self.solver.equilibrium.state()
         if load != at.load:
-            known = self.solver.equilibrium.problem.from_rest or at.increment is not None
+            equilibrium = self.solver.equilibrium
+            known = (equilibrium.problem.from_rest and equilibrium.springs is None) or at.increment is not None
             at.increment = new - self.state if known else np.zeros_like(new)
             at.stride = load - at.load
         at.load, self.state = load, new

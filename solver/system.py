@@ -51,7 +51,6 @@ class System:
             self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
             self.solver = Recovery(NewtonSolver(self.equilibrium))
         self._path: LoadPath | None = None
-        self.stabilisation_energy = 0.0
 
     def _surface(self, given: str | Rigid, interaction: str) -> Surface | RigidSurface:
         if isinstance(given, Rigid):
@@ -130,6 +129,12 @@ class System:
     def drive_displacement(self, name: str) -> float:
         """`drive_displacements` of the drive ``name``."""
         return float(self.drive_displacements()[self.drive_names.index(name)])
+
+    @property
+    def stabilisation_energy(self) -> float:
+        """Energy that the springs of `Problem.stabilise` took up so far, of the whole."""
+        springs = self.equilibrium.springs
+        return self.problem.symmetry * springs.energy if springs else 0.0
 
     def energies(self) -> tuple[float, float]:
         """Elastic energy and plastic dissipation of the whole."""

@@ -12,6 +12,7 @@ from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact.contact import Contact
 from archord.solver.drives import Drives
 from archord.solver.linear.condensed import Condensed, filled
+from archord.solver.stabilisation import Springs
 from archord.solver.timer import BEFORE_SOLVING, Timer
 
 
@@ -23,11 +24,13 @@ class TangentMatrix:
     ``factorisations`` counts those of sparse matrices that `update` asked for.
     """
 
-    def __init__(self, bulk: Bulk, contact: Contact, drives: Drives, timer: Timer, *, condense: bool) -> None:
+    def __init__(
+        self, bulk: Bulk, contact: Contact, drives: Drives, springs: Springs | None, timer: Timer, *, condense: bool
+    ) -> None:
         self.V, self.bulk, self.contact, self.timer = bulk.V, bulk, contact, timer
         self.comm, index_map = self.V.mesh.comm, self.V.dofmap.index_map
         self._size, self._start, self._n = index_map.size_global, index_map.local_range[0], index_map.size_local
-        self.drives, fixed, m = drives, drives.fixed, len(drives.unknown)
+        self.drives, self.springs, fixed, m = drives, springs, drives.fixed, len(drives.unknown)
         self._fixed, rate = fixed[: self._n], drives.unknown_rate[:, : self._n].reshape(m, 2 * self._n).T
         self._direction = fem.Function(self.V)
         self._bcs = []
@@ -105,6 +108,8 @@ class TangentMatrix:
             self.factorisations += factorise
             with self.timer("assemble bulk"):
                 self._elastic.copy(self.A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+                if self.springs:
+                    self.A.axpy(self.springs.factor, self.springs.of_free, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
                 self.bulk.assemble_correction(self.A, self._bcs)
         else:
             self.factorisations = 1
@@ -159,6 +164,8 @@ class TangentMatrix:
             if drives.moving[drives.unknown[level]]:
                 self._direction.x.array[:] = drives.unknown_rate[level].ravel()
                 self.bulk.add_action(self._direction, b)
+                if self.springs:
+                    b.array[:] += self.springs.pull(self._direction.x.array[: 2 * self._n])
                 D[:, level] += rate @ b.array_r
             c = b.copy()
             for vector, nodes, values, whole in ((b, tangent.rows, on_rows, B), (c, tangent.columns, on_columns, C)):
@@ -168,4 +175,7 @@ class TangentMatrix:
                 vector.assemble()
                 whole[:, level] += vector.array_r
                 vector.destroy()
-        return B * free[:, None], C * free[:, None], self.comm.allreduce(D)
+        D = self.comm.allreduce(D)
+        if self.springs:
+            D += np.diag(self.springs.factor * self.springs.of_levels[drives.unknown] * drives.weight**2)
+        return B * free[:, None], C * free[:, None], D

@@ -17,6 +17,7 @@ class Spring:
     """Equilibrium and solver in one, which converges in ``cost(load, stride)`` iterations; infinite: it fails."""
 
     problem = SimpleNamespace(load_name="delta", by_force=False, from_rest=True)
+    springs = None
     drives = SimpleNamespace(course=lambda load: np.array([load]))
     bulk = SimpleNamespace(plastic=True)
 

@@ -1,0 +1,105 @@
+"""Bodies that float until they touch: sleeves with clearance, pins under a force, discs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.geometry.curve import RigidCircle
+from archord.geometry.shapes.bushing import bushing
+from archord.geometry.shapes.lug import lug
+from archord.materials.elasticity import Elastic
+from archord.materials.hardening import LinearHardening
+from archord.materials.j2 import J2Material
+from archord.solver.problem import Body, Drive, Interaction, Load, Problem, Rigid, Support
+from archord.solver.stepping import StepRules
+from archord.solver.system import System
+from tests.solver.parts import ELASTIC, E, blocks, solve
+
+STEEL = Elastic(210000.0, 0.3, "strain")
+YIELDING = J2Material(210000.0, 0.3, "strain", LinearHardening(400.0, 2000.0))
+
+
+def steps_of(problem: Problem, loads) -> tuple[System, float]:
+    """The system at the last of the ``loads``, none of which may be cut, and the work of its one drive."""
+    system, work, before = System(problem), 0.0, np.zeros(2)
+    for load in loads:
+        system.solve([load], StepRules(minimum=1.0))
+        now = np.append(system.drive_displacements(), system.drive_forces())
+        work += (now[0] - before[0]) * (now[1] + before[1]) / 2
+        before = now
+    return system, work
+
+
+def sleeves(comm=MPI.COMM_SELF, material=STEEL) -> Problem:
+    """A pin that is pushed through the clearances of two sleeves, which nothing else holds along the push."""
+    mesh = bushing(comm, 10.0, [(10.05, 12.0), (12.03, 14.0)], 14.04, 30.0, 1.5, 0.4)
+    between = {"a": ("pin", "sleeve 1 inside"), "b": ("sleeve 1 outside", "sleeve 2 inside")}
+    between["c"] = ("sleeve 2 outside", "bore")
+    supports = [Support("axis", "axis", 1), Support("flat", "flat", 0, 1.0)]
+    supports += [Support("edge", "outer edge", axis) for axis in (0, 1)]
+    bodies = [Body(name, STEEL if name == "pin" else material) for name in ("pin", "sleeve 1", "sleeve 2", "housing")]
+    interactions = [Interaction(name, surfaces) for name, surfaces in between.items()]
+    return Problem(mesh, bodies, interactions, supports, symmetry=2.0, stabilise=True)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("material", [STEEL, YIELDING], ids=["elastic", "yielding"])
+def test_floating_sleeves_hand_the_whole_force_on(comm, material):
+    """From no contact at all, in steps of which some close a part of the clearance of 0.12: the springs' share of force
+    and work is below 1e-6, and the result does not depend on the steps that it took, if all is elastic."""
+    system, work = steps_of(sleeves(comm, material), [0.03, 0.09, 0.15, 0.2])
+    P = system.drive_force("")
+    for name in "abc":
+        np.testing.assert_allclose(system.contact_force(name), [P, system.contact_force(name)[1]], rtol=1e-6)
+    assert system.reaction("edge")[0] == pytest.approx(-P, rel=1e-6)
+    assert 0 < system.stabilisation_energy < 1e-6 * work
+    if material is STEEL:
+        at_once, _ = steps_of(sleeves(comm, material), [0.2])
+        assert at_once.drive_force("") == pytest.approx(P, rel=1e-6)
+
+
+@pytest.mark.parametrize("half", [True, False], ids=["half", "whole"])
+def test_a_pin_under_a_force_finds_its_hole(half):
+    """Concentric with clearance at first: nothing resists the force but springs. The whole pin may turn, too."""
+    mesh = lug(MPI.COMM_SELF, 10.0, 0.1, 40.0, 20.0, 60.0, 1.5, 0.4, half=half, pin="whole")
+    supports = [Support("clamp", "clamp", axis) for axis in (0, 1)] + [Support("axis", "axis", 1)] * half
+    bodies, contact = [Body("pin", STEEL), Body("lug", STEEL)], Interaction("contact", ("pin", "hole"))
+    loads, drives = [Load("pin", (-1.0, 0.0), drive="pull")], [Drive("pull", (0, 4000.0))]
+    problem = Problem(mesh, bodies, [contact], supports, loads, drives=drives, symmetry=1.0 + half, stabilise=True)
+    system, work = steps_of(problem, [0.25, 0.5, 1.0])
+    assert system.drive_displacements()[0] > 0.2  # through the whole clearance, and beyond
+    np.testing.assert_allclose(system.reaction("clamp")[0], 4000, rtol=1e-6)
+    np.testing.assert_allclose(system.contact_force("contact")[0], -4000, rtol=1e-6)
+    assert 0 < system.stabilisation_energy < 1e-6 * work
+
+
+def test_a_disc_under_a_force_finds_its_body():
+    """Half its radius away from it at first."""
+    disc = Rigid(RigidCircle(np.array([0.5, 4.0]), 2.0), {"down": (0.0, -1.0), "aside": (1.0, 0.0)})
+    paths = [Drive("down", (0, 0.1), "force"), Drive("aside", (0, 0.0))]
+    supports = [Support("base", facets, axis) for facets in ("base", "upper bottom") for axis in (0, 1)]
+    bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
+    contact = [Interaction("contact", (disc, "lid"))]
+    problem = Problem(blocks(MPI.COMM_SELF, 3, 6), bodies, contact, supports, drives=paths, stabilise=True)
+    system = solve(problem, [1.0])
+    assert system.drive_displacement("down") > 1.0
+    assert system.contact_force("contact")[1] == pytest.approx(-0.1, rel=1e-6)
+    assert system.stabilisation_energy < 1e-6 * 0.1 * E
+
+
+def test_bodies_that_supports_hold_get_no_springs():
+    """Also not those that a coupling holds; a rigid reference point that a force moves does not hold."""
+
+    def springs(mesh=None, **parts):
+        problem = Problem(blocks(MPI.COMM_SELF, 2, 3), bodies, (), stabilise=True, **parts)
+        return System(problem).equilibrium.springs
+
+    bodies = [Body("lower", ELASTIC), Body("upper", ELASTIC)]
+    held = [Support("base", facets, axis) for facets in ("base", "lid") for axis in (0, 1)]
+    assert springs(supports=held) is None
+    assert springs(supports=held[:3]) is not None
+    pushed = [*held[:2], Support("lid", "lid", 0), Support("lid", "lid", 1, 1.0, "push")]
+    assert springs(supports=pushed, drives=[Drive("push", (0, 1.0))]) is None
+    assert springs(supports=pushed, drives=[Drive("push", (0, 1.0), "force")]) is not None
