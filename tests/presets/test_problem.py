@@ -1,0 +1,112 @@
+"""General scenes as problems: what each word does, on a lug with and without its pin."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.presets.general import GeneralAccount
+from archord.scene.file import parse_any
+from archord.solver.stepping import march
+
+STEEL = {"E": 210000.0, "nu": 0.3}
+SHAPE = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+SHAPE |= {"element_size": 2.0, "growth": 0.8}
+CLAMP = {"name": "clamp", "on": "clamp", "fixed": ["x", "y"]}
+SYMMETRY = {"name": "symmetry", "on": "axis", "fixed": ["y"]}
+CONTACT = {"name": "contact", "surfaces": ["pin", "hole"]}
+
+
+def solved(loads, *, pin: str = "half", interactions=(), couplings=(), supports=(CLAMP, SYMMETRY), steps=1, half=True):
+    """The account of the last step, and its record."""
+    bodies = [{"name": "lug"} | STEEL] + ([{"name": "pin"} | STEEL] if pin != "none" else [])
+    scene = parse_any(
+        {
+            "mesh": {"shape": SHAPE | {"pin": pin, "half": half}},
+            "body": bodies,
+            "interaction": list(interactions),
+            "coupling": list(couplings),
+            "support": list(supports),
+            "load": loads,
+            "path": {"steps": steps},
+            "analysis": {"symmetry": 2 if half else 1},
+        }
+    )
+    account = GeneralAccount(scene, MPI.COMM_SELF)
+    records = []
+
+    def done(step, position):
+        records.append(account.step(records, step, account.profiles(), 0.0, 0.0))
+
+    march(account.system.load_path(), scene.targets, target_done=done)
+    return account, records[-1].values
+
+
+def load(name="press", on="flat", direction="x", **value):
+    return {"name": name, "on": on, "direction": direction} | value
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    return solved([load(displacement=0.1)], interactions=[CONTACT])[1]
+
+
+def test_a_force_moves_a_straight_edge_as_far_as_it_takes(pressed):
+    found = solved([load(force=pressed["press force"])], interactions=[CONTACT])[1]
+    assert found["press displacement"] == pytest.approx(0.1, rel=1e-6)  # springs hold the pin by 1e-7 of its force
+    assert found["clamp x"] == pytest.approx(-pressed["press force"], rel=1e-6)
+
+
+def test_loads_in_turn_end_where_loads_together_do():
+    """Of an elastic body without contact."""
+    on = {"pin": "none", "supports": [CLAMP], "half": False}
+    pull, side = load(on="hole", force=100.0), load("side", on="end", direction="y", displacement=0.01)
+    together = solved([pull, side], **on)[1]
+    in_turn = solved([pull | {"force": [100.0, 100.0]}, side | {"displacement": [0.0, 0.01]}], **on)[1]
+    for name, value in together.items():
+        assert in_turn[name] == pytest.approx(value, rel=1e-8, abs=1e-8), name
+
+
+@pytest.mark.parametrize("kind", ["rigid", "distributing"])
+def test_a_reference_point_carries_force_and_moment(kind):
+    """The hole's, with the force the clamp takes, and its moment about the origin."""
+    point = {"name": "pin", "facets": "hole", "point": [0.0, 5.0], "kind": kind}
+    loads = [load(on="pin", force=300.0), load("turn", on="pin", direction="rotation", force=2000.0)]
+    found = solved(loads, pin="none", couplings=[point], supports=[CLAMP], half=False)[1]
+    assert found["clamp x"] == pytest.approx(-300, rel=1e-9)
+    assert found["clamp y"] == pytest.approx(0, abs=1e-6)
+    assert found["clamp moment"] == pytest.approx(5 * 300 - 2000, rel=1e-8)
+    back = [load(on="pin", displacement=found["press displacement"])]
+    back.append(load("turn", on="pin", direction="rotation", displacement=found["turn displacement"]))
+    again = solved(back, pin="none", couplings=[point], supports=[CLAMP], half=False)[1]
+    assert (again["press force"], again["turn force"]) == pytest.approx((300, 2000), rel=1e-7)
+
+
+def test_a_held_reference_point_does_not_move():
+    point = {"name": "bore", "facets": "hole", "point": [0.0, 0.0]}
+    held = {"name": "held", "on": "bore", "fixed": ["x", "y", "rotation"]}
+    account, found = solved([load(on="end", force=50.0)], pin="none", couplings=[point], supports=[held], half=False)
+    assert found["bore x"] == pytest.approx(-50, rel=1e-9)
+    nodes = account.system.problem.mesh.dofs_in(account.system.V, "hole")
+    assert np.abs(account.system.equilibrium.displacement()[nodes]).max() < 1e-12
+
+
+def test_a_pressure_acts_along_the_normal():
+    """On half a hole: twice the resultant of the modelled quarter circles, none along the axis."""
+    pressure = {"name": "oil", "on": "hole", "pressure": 10.0}
+    found = solved([pressure], pin="none")[1]
+    assert found["clamp x"] == pytest.approx(0, abs=1e-2)
+    assert found["clamp y"] + found["symmetry y"] == pytest.approx(-2 * 10 * 20, rel=1e-3)
+    assert found["oil force"] == 10
+
+
+def test_a_rigid_disc_presses_as_a_stiff_pin(pressed):
+    disc = {"name": "contact", "surfaces": ["hole"], "rigid": {"centre": [0.1, 0.0], "radius": 9.9}}
+    found = solved([load(on="contact", displacement=0.1)], pin="none", interactions=[disc])[1]
+    assert found["press force"] == pytest.approx(found["contact force x"], rel=1e-8)
+    assert found["press force"] == pytest.approx(-found["clamp x"], rel=1e-8)
+    assert pressed["press force"] < found["press force"] < 2 * pressed["press force"]
+
+
+def test_a_force_on_cells_is_spread_over_them():
+    found = solved([load(on="lug", force=80.0)], pin="none")[1]
+    assert found["clamp x"] == pytest.approx(-80, rel=1e-9)
