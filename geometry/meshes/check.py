@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations, compress, permutations
+
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from archord.geometry.basis import Array, bulk_quadrature, cell_kind, tabulate
+from archord.geometry.curve import Curve
+from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.plane_mesh import PlaneMesh, distinct_edges, sides_of
+from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
+_SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
+_INTO = 0.02, 1e-3  # of a side: how deep bodies may overlap by their sides being straight, or curved
+_PIECES = 8  # of a side, as a polygon
+_AT_ONCE = 2_000_000  # pairs of points and pieces
+_ROUND = 1e-3  # of an arc's size: how far nodes may be off its circle; and size over radius, below which it is a line
+_COARSE = 0.05  # of the clearance: sagitta of straight sides that spoils it
+_MOTIONS = ("x", "y", "rotation")
+_HELD = 1e-8  # singular value over the largest one, below which a motion is free
 
 
 def _at(x: Array) -> str:
@@ -31,3 +48,190 @@ def faults(mesh: PlaneMesh) -> list[str]:
         place = mesh.x[sides_of(mesh.cells)[crowded[0]]].mean(axis=0)
         said.append(f"{len(crowded)} edges belong to more than two cells, the first at {_at(place)}: cells overlap")
     return said
+
+
+def check_mesh(
+    tagged: TaggedMesh,
+    bodies: Mapping[str, str],
+    pairs: Sequence[Sequence[str]] = (),
+    overlap: float = 0.0,
+    millimetres: bool = False,
+) -> list[str]:
+    """Warnings about a mesh whose ``bodies`` are the named cell sets, with ``pairs`` of surfaces in contact (one beside
+    a rigid disc). Collective.
+
+    Bodies may lie in each other by the ``overlap``; lengths may be known to be in ``millimetres``. Raises ValueError
+    with the first fault on all ranks.
+    """
+    for cells in bodies.values():
+        tagged.cell_tags(cells)
+    for name in [name for pair in pairs for name in pair]:
+        tags_of("facet", tagged.facet_sets, name)
+    mesh, found, warnings = gathered(tagged), "", list[str]()
+    if mesh is not None:
+        inside = {body: np.isin(mesh.bodies, mesh.cell_sets[cells]) for body, cells in bodies.items()}
+        every = [faults(mesh), _metres(mesh) if millimetres else [], _of_bodies(mesh, inside)]
+        checks = [*every, *(_of_surface(mesh, inside, name) for pair in pairs for name in pair)]
+        checks += [_overlaps(mesh, inside, overlap), *(sagitta(mesh, *pair) for pair in pairs if len(pair) == 2)]
+        found = next((said for check in checks for said in check), "")
+        warnings = [said for body, cells in inside.items() for said in _cracks(mesh, body, cells)]
+    found, warnings = tagged.mesh.comm.bcast((found, warnings))
+    if found:
+        raise ValueError(found)
+    return warnings
+
+
+def _metres(mesh: PlaneMesh) -> Iterator[str]:
+    size = np.ptp(mesh.x, axis=0).max()
+    if size < 1:
+        yield f"the mesh is {size:g} mm large; is it in metres? Then give mesh.scale = 1000"
+
+
+def _of_bodies(mesh: PlaneMesh, inside: Mapping[str, np.ndarray]) -> Iterator[str]:
+    middle = mesh.x[mesh.cells].mean(axis=1)
+    of_none = ~np.logical_or.reduce(list(inside.values()))
+    if of_none.any():
+        yield f"{of_none.sum()} cells belong to no body, the first at {_at(middle[of_none][0])}"
+    for a, b in combinations(inside, 2):
+        both = inside[a] & inside[b]
+        if both.any():
+            yield f"the bodies {a!r} and {b!r} share {both.sum()} cells, the first at {_at(middle[both][0])}"
+    for body, cells in inside.items():
+        part = parts(mesh.cells[cells])
+        count = np.bincount(part)
+        if len(count) > 1:
+            at = _at(middle[cells][part == count.argmin()][0])
+            yield f"the body {body!r} has {len(count)} unconnected parts, the smallest of {count.min()} cells at {at}"
+
+
+def parts(cells: np.ndarray) -> np.ndarray:
+    """The part ``(m,)`` of each of ``cells``, from 0: cells that share sides are of one."""
+    _, which = distinct_edges(sides_of(cells)[:, :2])
+    cell = np.arange(len(which)) // (len(which) // len(cells))
+    shape = (len(cells), which.max() + 1)
+    at_sides = coo_matrix((np.ones(len(which)), (cell, which)), shape).tocsr()
+    return connected_components(at_sides @ at_sides.T, directed=False)[1]
+
+
+def _of_surface(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], name: str) -> Iterator[str]:
+    sides = sides_of(mesh.cells)[:, :2]
+    edges = mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])][:, :2]
+    _, which = distinct_edges(np.concatenate([sides, edges]))
+    cells = np.flatnonzero(np.isin(which[: len(sides)], which[len(sides) :])) * len(mesh.cells) // len(sides)
+    owners = [body for body, of_body in inside.items() if of_body[cells].any()]
+    if len(owners) > 1:
+        yield f"the facet set {name!r} is of the bodies {' and '.join(map(repr, owners))}; a surface is of one"
+    elif len(cells) > len(edges):
+        yield f"the facet set {name!r} lies inside the body {owners[0]!r}; a surface is on a boundary"
+
+
+def _outline(mesh: PlaneMesh, cells: np.ndarray) -> Array:
+    """The sides ``(k, pieces + 1, 2)`` around ``cells`` as polygons."""
+    sides = sides_of(mesh.cells[cells])
+    first, which = distinct_edges(sides[:, :2])
+    outer = sides[first[np.bincount(which) == 1]]
+    order = outer.shape[1] - 1
+    xi = np.linspace(0, 1, _PIECES + 1)
+    shape, _ = Curve(np.zeros((order + 1, 2)), order).shapes(xi)
+    return np.einsum("qa,kai->kqi", shape, mesh.x[outer[:, [0, *range(2, order + 1), 1]]])
+
+
+def _overlaps(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], allowed: float) -> Iterator[str]:
+    """Vertices of a body that lie in another by more than is ``allowed``."""
+    outlines = {body: _outline(mesh, cells) for body, cells in inside.items()}
+    for a, b in permutations(outlines, 2):
+        start, end = outlines[b][:, :-1].reshape(-1, 2), outlines[b][:, 1:].reshape(-1, 2)
+        points = outlines[a][:, 0]
+        points = points[((points > start.min(axis=0)) & (points < start.max(axis=0))).all(axis=1)]
+        side = np.linalg.norm(outlines[b][:, -1] - outlines[b][:, 0], axis=1).max()
+        into = allowed + _INTO[mesh.edges.shape[1] > 2] * side
+        for part in np.array_split(points, 1 + len(points) * len(start) // _AT_ONCE):
+            part = part[_within(part, start, end)]
+            depth = _distance(part, start, end)
+            if depth.max(initial=0) > into:
+                at = _at(part[depth.argmax()])
+                yield f"the body {a!r} lies {depth.max():.3g} deep in the body {b!r} at {at}"
+                break
+
+
+def _within(x: Array, start: Array, end: Array) -> np.ndarray:
+    """Whether a ray from each of ``x`` ``(m, 2)`` to the right crosses the polygon an odd number of times."""
+    y, along = x[:, 1, None], end - start
+    crosses = (start[:, 1] > y) != (end[:, 1] > y)
+    slope = along[:, 0] / np.where(along[:, 1] == 0, 1.0, along[:, 1])
+    right = x[:, 0, None] < start[:, 0] + (y - start[:, 1]) * slope
+    return (crosses & right).sum(axis=1) % 2 == 1
+
+
+def _distance(x: Array, start: Array, end: Array) -> Array:
+    """Distance ``(m,)`` of ``x`` from the nearest of the segments."""
+    along, to = end - start, x[:, None] - start
+    xi = np.clip((to * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
+    return np.linalg.norm(to - xi[..., None] * along, axis=2).min(axis=1, initial=np.inf)
+
+
+def _cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
+    sides = sides_of(mesh.cells[cells])
+    first, which = distinct_edges(sides[:, :2])
+    nodes = np.unique(sides[first[np.bincount(which) == 1], :2])
+    pairs = cKDTree(mesh.x[nodes]).query_pairs(_SAME * np.ptp(mesh.x, axis=0).max(), output_type="ndarray")
+    if len(pairs):
+        at = _at(mesh.x[nodes[pairs[0, 0]]])
+        yield f"the body {body!r} has {len(pairs)} pairs of nodes at the same place, as at {at}: a crack, if not merged"
+
+
+def circle_through(x: Array) -> tuple[Array, float] | None:
+    """Centre and radius of the circle that the points ``x`` ``(n, 2)`` lie on; None if there is none (Kasa 1976)."""
+    shift = x.mean(axis=0)
+    y = x - shift
+    (a, b, c), *_ = np.linalg.lstsq(np.column_stack([2 * y, np.ones(len(y))]), (y**2).sum(axis=1), rcond=None)
+    radius = np.sqrt(max(c + a * a + b * b, 0.0))
+    off = np.abs(np.linalg.norm(y - [a, b], axis=1) - radius).max()
+    size = np.ptp(y, axis=0).max()
+    return (
+        None
+        if len(x) < 4 or off > _ROUND * size or _ROUND * radius > size
+        else (shift + np.array([a, b]), float(radius))
+    )
+
+
+def sagitta(mesh: PlaneMesh, first: str, second: str) -> Iterator[str]:
+    """What is said if two round surfaces have straight sides, whose sagitta h^2/(8 R) spoils the clearance."""
+    if mesh.edges.shape[1] > 2:
+        return
+    edges = [mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])] for name in (first, second)]
+    circles = [circle_through(mesh.x[np.unique(nodes)]) for nodes in edges]
+    if circles[0] is None or circles[1] is None:
+        return
+    length = [np.linalg.norm(np.diff(mesh.x[nodes], axis=1), axis=2).max() for nodes in edges]
+    deep = max(h**2 / (8 * circle[1]) for h, circle in zip(length, circles, strict=True) if circle)
+    clearance = abs(circles[0][1] - circles[1][1])
+    if deep > _COARSE * clearance:
+        arcs = f"the arcs {first!r} and {second!r} have straight sides with a sagitta of {deep:.2g}"
+        remedy = "give order = 2 in [mesh] with a [[mesh.circle]] for each, or a mesh of second order"
+        yield f"{arcs}, too much for their clearance of {clearance:.2g}; {remedy}"
+
+
+def free_motions(
+    held: Mapping[str, Sequence[tuple[Array, Array]]], links: Sequence[tuple[str, str, Array, Array]] = ()
+) -> dict[str, list[str]]:
+    """Which of "x", "y" and "rotation" nothing holds, by body.
+
+    Each body is ``held`` at points ``(k, 2)`` in directions ``(k, 2)``. Two bodies hold each other likewise by
+    ``links``: contact without friction along its normals, ties in both directions.
+    """
+    rows, names = [np.zeros((1, len(held), 3))], list(held)
+    everything = [(a, a, x, n) for a, found in held.items() for x, n in found] + list(links)
+    size = max((np.abs(x).max() for _, _, x, _ in everything), default=1.0) or 1.0
+    for a, b, x, n in everything:
+        row = np.zeros((len(x), len(names), 3))
+        row[:, names.index(a)] = np.column_stack([n, (x[:, 0] * n[:, 1] - x[:, 1] * n[:, 0]) / size])
+        row[:, names.index(b)] -= row[:, names.index(a)] if a != b else 0.0
+        rows.append(row)
+    moves = np.zeros((len(names), 3), dtype=bool)
+    for kept in (3, 2):  # with rotations, of which others are a part, and without
+        matrix = np.concatenate(rows)[:, :, :kept].reshape(-1, kept * len(names))
+        _, value, modes = np.linalg.svd(matrix.T @ matrix)
+        free = modes[value <= _HELD * max(value.max(), 1.0)].reshape(-1, len(names), kept)
+        moves[:, :kept] = (np.abs(free) > _HELD).any(axis=0)
+    return {name: list(compress(_MOTIONS, moved)) for name, moved in zip(names, moves, strict=True)}

@@ -1,0 +1,186 @@
+"""What is said of meshes that nothing can be computed on, one sentence for each fault."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from archord.geometry.meshes.check import check_mesh, circle_through, faults, free_motions
+from archord.geometry.meshes.fenicsx import distribute, gathered
+from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.refine import Circle, refined
+
+
+def grid(n, m, corner=(0.0, 0.0), size=(1.0, 1.0)):
+    """Nodes and counterclockwise quadrilaterals, in basix' order, of a rectangle."""
+    x = np.stack(np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, m + 1)), axis=-1).reshape(-1, 2)
+    first = (np.arange(n) + (n + 1) * np.arange(m)[:, None]).ravel()
+    return x * size + corner, first[:, None] + [0, 1, n + 1, n + 2]
+
+
+def joined(*grids):
+    """One mesh of several, none of whose nodes are merged; sets "0", "1", ... and the facet sets "0 top", ..."""
+    x, cells, cell_sets, facet_sets, n, m = [], [], {}, {}, 0, 0
+    for k, (nodes, found) in enumerate(grids):
+        cell_sets[str(k)] = m + np.arange(len(found))
+        for name, row, ends in (("bottom", nodes[:, 1].min(), [0, 1]), ("top", nodes[:, 1].max(), [2, 3])):
+            at = (np.abs(nodes[found[:, ends], 1] - row) < 1e-9).all(axis=1)
+            facet_sets[f"{k} {name}"] = n + found[at][:, ends]
+        x.append(nodes)
+        cells.append(n + found)
+        n, m = n + len(nodes), m + len(found)
+    return np.concatenate(x), np.concatenate(cells), cell_sets, facet_sets
+
+
+def check(comm, made, bodies, **options):
+    mesh = PlaneMesh.of_sets(*made, {}) if comm.rank == 0 else None
+    return check_mesh(distribute(comm, mesh), bodies, **options)
+
+
+BOTH = {"lower": "0", "upper": "1"}
+TWO = joined(grid(2, 2), grid(3, 2, (0, 1.01)))
+
+
+@pytest.mark.mpi
+def test_a_sound_mesh_has_nothing_said_of_it(comm):
+    assert check(comm, TWO, BOTH, pairs=[("0 top", "1 bottom")]) == []
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("made", "bodies", "options", "said"),
+    [
+        (TWO, {"lower": "0", "upper": "2"}, {}, r"no cell set '2'"),
+        (TWO, BOTH, {"pairs": [("0 top", "1 bottm")]}, r"no facet set '1 bottm' \(did you mean '1 bottom'\?\)"),
+        (TWO, {"lower": "0"}, {}, r"6 cells belong to no body, the first at \(0.166667, 1.26\)"),
+        (TWO, {"lower": "0", "upper": "1", "again": "1"}, {}, "bodies 'upper' and 'again' share 6 cells"),
+        (TWO, {"one": "both"}, {}, r"'one' has 2 unconnected parts, the smallest of 4 cells at \(0.25, 0.25\)"),
+        (TWO, BOTH, {"pairs": [("seam",)]}, "set 'seam' is of the bodies 'lower' and 'upper'; a surface is of one"),
+        (TWO, BOTH, {"pairs": [("middle",)]}, "set 'middle' lies inside the body 'lower'; a surface is on a boundary"),
+        (TWO, BOTH, {"millimetres": True, "scale": 0.01}, "the mesh is 0.0201 mm large; is it in metres?"),
+        (
+            joined(grid(2, 2), grid(3, 2, (0.2, 0.9))),
+            BOTH,
+            {},
+            r"'lower' lies 0.1 deep in the body 'upper' at \(0.5, 1\)",
+        ),
+        (joined(grid(2, 2), grid(1, 1, (0.2, 0.3), (0.1, 0.1))), BOTH, {}, "'upper' lies 0.3 deep in the body 'lower'"),
+    ],
+)
+def test_each_fault_has_its_sentence(comm, made, bodies, options, said):
+    x, cells, cell_sets, facet_sets = made
+    options, both = dict(options), np.arange(len(cells))
+    seam = np.concatenate([facet_sets["0 top"], facet_sets["1 bottom"]])
+    facet_sets = facet_sets | {"seam": seam, "middle": np.array([[3, 4], [4, 5]])}
+    with pytest.raises(ValueError, match=said):
+        check(comm, (x * options.pop("scale", 1.0), cells, {**cell_sets, "both": both}, facet_sets), bodies, **options)
+
+
+def test_bodies_may_lie_in_each_other_as_far_as_is_said():
+    made = joined(grid(2, 2), grid(3, 2, (0.0, 0.9)))
+    assert check(MPI.COMM_SELF, made, BOTH, overlap=0.1) == []
+
+
+def test_a_crack_is_warned_of():
+    """Two halves that share one side, and have two nodes each where one was meant."""
+    x, cells = grid(2, 2)
+    x, cells = np.concatenate([x, x[[1]]]), cells.copy()
+    cells[1, 0] = 9
+    (said,) = check(MPI.COMM_SELF, (x, cells, {"0": np.arange(4)}, {}), {"body": "0"})
+    assert said.startswith("the body 'body' has 1 pairs of nodes at the same place, as at (0.5, 0)")
+
+
+def disc(n, radius, m=2):
+    """Quadrilaterals of a ring of straight sides inside the ``radius``, or outside if ``m`` is negative."""
+    x, cells = grid(n, abs(m))
+    r, angle = radius * (0.5 + 0.5 * x[:, 1] if m > 0 else 2 - x[:, 1]), -np.pi * x[:, 0]
+    return np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1), cells
+
+
+def arcs(clearance):
+    x, cells, cell_sets, _ = joined(disc(20, 1.0), disc(20, 1.0 + clearance, -2))
+    tops = {f"{k} top": cells[found][-20:][:, [2, 3]] for k, found in cell_sets.items()}
+    return x, cells, cell_sets, tops
+
+
+PAIR = {"pairs": [("0 top", "1 top")]}
+
+
+def test_straight_sides_of_arcs_are_told_with_their_sagitta():
+    """pi/20 squared over 8 is 0.0031; with middle nodes on the circles there is none."""
+    bodies = {"pin": "0", "plate": "1"}
+    with pytest.raises(ValueError, match=r"a sagitta of 0.0031, too much for their clearance of 0.01"):
+        check(MPI.COMM_SELF, arcs(0.01), bodies, **PAIR)
+    assert check(MPI.COMM_SELF, arcs(0.1), bodies, **PAIR) == []
+    circles = [Circle("0 top", (0.0, 0.0), 1.0), Circle("1 top", (0.0, 0.0), 1.01)]
+    curved = refined(PlaneMesh.of_sets(*arcs(0.01), {}), order=2, circles=circles)
+    assert check_mesh(distribute(MPI.COMM_SELF, curved), bodies, **PAIR) == []
+
+
+def test_the_circle_of_points():
+    angle = np.linspace(0.2, 0.5, 7)
+    x = np.array([30.0, -4.0]) + 2.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    centre, radius = circle_through(x)
+    np.testing.assert_allclose([*centre, radius], [30, -4, 2], rtol=1e-9)
+    assert circle_through(x * [1, 2] + 0.1 * x**2) is None
+    assert circle_through(np.column_stack([angle, angle])) is None
+    assert circle_through(x[:3]) is None
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_cells_that_cannot_be_used(mirrored):
+    """Folded, flat or there twice; clockwise ones can be."""
+    x, cells = grid(2, 2)
+    x = x * [-1, 1] if mirrored else x
+    made = PlaneMesh.of_sets(x, cells, {}, {}, {})
+    assert faults(made) == []
+    x[4] = [0.9 * np.sign(x[5, 0]), -0.6]
+    assert faults(PlaneMesh.of_sets(x, cells, {}, {}, {}))[0].startswith("2 cells are folded or have no area")
+    x, cells = grid(2, 1)
+    twice = PlaneMesh.of_sets(x, np.concatenate([cells, cells[:1]]), {}, {}, {})
+    assert faults(twice)[0] == "1 cells are there twice, the first at (0.25, 0.5)"
+    third = np.concatenate([cells, [[1, 6, 4, 7]]])
+    crowded = PlaneMesh.of_sets(np.concatenate([x, [[2.0, 0], [2, 1]]]), third, {}, {}, {})
+    assert faults(crowded)[0] == "1 edges belong to more than two cells, the first at (0.5, 0.5): cells overlap"
+
+
+X, Y = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+
+
+def along(direction, *points):
+    return np.array(points, dtype=float), np.tile(direction, (len(points), 1))
+
+
+@pytest.mark.parametrize(
+    ("held", "free"),
+    [
+        ([], ["x", "y", "rotation"]),
+        ([along(X, (0, 5))], ["y", "rotation"]),
+        ([along(X, (7, 5), (7, 8))], ["y"]),
+        ([along(X, (7, 5)), along(Y, (7, 5))], ["rotation"]),
+        ([along(X, (7, 5)), along(Y, (7, 5), (8, 5))], []),
+    ],
+)
+def test_motions_that_nothing_holds(held, free):
+    assert free_motions({"body": held}) == {"body": free}
+
+
+def test_bodies_that_hold_each_other():
+    """A pin in a bushing may turn, a tied one not; what a chain hangs on holds all of it."""
+    angle = np.linspace(0, 6, 9)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    clamp = [along(X, (5, 0), (5, 1)), along(Y, (5, 0))]
+    held = {"pin": [], "bushing": [], "plate": clamp}
+    smooth = [("pin", "bushing", circle, circle), ("bushing", "plate", 2 * circle, circle)]
+    assert free_motions(held, smooth) == {"pin": ["rotation"], "bushing": ["rotation"], "plate": []}
+    tie = [("pin", "bushing", circle, np.tile(d, (9, 1))) for d in (X, Y)]
+    assert free_motions(held, [*smooth, *tie])["pin"] == ["rotation"]
+    assert free_motions(held | {"pin": [along(Y, (0, 0), (1, 0))]}, [*smooth, *tie])["bushing"] == []
+    loose = free_motions({"pin": [], "plate": clamp}, smooth[:0])
+    assert loose["pin"] == ["x", "y", "rotation"]
+
+
+@pytest.mark.mpi
+def test_checks_see_the_mesh_of_all_ranks(comm):
+    mesh = distribute(comm, PlaneMesh.of_sets(*TWO, {}) if comm.rank == 0 else None)
+    whole = gathered(mesh)
+    assert (whole is None) or len(whole.cells) == 10
