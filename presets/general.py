@@ -23,7 +23,7 @@ from archord.solver.timer import Timer
 
 _FEW_FACETS = 3
 _LARGE_STRAIN = 0.05  # PEEQ
-_SPURIOUS = 1e-4  # of the work, in the springs that hold floating bodies
+_SPURIOUS = 1e-4  # of the work or the energy, in the springs that hold floating bodies
 NEVER = "no surfaces ever touched: no load presses any of them together"
 
 
@@ -164,8 +164,9 @@ class GeneralAccount:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
         if m.force_balance > 1e-8:
             said.append(f"the forces on the whole do not balance: {m.force_balance:.1e} of the largest is left")
-        if (spurious := self.system.stabilisation_energy) > _SPURIOUS * abs(m.work):
-            said.append(f"springs that hold floating bodies do {spurious / abs(m.work):.1e} of the work")
+        total = max(abs(m.work), m.elastic_energy + m.plastic_dissipation)
+        if (spurious := self.system.stabilisation_energy) > _SPURIOUS * total:
+            said.append(f"springs that hold floating bodies do {spurious:.1e} of the work {total:.1e}")
         return said
 
     def ending(self, steps: Sequence[Record]) -> tuple[str, list[str]]:
