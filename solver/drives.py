@@ -65,8 +65,7 @@ class Drives:
         self.rate = np.concatenate([self.rate, anchors])
         self.applied = np.pad(self.applied, ((0, len(anchors)), (0, 0), (0, 0)))
         self.moving = np.append(np.isin(names, list(moves)), np.ones(len(anchors), dtype=bool))
-        self.unknown = np.append(np.flatnonzero(np.isin(names, unknown)), len(names) + np.arange(len(anchors)))
-        self.unknown = self.unknown.astype(int)
+        self.unknown = np.flatnonzero(np.append(np.isin(names, unknown), np.ones(len(anchors), dtype=bool)))
         for interface in contact.interfaces:
             disc, given = interface.surfaces[0], interface.interaction.surfaces[0]
             if isinstance(disc, RigidSurface) and isinstance(given, Rigid):
@@ -159,7 +158,10 @@ class Drives:
         entities = np.unique(sets.cells_in(cells) if cells else sets.facets_in(facets))
         tags = meshtags(mesh, 2 if cells else 1, entities.astype(np.int32), 1)
         rule = {"quadrature_degree": _LOAD_DEGREE}
-        return ufl.Measure("dx" if cells else "ds", mesh, subdomain_data=tags, metadata=rule)(1)
+        measure = ufl.Measure("dx" if cells else "ds", mesh, subdomain_data=tags, metadata=rule)(1)
+        if not self.integral(fem.Constant(mesh, 1.0) * measure):
+            raise ValueError(f"the facet set {facets!r} is not on the boundary of a body: nothing can load it")
+        return measure
 
     def integral(self, form: Any) -> float:
         """The ``form`` without arguments, over all ranks."""

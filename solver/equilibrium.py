@@ -130,7 +130,8 @@ class Equilibrium:
         Raises `ProjectionError` if a contact point finds no partner, and what `evaluate` raises."""
         self.u.x.array[: 2 * self.n_owned] = x.array_r[: 2 * self.n_owned]
         self.u.x.scatter_forward()
-        drives, lacking = self.drives, np.zeros(0)
+        drives = self.drives
+        lacking: Array = np.zeros(0)
         if self.border:
             self.levels[drives.unknown] = drives.weight * self.border.levels(x)
         self.u.x.array[self.fixed.ravel()] = self.levels @ self._rate_of_fixed

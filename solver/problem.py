@@ -156,8 +156,8 @@ class Problem:
             if len(set(names)) < len(names):
                 raise ValueError(f"{kind} must have different names, these are {', '.join(names)}")
         for load in self.loads:
-            if bool(load.cells) == bool(load.facets) or (load.pressure and load.cells):
-                raise ValueError("a load acts on the cells of a set or on its facets, a pressure on facets")
+            if bool(load.cells) == bool(load.facets) or (load.pressure and (load.cells or any(load.force))):
+                raise ValueError("a load is a force on the cells of a set or on its facets, or a pressure on facets")
         moves, loads, means = self.moving_drives(), {x.drive for x in self.loads}, [x.drive for x in self.means]
         known = [drive.name for drive in self.all_drives]
         for name in (*moves, *loads, *means):

@@ -108,27 +108,20 @@ class System:
         """The names of the problem's drives."""
         return self.equilibrium.drives.names
 
-    def drive_forces(self) -> Array:
-        """Force ``(d,)`` of each of the ``drive_names`` on the whole: its work is done on the drive's displacement."""
-        return self._of_drives(self.equilibrium.drives.moving)
-
-    def drive_displacements(self) -> Array:
-        """Displacement ``(d,)`` of each of the ``drive_names``: that of what it moves, or the mean one along loads."""
-        return self._of_drives(~self.equilibrium.drives.moving)
-
-    def _of_drives(self, conjugate: np.ndarray) -> Array:
-        """What is ``conjugate`` to the drives' levels, or else the levels."""
-        at = self.equilibrium
-        found = np.where(conjugate, self.problem.symmetry * at.conjugates(), at.levels)
-        return found[: len(self.drive_names)]
+    def driven(self) -> tuple[Array, Array]:
+        """Displacements and forces ``(d,)`` of the ``drive_names`` on the whole, which do the work: of what a drive
+        moves, or the mean displacement along its loads and their force."""
+        at, moving = self.equilibrium, self.equilibrium.drives.moving
+        conjugates, n = self.problem.symmetry * at.conjugates(), len(self.drive_names)
+        return np.where(moving, at.levels, conjugates)[:n], np.where(moving, conjugates, at.levels)[:n]
 
     def drive_force(self, name: str) -> float:
-        """`drive_forces` of the drive ``name``."""
-        return float(self.drive_forces()[self.drive_names.index(name)])
+        """Force of the drive ``name``."""
+        return float(self.driven()[1][self.drive_names.index(name)])
 
     def drive_displacement(self, name: str) -> float:
-        """`drive_displacements` of the drive ``name``."""
-        return float(self.drive_displacements()[self.drive_names.index(name)])
+        """Displacement of the drive ``name``."""
+        return float(self.driven()[0][self.drive_names.index(name)])
 
     @property
     def stabilisation_energy(self) -> float:

@@ -63,8 +63,8 @@ def test_a_moment_on_a_rigid_end_bends_a_bar_as_beams_bend(control):
         paths = {"x": (0, 0), "y": (0, 0), "turn": (0, moment)}
     supports = [*reference_point("end", "right"), *WALL]
     system = solve(bar(supports=supports, drives=drives(control, **paths)), [1.0])
-    np.testing.assert_allclose(system.drive_displacements(), [0, theta * LENGTH / 2, theta], rtol=1e-8, atol=1e-11)
-    np.testing.assert_allclose(system.drive_forces(), [0, 0, moment], rtol=1e-8, atol=1e-10 * E)
+    np.testing.assert_allclose(system.driven()[0], [0, theta * LENGTH / 2, theta], rtol=1e-8, atol=1e-11)
+    np.testing.assert_allclose(system.driven()[1], [0, 0, moment], rtol=1e-8, atol=1e-10 * E)
     for name, sign in (("end", 1), ("wall", -1)):
         np.testing.assert_allclose(system.reaction(name), 0, atol=1e-10 * E)
         assert system.reaction_moment(name, (7.0, 3.0)) == pytest.approx(sign * moment, rel=1e-7)
@@ -86,9 +86,9 @@ def test_forces_at_once_and_in_turn_add_up():
     u = sum(system.equilibrium.displacement() for system in single)
     for system in (together, in_turn):
         np.testing.assert_allclose(system.equilibrium.displacement(), u, rtol=0, atol=1e-9 * np.abs(u).max())
-    q = together.drive_displacements()
+    q = together.driven()[0]
     moved = loaded([1.0], "displacement", **{name: (0, level) for name, level in zip(NAMES, q, strict=True)})
-    np.testing.assert_allclose(moved.drive_forces(), force, rtol=1e-8)
+    np.testing.assert_allclose(moved.driven()[1], force, rtol=1e-8)
     np.testing.assert_allclose(moved.reaction("end"), force[:2], rtol=1e-8)
     assert moved.reaction_moment("end", END) == pytest.approx(force[2], rel=1e-7)
 
@@ -99,15 +99,15 @@ def test_a_mean_displacement_takes_the_force_that_gives_it():
     given = {name: (0, level) for name, level in zip(NAMES, q, strict=True)}
     means = coupling("tip", "right", point)
     prescribed = solve(bar(means=means, drives=drives("displacement", **given)), [1.0])
-    np.testing.assert_allclose(prescribed.drive_displacements(), q, rtol=1e-9)
-    force = prescribed.drive_forces()
+    np.testing.assert_allclose(prescribed.driven()[0], q, rtol=1e-9)
+    force = prescribed.driven()[1]
     np.testing.assert_allclose(prescribed.reaction("tip"), force[:2], rtol=1e-9)
     assert prescribed.reaction_moment("tip", point) == pytest.approx(force[2], rel=1e-8)
     np.testing.assert_allclose(prescribed.reaction("wall"), -force[:2], rtol=1e-7)
     assert prescribed.reaction_moment("wall", point) == pytest.approx(-force[2], rel=1e-7)
     forced = {name: (0, level) for name, level in zip(NAMES, force, strict=True)}
     pushed = solve(bar(means=means, drives=drives("force", **forced)), [1.0])
-    np.testing.assert_allclose(pushed.drive_displacements(), q, rtol=1e-7)
+    np.testing.assert_allclose(pushed.driven()[0], q, rtol=1e-7)
     u = pushed.equilibrium.displacement()
     np.testing.assert_allclose(u, prescribed.equilibrium.displacement(), rtol=0, atol=1e-8 * np.abs(u).max())
     assert pushed.energies()[0] == pytest.approx(force @ q / 2, rel=1e-7)
@@ -181,7 +181,7 @@ def test_drives_find_the_same_on_any_ranks(comm):
     for ranks in (MPI.COMM_SELF, comm):
         system = System(pressed(ranks))
         system.solve([0.5, 1.0])
-        found.append(np.append(system.drive_forces(), system.drive_displacements()))
+        found.append(np.concatenate(system.driven()))
         forces = [system.contact_force(name) for name in ("joint", "disc")]
         np.testing.assert_allclose(forces[1], forces[0] - system.reaction("shift"), atol=1e-9)
         np.testing.assert_allclose(system.reaction("base"), -forces[0], atol=1e-9)
@@ -207,8 +207,8 @@ def test_pressure_in_a_thick_cylinder_is_lames():
     r = np.linalg.norm(X, axis=1)
     found = (system.equilibrium.displacement() * X).sum(axis=1) / r
     np.testing.assert_allclose(found, u(r), rtol=2e-4)
-    assert system.drive_forces() == p
-    assert system.drive_displacements()[0] == pytest.approx(2 * np.pi * a * u(a), rel=1e-4)
+    assert system.driven()[1] == p
+    assert system.driven()[0][0] == pytest.approx(2 * np.pi * a * u(a), rel=1e-4)
     assert system.reaction("x")[1] == pytest.approx(-4 * p * a, rel=1e-4)
 
 

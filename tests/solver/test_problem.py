@@ -149,7 +149,7 @@ REFUSED = {
     "must move supports": {"supports": [Support("base", "base", 1, 1.0)], "loads": [Load("lower", (0.0, -1.0))]},
     "no drive 'up'": {"loads": [Load("lower", (0.0, -1.0), drive="up")]},
     "'up' moves nothing": {"drives": [Drive("up")]},
-    "on the cells of a set or on its facets": {"loads": [Load("lower", pressure=1.0)]},
+    "a force on the cells of a set or on its facets": {"loads": [Load("lower", pressure=1.0)]},
     "'joint' is tied": {"interactions": [Interaction("joint", ("upper bottom", "lower top"), "tied", overlap=0.1)]},
     "must say yields": {"bodies": [Body("lower", Stiffening(E, NU, "strain"))]},
 }
