@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from tempfile import TemporaryDirectory
-from types import ModuleType
 from typing import Any
 
 import basix
@@ -43,7 +42,7 @@ with suppress(TypeError, ValueError):  # a handler of another language, or not t
 
 def gmsh_to_mesh(
     comm: MPI.Comm,
-    build: Callable | ModuleType,
+    build: Callable,
     adjust: Callable[[Array, int], Array] | None = None,
     *,
     order: int = 2,
@@ -58,10 +57,8 @@ def gmsh_to_mesh(
     The cells are cut in four ``refinements`` times before they get nodes of higher order.
     ``adjust(x, tag)`` moves the nodes ``x`` ``(n, 2)`` of the physical curve ``tag``; without it, second-order edges
     are straight. An error on rank 0 is raised on every rank. The sets have the names of gmsh's physical groups.
-    ``partitioner`` replaces `sectors`. A mesh whose ``key`` says all that enters it is kept (`kept_mesh`).
-
-    ``build`` may be the module gmsh itself: then its current model on rank 0 is taken. A mesh that is there already
-    stays as it is, else the model is meshed, with edges that follow its curves.
+    ``partitioner`` replaces `sectors`. A mesh whose ``key`` says all that enters it is kept (`kept_mesh`). What has a
+    mesh already is taken by `read_mesh`.
     """
     made, failure = None, None
     if comm.rank == 0:
@@ -76,21 +73,32 @@ def gmsh_to_mesh(
 
 
 def _made(
-    build: Callable | ModuleType,
-    adjust: Callable[[Array, int], Array] | None,
-    order: int,
-    refinements: int,
-    quads: bool,
+    build: Callable, adjust: Callable[[Array, int], Array] | None, order: int, refinements: int, quads: bool
 ) -> PlaneMesh:
-    if isinstance(build, ModuleType):
-        return _meshed(build, adjust, order, refinements, quads, curved=True)
     with own_gmsh() as gmsh:
         for option in ("FromPoints", "FromCurvature", "ExtendFromBoundary"):
             gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
         for name, value in (("Mesh.Algorithm", 6), ("Mesh.HighOrderOptimize", 0)):
             gmsh.option.setNumber(name, value)
+        if quads:
+            gmsh.option.setNumber("Mesh.RecombineAll", 1)
+            gmsh.option.setNumber("Mesh.RecombinationAlgorithm", _ALL_QUADS)
         build(gmsh)
-        return _meshed(gmsh, adjust, order, refinements, quads, curved=False)
+        gmsh.model.mesh.generate(2)
+        for _ in range(refinements):
+            gmsh.model.mesh.refine()
+        if order > 2:
+            gmsh.model.mesh.setOrder(order)
+        mesh = PlaneMesh.from_gmsh(gmsh)
+        curves = {tag: gmsh.model.getPhysicalName(1, tag) or str(tag) for _, tag in gmsh.model.getPhysicalGroups(1)}
+    if order == 2:  # in much less time than gmsh's setOrder
+        mesh = mesh.second_order()
+    if adjust is not None:
+        for tag, name in curves.items():
+            nodes = np.unique(mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])])
+            mesh.x[nodes] = adjust(mesh.x[nodes], int(tag))
+        mesh.centre()
+    return mesh
 
 
 @contextmanager
@@ -118,31 +126,6 @@ def own_gmsh() -> Iterator[Any]:
                     gmsh.model.setCurrent(current)
                 else:
                     gmsh.finalize()  # or the next mesh would start from what is left of this one
-
-
-def _meshed(gmsh, adjust, order: int, refinements: int, quads: bool, curved: bool) -> PlaneMesh:
-    """The mesh of gmsh's current model, made if there is none; with edges along its curves if ``curved``."""
-    there = len(gmsh.model.mesh.getElementTypes(2)) > 0
-    if not there:
-        if quads:
-            gmsh.option.setNumber("Mesh.RecombineAll", 1)
-            gmsh.option.setNumber("Mesh.RecombinationAlgorithm", _ALL_QUADS)
-        gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 0)
-        gmsh.model.mesh.generate(2)
-        for _ in range(refinements):
-            gmsh.model.mesh.refine()
-        if order > 2 or curved:
-            gmsh.model.mesh.setOrder(order)
-    mesh = PlaneMesh.from_gmsh(gmsh)
-    if order == 2 and not there and not curved:  # in much less time than gmsh's setOrder
-        mesh = mesh.second_order()
-    if adjust is not None:
-        for _, tag in gmsh.model.getPhysicalGroups(1):
-            found = np.isin(mesh.tags, mesh.facet_sets[gmsh.model.getPhysicalName(1, tag) or str(tag)])
-            nodes = np.unique(mesh.edges[found])
-            mesh.x[nodes] = adjust(mesh.x[nodes], int(tag))
-        mesh.centre()
-    return mesh
 
 
 def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None, cut: Cut | None = None) -> TaggedMesh:

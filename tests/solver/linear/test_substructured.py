@@ -1,7 +1,11 @@
 """Each rank eliminates its own unknowns: the same solutions as with the whole matrix."""
 
+import basix.ufl
 import numpy as np
 import pytest
+from basix import LagrangeVariant
+from dolfinx import fem
+from dolfinx.mesh import CellType, create_unit_square
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -140,6 +144,25 @@ def test_corners_are_those_of_the_edge_or_triangle(degree):
     on_edge = [np.abs((1 - w) * ends[:, 0] + w * ends[:, k] - x).max(axis=1) for w in weights for k in (1, 2)]
     off = np.minimum.reduce([*on_edge, np.abs(ends.mean(axis=1) - x).max(axis=1)])
     assert (off[~alone] <= 0.05 * size[~alone]).all()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("degree", [2, 3])
+def test_corners_of_quads(degree):
+    """As those of triangles: a node is the mean of its corners, or at a third between two (straight cells)."""
+    equispaced = {"lagrange_variant": LagrangeVariant.equispaced, "shape": (2,)}
+    element = basix.ufl.element("P", "quadrilateral", degree, **equispaced)
+    V = fem.functionspace(create_unit_square(MPI.COMM_WORLD, 4, 3, CellType.quadrilateral), element)
+    index_map, here = V.dofmap.index_map, np.zeros((V.dofmap.index_map.size_global, 2))
+    own = slice(*index_map.local_range)
+    here[own] = V.tabulate_dof_coordinates()[: index_map.size_local, :2]
+    MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, here)
+    x, ends = here[own], here[corners(V)]
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    share = (x - low) / np.where(high > low + 1e-9, high - low, 1.0)
+    assert np.abs(share * degree - np.round(share * degree)).max() < 1e-12
+    inside = (share > 1e-9) & (share < 1 - 1e-9)
+    np.testing.assert_array_equal(inside, high > low + 1e-9)
 
 
 def grid(n):
