@@ -84,7 +84,7 @@ def _mesh(scene: Scene, comm: MPI.Comm, partitioner) -> TaggedMesh:
     if g.is_ring:
         return half_ring(comm, *sizes, scene.load.core_radius * g.radius, **options)
     edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
-    return quarter_joint(comm, *sizes, edge=edge, rigid_pin=scene.pin.rigid, **options)
+    return quarter_joint(comm, *sizes, edge=edge, rigid_pin=scene.pin.rigid, whole_pin=scene.pin.whole, **options)
 
 
 def _coarser(scene: Scene) -> Scene:

@@ -13,6 +13,7 @@ from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.read import read_mesh, tagged
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.bushing import bushing
 from archord.geometry.shapes.lug import lug
 from archord.materials.material import Array
 from archord.scene import parts
@@ -20,7 +21,7 @@ from archord.scene.errors import InputError
 from archord.scene.problem import LIVE, ProblemScene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
 
-_SHAPES = {"lug": lug}
+_SHAPES: dict[str, Callable[..., TaggedMesh]] = {"lug": lug, "bushing": bushing}
 _AXES = {"x": 0, "y": 1, "rotation": 2}
 
 
@@ -47,7 +48,7 @@ def scene_mesh(scene: ProblemScene, comm: MPI.Comm, partitioner=None) -> TaggedM
     """The mesh of ``scene``. Collective; raises ValueError."""
     mesh = scene.mesh
     if mesh.shape is not None:
-        shape = dict(mesh.shape)
+        shape = mesh.shape.arguments()
         return _SHAPES[shape.pop("kind")](comm, degree=scene.analysis.degree, partitioner=partitioner, **shape)
     source = LIVE.get(mesh.file or "", mesh.file)
     circles = [Circle(circle.facets, (circle.centre[0], circle.centre[1]), circle.radius) for circle in mesh.circle]

@@ -13,6 +13,7 @@ from archord.scene.faults import shortened
 from archord.scene.problem import ProblemScene, is_problem
 from archord.scene.scene import CHOSEN, Scene
 from archord.scene.sections import LOADS
+from archord.scene.shapes import PRESETS, expand
 
 ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
@@ -35,7 +36,8 @@ def parse_scene(data: dict[str, Any], source: str = "scene", origin: Mapping[str
 
 
 def parse_any(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> AnyScene:
-    """As `parse_scene`, of a joint or a general scene."""
+    """As `parse_scene`, of a joint, a general scene or a preset that stands for one."""
+    data, origin = expand(data, source, origin), None if {*PRESETS} & {*data} else origin
     scene: Any = ProblemScene if is_problem(data) else Scene
     return scene(source, origin, **data)
 

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from archord.scene.keys import LINE, Positive, Section, key, require
 from archord.scene.sections import Modelling, NotNegative, Solid, Steps, Targets
+from archord.scene.shapes import Bushing, Lug
 
 Point = Annotated[list[float], Field(min_length=2, max_length=2)]
 Freedom = Literal["x", "y", "rotation"]
@@ -48,7 +49,7 @@ class Mesh(Section):
     )
     refine: int = key("how often every cell is cut in four", default=0, ge=0, le=6)
     circle: list[Circle] = Field(default_factory=list, description="circles that facet sets lie on")
-    shape: dict[str, Any] | None = Field(
+    shape: Annotated[Lug | Bushing, Field(discriminator="kind")] | None = Field(
         None, description="the shape of a preset, as `archord scene --expand` prints it"
     )
 

@@ -11,6 +11,7 @@ from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
 from archord.scene.problem import ProblemScene
 from archord.scene.scene import FORMAT, Scene
+from archord.scene.shapes import PRESETS, Preset
 
 _GENERAL: dict[str, Any] = {}
 for _name, _info in ProblemScene.model_fields.items():
@@ -19,6 +20,12 @@ for _name, _info in ProblemScene.model_fields.items():
     if _name == "mesh":
         _GENERAL["mesh.circle"] = Mesh.model_fields["circle"]
 _SECTIONS: dict[str, Any] = {name: info for name, info in Scene.model_fields.items() if name != "format"}
+_PRESETS = {
+    name: info
+    for scene in PRESETS.values()
+    for name, info in scene.model_fields.items()
+    if name not in Preset.model_fields
+} | {"load": Preset.model_fields["load"]}
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 _KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false", "array": "list"}
 
@@ -54,6 +61,11 @@ def reference() -> str:
         "The sections units, stepping and output are those of joints. Headings in double brackets may stand any number "
         "of times.\n",
         *_tables(_GENERAL, {name: _SECTIONS[name] for name in ("units", "analysis", "stepping", "output")}),
+        "# Presets\n",
+        "A scene with `[lug]` (and `[plate]`) or `[bushing]` (and `[[sleeve]]`, `[housing]`) stands for a general one, "
+        "which `archord scene --expand` prints. The section pin is that of joints, plate, sleeves and housing have "
+        "materials like it, and the other sections are those of general scenes.\n",
+        *_tables(_PRESETS, dict.fromkeys(("plate", "sleeve", "housing"), _SECTIONS["block"])),
     ]
     return "\n".join(parts)
 

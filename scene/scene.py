@@ -91,6 +91,7 @@ class Scene(Checked):
             said = 'does not load a joint whose model is "ring"; give force or relative_force'
             require(self.force_controlled, load, said)
             require(not pin.rigid, "pin.rigid", 'must be false where joint.model is "ring"')
+            require(not pin.whole, "pin.whole", 'is for joint.model = "block": the pin of a ring is whole anyway')
         scale = self.E_star * self.thickness if self.force_controlled else 1.0
         largest, most = max(map(abs, self.targets)), 0.5 * scale * joint.radius
         what = "E* R" if self.force_controlled else "the radius"

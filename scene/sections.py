@@ -126,11 +126,12 @@ class Pin(Solid):
     E: Positive | None = key(_E, "stress", default=None, example=210000.0)  # type: ignore[assignment]
     nu: Ratio | None = key(_NU, default=None, example=0.3)  # type: ignore[assignment]
     rigid: bool = key("a rigid pin: no mesh, no other key", default=False, other=True)
+    whole: bool = key("model the unloaded half behind the pressed diameter, too", default=False, other=True)
 
     @model_validator(mode="after")
     def _rigid_or_solid(self) -> Pin:
         # a table brings the yield stress
-        for name in ("material", "hardening", "yield_stress", "back_stresses", "E", "nu"):
+        for name in ("material", "hardening", "yield_stress", "back_stresses", "E", "nu", "whole"):
             given = name in self.model_fields_set and getattr(self, name)
             require(not (self.rigid and given), name, "is not for a rigid pin")
         for name in ("E", "nu"):

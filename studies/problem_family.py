@@ -31,8 +31,8 @@ class ProblemFamily:
         changes: dict[str, Any] = {"refine": self.scene.mesh.refine + level}
         if self.shape is not None:
             factor = _COARSEST / self.ratio**level
-            sizes = {name: float(f"{factor * self.shape[name]:.4g}") for name in ("element_size", "growth")}
-            changes = {"shape": self.shape | sizes}
+            size, growth = (float(f"{factor * value:.4g}") for value in (self.shape.h, self.shape.growth))
+            changes = {"shape": self.shape.model_copy(update={"element_size": size, "growth": growth})}
         length, stepping = 1 / substeps, self.scene.stepping.model_dump()
         stepping |= {"initial": length, "maximum": length, "minimum": min(stepping["minimum"], length)}
         sections = {
@@ -44,9 +44,8 @@ class ProblemFamily:
 
     def sizes(self, scene: Any) -> tuple[float, float]:
         """Element size and growth of ``scene``; of a file, the size over that of its own cells."""
-        if scene.mesh.shape is None:
-            return 0.5**scene.mesh.refine, 0.0
-        return scene.mesh.shape["element_size"], scene.mesh.shape["growth"]
+        shape = scene.mesh.shape
+        return (0.5**scene.mesh.refine, 0.0) if shape is None else (shape.h, shape.growth)
 
     def curve(self, steps: Sequence[Record]) -> list[float]:
         """The force of the last load at every step, or its displacement where it is a force."""

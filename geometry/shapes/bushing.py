@@ -22,9 +22,7 @@ _THIN = 4.0  # walls of fewer elements are cut into a grid
 def bushing(
     comm: MPI.Comm,
     radius: float,
-    sleeves: Sequence[Sequence[float]],
-    bore: float,
-    outer_radius: float,
+    rings: Sequence[Sequence[float]],
     element_size: float,
     growth: float,
     *,
@@ -34,12 +32,12 @@ def bushing(
 ) -> TaggedMesh:
     """Mesh the bodies "pin", "sleeve 1", ... and "housing", with ``options`` as for `mesh_joint`.
 
-    ``sleeves`` are the inner and outer radii from the pin outward. Lengths share one unit. All arcs are cut into equal
-    angles, of elements ``element_size`` long on the pin, shorter if walls are thin; away from the arcs they grow by
-    ``growth`` per unit of distance. Sets: "pin", "flat" (the pin's line across the axis, see `lug`), "sleeve 1 inside",
-    "sleeve 1 outside", ..., "bore", "outer edge" and "axis" (y = 0).
+    ``rings`` are the inner and outer radii of sleeves and housing, from the pin outward. Lengths share one unit. All
+    arcs are cut into equal angles, of elements ``element_size`` long on the pin, shorter if walls are thin; away from
+    the arcs they grow by ``growth`` per unit of distance. Sets: "pin", "flat" (the pin's line across the axis, see
+    `lug`), "sleeve 1 inside", "sleeve 1 outside", ..., "bore", "outer edge" and "axis" (y = 0).
     """
-    rings = [(inner / radius, outer / radius) for inner, outer in [*sleeves, (bore, outer_radius)]]
+    rings = [(inner / radius, outer / radius) for inner, outer in rings]
     size = min(element_size / radius, *(_SLENDER / _LAYERS * (outer - inner) for inner, outer in rings))
     within = [1.0, *(outer for _, outer in rings)]
     gaps = [touching * max(inner - r, 0.0) for (inner, _), r in zip(rings, within, strict=False)]

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from enum import IntEnum
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Literal, NamedTuple
@@ -16,30 +15,6 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-
-
-class _Set(IntEnum):
-    @property
-    def set_name(self) -> str:
-        """Name in a problem: "pin" and "block", and of facets "pin" and "hole" (the arcs), "pin top", ..."""
-        return self.name.removesuffix("_ARC").replace("_", " ").lower()
-
-
-class Cells(_Set):
-    """Cell tags: the two bodies."""
-
-    PIN = 1
-    BLOCK = 2
-
-
-class Facets(_Set):
-    """Facet tags of the edges that carry a condition; other edges are free."""
-
-    PIN_ARC = 1
-    HOLE_ARC = 2
-    PIN_TOP = 3  # where the quarter joint is pressed
-    BLOCK_HELD = 4
-    SYMMETRY = 5
 
 
 class Drawing(NamedTuple):

@@ -1,6 +1,7 @@
 """A straight lug: a plate with a hole near its end, a clamp at the other, and a pin that pulls at it in +x.
 
-The hole's centre is the origin. The pin's centre is (dR, 0), so pin and hole touch at (R + dR, 0). The plate reaches
+The hole's centre is the origin. The pin's centre is (dR, 0), so pin and hole touch at (R + dR, 0); for an interference
+both are drawn into each other around the origin. The plate reaches
 from the clamp x = -length to the apex x = edge distance of its end, and from y = -width/2 to width/2.
 """
 
@@ -44,7 +45,7 @@ def lug(
     The point set "centre" is the pin's centre.
     """
     hole, side, tip, back = (v / radius for v in (radius + clearance, width / 2, edge_distance, length))
-    size, x = min(element_size / radius, (min(side, tip) - hole) / _ACROSS), hole - 1
+    size, x = min(element_size / radius, (min(side, tip) - hole) / _ACROSS), max(hole - 1, 0.0)
     round_end = end == "round"
 
     def draw(geo) -> Drawing:

@@ -5,8 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.interpolation import Interpolation
-from archord.geometry.shapes.joint_mesh import Cells
 from archord.geometry.shapes.quarter_joint import quarter_joint
+from tests.geometry.shapes.measures import Cells
 
 
 def nodes_of(mesh, cells):

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.fenicsx import create_vector, gmsh_to_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Cells, on_circle
+from archord.geometry.shapes.joint_mesh import on_circle
 from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
@@ -28,6 +28,7 @@ from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Problem
 from archord.solver.stepping import StepRules
 from archord.solver.system import System
+from tests.geometry.shapes.measures import Cells
 
 E, NU = 1.82, 0.3
 YIELD_STRESS = 0.01

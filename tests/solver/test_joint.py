@@ -133,6 +133,13 @@ def test_a_very_stiff_pin_is_a_rigid_pin():
     assert pytest.approx(stiff, rel=1e-4) == rigid.steps[-1].P
 
 
+def test_a_whole_pin_is_a_little_stiffer_than_its_half():
+    """What lies behind the pressed diameter, kept straight, only hinders it from widening; forces balance as before."""
+    half, whole = (solve(scene(0.12, 2, pin=pin)).steps[-1] for pin in ({}, {"whole": True}))
+    assert 1.0 < whole.P / half.P < 1.02
+    assert whole.force_balance < 1e-8
+
+
 def test_like_bodies_share_pin_and_hole_swapped():
     """An elastic body with a yield stress out of reach is elastic."""
     elastic = solve(scene(0.08, 2)).steps[-1]

@@ -6,8 +6,8 @@ from dolfinx.mesh import entities_to_geometry
 
 from archord.geometry.meshes.fenicsx import sectors
 from archord.geometry.shapes.half_ring import half_ring
-from archord.geometry.shapes.joint_mesh import Facets
 from archord.geometry.shapes.quarter_joint import quarter_joint
+from tests.geometry.shapes.measures import Facets
 
 
 @pytest.mark.parametrize("n_parts", [1, 2, 3, 64])

@@ -2,11 +2,30 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
+
 import numpy as np
 from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
+
+
+class Cells(IntEnum):
+    """Numbers of the bodies of a quarter joint and a half ring."""
+
+    PIN = 1
+    BLOCK = 2
+
+
+class Facets(IntEnum):
+    """Numbers of their facet sets, "pin", "hole", "pin top", "block held" and "symmetry"."""
+
+    PIN_ARC = 1
+    HOLE_ARC = 2
+    PIN_TOP = 3
+    BLOCK_HELD = 4
+    SYMMETRY = 5
 
 
 def area(joint, body, comm=MPI.COMM_SELF):

@@ -17,8 +17,8 @@ WALLS = [(10.02, 10.22), (10.22, 10.42)]  # of 0.02 R
 
 
 def made(sleeves=(SLEEVE,), bore=BORE, outer=OUTER, size=1.0, comm=MPI.COMM_SELF, scale=1.0, **options):
-    rings = [[scale * r for r in sleeve] for sleeve in sleeves]
-    return bushing(comm, scale * R, rings, scale * bore, scale * outer, scale * size, 0.3, **options)
+    rings = [[scale * r for r in ring] for ring in [*sleeves, (bore, outer)]]
+    return bushing(comm, scale * R, rings, scale * size, 0.3, **options)
 
 
 @pytest.mark.mpi

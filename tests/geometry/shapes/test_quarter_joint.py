@@ -9,9 +9,9 @@ from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
 from archord.geometry.shapes.half_ring import half_ring
-from archord.geometry.shapes.joint_mesh import Cells, Facets
 from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.scene.geometry import JointGeometry
+from tests.geometry.shapes.measures import Cells, Facets
 
 R, DR, W = 1.0, 0.005, 10.0
 SIZE, GROWTH = 0.2, 0.4
@@ -131,6 +131,18 @@ def test_a_rigid_pin_is_not_meshed(joint):
     assert set(rigid.cells.values) == {Cells.BLOCK}
     assert set(rigid.facets.values) == {Facets.HOLE_ARC, Facets.BLOCK_HELD, Facets.SYMMETRY}
     assert area(rigid, Cells.BLOCK) == pytest.approx(area(joint, Cells.BLOCK), rel=1e-12)
+
+
+def test_a_whole_pin_has_a_free_half_above(joint):
+    """The pressed line lies inside of it then; block and arcs in contact stay where they are."""
+    whole = made(whole_pin=True)
+    assert area(whole, Cells.PIN) == pytest.approx(2 * area(joint, Cells.PIN), rel=1e-9)
+    assert area(whole, Cells.BLOCK) == pytest.approx(area(joint, Cells.BLOCK), rel=1e-12)
+    for tag in (Facets.PIN_ARC, Facets.HOLE_ARC, Facets.PIN_TOP, Facets.BLOCK_HELD):
+        assert edge_lengths(whole, tag).sum() == pytest.approx(edge_lengths(joint, tag).sum(), rel=1e-12)
+    x = facet_nodes(whole, whole.facet_sets["pin back"][0]) - [0, -DR]
+    np.testing.assert_allclose(np.linalg.norm(x, axis=-1), R, rtol=1e-15)
+    assert x[..., 1].min() > -1e-15
 
 
 def test_tagged_edges_are_where_their_names_say(joint):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from archord.geometry.shapes.joint_mesh import Cells
+from tests.geometry.shapes.measures import Cells
 from tests.solver.parts import DR, ELASTIC, PERFECT, R, commit, contact_force, coordinates, joint_parts, nodes_of
 
 every_kinematics = pytest.mark.parametrize("kinematics", ["current", "reference", "tied"])

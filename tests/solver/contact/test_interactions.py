@@ -7,13 +7,13 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
-from archord.geometry.shapes.joint_mesh import Facets
 from archord.materials.elasticity import contact_modulus
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface
 from archord.solver.contact.law import ContactLaw
 from archord.solver.contact.surface import RigidSurface, Surface
 from archord.solver.problem import Body, Interaction, Problem, Support
+from tests.geometry.shapes.measures import Facets
 from tests.solver.contact.test_tangent import matrix
 from tests.solver.parts import DR, ELASTIC, NU, E, R, blocks, contact_force, coordinates, joint_parts, solve
 

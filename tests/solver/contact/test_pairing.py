@@ -9,7 +9,7 @@ import pytest
 
 from archord.geometry import curve as curve_module
 from archord.geometry.curve import Curve, ProjectionError
-from archord.geometry.shapes.joint_mesh import Cells
+from tests.geometry.shapes.measures import Cells
 from tests.solver.parts import DR, contact_force, interact, joint_parts, n_nodes, nodes_of
 
 

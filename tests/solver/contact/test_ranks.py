@@ -8,7 +8,7 @@ from mpi4py import MPI
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from archord.geometry.shapes.joint_mesh import Cells
+from tests.geometry.shapes.measures import Cells
 from tests.solver.parts import (
     DR,
     ELASTIC,

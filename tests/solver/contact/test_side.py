@@ -11,8 +11,8 @@ from dolfinx.mesh import compute_midpoints, create_mesh, exterior_facet_indices
 from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, strain
-from archord.geometry.shapes.joint_mesh import Facets
 from archord.solver.contact.surface import Surface, _pieces, neighbours
+from tests.geometry.shapes.measures import Facets
 from tests.solver.parts import DR, ELASTIC, PERFECT, PLANE_STRESS, R, coordinates, joint_parts, space
 
 SIDES = {"pin": (0, R, np.array([0.0, -DR])), "hole": (1, R + DR, np.array([0.0, 0.0]))}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from archord.geometry.shapes.joint_mesh import Cells
 from archord.solver.contact.tangent import trial_rate
+from tests.geometry.shapes.measures import Cells
 from tests.solver.parts import (
     DR,
     ELASTIC,

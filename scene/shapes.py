@@ -1,0 +1,228 @@
+"""Presets: a lug, and a pin in sleeves, in a few words; what general scene they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from archord.scene.keys import Positive, Section, key, require
+from archord.scene.scene import Checked
+from archord.scene.sections import Modelling, Output, Pin, Solid, Stepping, Steps, Targets, Units
+
+_THINNEST, _DEEPEST, _FARTHEST = 0.02, 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
+PinPart = Literal["half", "whole", "none"]
+
+
+class Shape(Section):
+    """A shape around a pin, and how finely it is meshed."""
+
+    radius: Positive = key("radius R of the pin", "length", example=10.0)
+    element_size: Positive | None = key(
+        "edge length of the elements on the arcs, 1e-3 to 0.5 R; 0.04 R if absent", "length", default=None, other=0.4
+    )
+    growth: float = key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
+    pin: PinPart = key("part of the pin that is meshed; [pin] says it in a preset", default="half", other="whole")
+
+    @model_validator(mode="after")
+    def _mesh(self):
+        require(1e-3 <= self.h / self.radius <= 0.5, "element_size", "must be between 1e-3 and 0.5 times the radius")
+        return self
+
+    @property
+    def h(self) -> float:
+        """Element size on the arcs."""
+        return self.element_size or 0.04 * self.radius
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws it: lengths, and what is drawn."""
+        return self.model_dump() | {"element_size": self.h}
+
+
+class Lug(Shape):
+    """A straight lug, clamped at one end, and its pin, which pulls at the other."""
+
+    clearance: float = key("hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1)
+    width: Positive = key("width W", "length", example=40.0)
+    edge_distance: Positive | None = key(
+        "from the hole's centre to the loaded end; W/2 if absent", "length", default=None, example=20.0
+    )
+    length: Positive | None = key("from the hole's centre to the clamp; 1.5 W if absent", "length", default=None)
+    end: Literal["round", "square"] = key("the loaded end: an arc of radius W/2, or straight", default="round")
+    half: bool = key("model the half y >= 0 alone", default=True)
+    kind: Literal["lug"] = "lug"
+
+    @model_validator(mode="after")
+    def _lug(self) -> Lug:
+        a, R = self.arguments(), self.radius
+        hole, said = R + self.clearance, f"must leave a ligament of at least {_THINNEST:g} R"
+        between = f"must be between {-_DEEPEST:g} and 0.5 times the radius"
+        require(-_DEEPEST <= self.clearance / R <= 0.5, "clearance", between)
+        require(self.width / 2 - hole >= _THINNEST * R, "width", f"{said} beside the hole")
+        require(a["edge_distance"] - hole >= _THINNEST * R, "edge_distance", f"{said} before the hole")
+        behind = max(hole, self.width / 2 - a["edge_distance"])
+        require(a["length"] - behind >= _THINNEST * R, "length", f"{said} behind the hole and the end's arc")
+        for name in ("width", "edge_distance", "length"):
+            require(a[name] <= _FARTHEST * R, name, f"must not exceed {_FARTHEST:g} R")
+        return self
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws it: lengths, and what is drawn."""
+        lengths = {"edge_distance": self.edge_distance or self.width / 2, "length": self.length or 1.5 * self.width}
+        return super().arguments() | lengths
+
+
+class Bushing(Shape):
+    """A pin in sleeves in a housing that is held at its outer edge."""
+
+    rings: list[Annotated[list[Positive], Field(min_length=2, max_length=2)]] = key(
+        "inner and outer radii from the pin outward; [[sleeve]] and [housing] say them in a preset",
+        "length",
+        default=[],
+        other=[[10.05, 14.0], [13.98, 30.0]],
+    )
+    touching: bool = key("bodies with clearance touch on the load axis at first, or are concentric", default=False)
+    kind: Literal["bushing"] = "bushing"
+
+    @model_validator(mode="after")
+    def _bushing(self) -> Bushing:
+        self.check(self.rings, ["rings"] * len(self.rings))
+        return self
+
+    def check(self, rings: list[list[float]], names: list[str]) -> None:
+        """Raise ValueError, of the keys ``names``, for ``rings`` that do not fit."""
+        R, edge = self.radius, self.radius
+        fits = f"must not overlap what is inside by more than {_DEEPEST:g} of its radius, nor be wider by more than 0.5"
+        for name, (inner, outer) in zip(names, rings, strict=True):
+            require(outer - inner >= _THINNEST * R, name, f"must have a wall of at least {_THINNEST:g} R")
+            require(outer <= _FARTHEST * R, name, f"must not exceed {_FARTHEST:g} R")
+            require(-_DEEPEST <= inner / edge - 1 <= 0.5, name, fits)
+            edge = outer
+
+
+class Ring(Solid):
+    """A sleeve or the housing; with a bore smaller than what is inside they are pressed together."""
+
+    bore: Positive = key("inner radius", "length", example=10.05)
+    outer: Positive = key("outer radius", "length", example=14.0)
+
+
+class PinLoad(Section):
+    """How the pin is moved in +x: by its diameter across the axis, or as a rigid disc."""
+
+    displacement: Targets | None = key("displacement of the pin", "length", default=None, example=0.1)
+    force: Targets | None = key("force on the whole pin, instead", "force", default=None, other=1000.0)
+    steps: Steps | Annotated[list[Steps], Field(min_length=1)] = key("output steps up to each target", default=20)
+
+    @model_validator(mode="after")
+    def _one_load(self) -> PinLoad:
+        none, both = self.displacement is None and self.force is None, None not in (self.displacement, self.force)
+        require(not none, "displacement", "is missing (or force)")
+        require(not both, "displacement", "must not be given together with force")
+        return self
+
+
+class Preset(Checked):
+    """What the scenes of presets share."""
+
+    newest: ClassVar[int] = 2
+    format: Literal[2] = key("version of the scene format", default=2)
+    units: Units = Field(default_factory=Units, description="names of the units")
+    pin: Pin = Field(description="material of the pin")
+    load: PinLoad = Field(description="loading")
+    analysis: Modelling = Field(default_factory=Modelling, description="model and solver")
+    stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
+    output: Output = Field(default_factory=Output, description="what is written")
+
+    def _require_whole(self, name: str, inner: float, outer: float) -> None:
+        whole = self.pin.whole or self.pin.rigid or inner <= outer
+        require(whole, name, "needs pin.whole = true, as half a pin cannot be pressed in")
+
+    def _general(
+        self, shape: Shape, solids: Mapping[str, Solid], held: str, surfaces: list[str], radii: list[float]
+    ) -> dict[str, Any]:
+        """The general scene of ``solids`` with the edge ``held``; ``surfaces`` and their ``radii`` go from the pin
+        outward, the first faces the second, the third the fourth, ..."""
+        half, touching = (getattr(shape, name, True) for name in ("half", "touching"))
+        rigid, gaps = self.pin.rigid, [outer - inner for inner, outer in zip(radii[::2], radii[1::2], strict=True)]
+        said = self.model_dump(exclude_none=True, include={"units", "analysis", "stepping", "output"})
+        bodies, material = solids if rigid else {"pin": self.pin, **solids}, {*Solid.model_fields}
+        contacts: list[dict[str, Any]] = [
+            {"name": f"{a} in {b}", "surfaces": [inner, outer], "overlap": max(-gap, 0.0)}
+            for (a, b), inner, outer, gap in zip(
+                pairwise(["pin", *solids]), surfaces[::2], surfaces[1::2], gaps, strict=True
+            )
+        ]
+        if rigid:
+            disc = {"centre": [touching * sum(max(gap, 0.0) for gap in gaps), 0.0], "radius": shape.radius}
+            contacts[0] |= {"surfaces": [surfaces[1]], "rigid": disc}
+        supports = [{"name": held, "on": held, "fixed": ["x", "y"]}]
+        if half or not rigid:
+            supports.append({"name": "axis", "on": "axis" if half else "centre", "fixed": ["y"]})
+        part = "none" if rigid else "whole" if self.pin.whole else "half"
+        load = {"name": "pull", "on": contacts[0]["name"] if rigid else "flat", "direction": "x"}
+        return said | {
+            "format": 2,
+            "analysis": said["analysis"] | {"symmetry": 2 if half else 1},
+            "mesh": {"shape": shape.arguments() | {"pin": part}},
+            "body": [{"name": n} | s.model_dump(exclude_none=True, include=material) for n, s in bodies.items()],
+            "interaction": contacts,
+            "support": supports,
+            "load": [load | self.load.model_dump(exclude_none=True, exclude={"steps"})],
+            "path": {"steps": self.load.steps},
+        }
+
+
+class LugScene(Preset):
+    """A lug and its pin."""
+
+    lug: Lug = Field(description="geometry and mesh")
+    plate: Solid = Field(description="material of the lug")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> LugScene:
+        self._require_whole("lug.clearance", 0.0, self.lug.clearance)
+        return self
+
+    def general(self) -> dict[str, Any]:
+        """The general scene that it stands for."""
+        radii = [self.lug.radius, self.lug.radius + self.lug.clearance]
+        return self._general(self.lug, {"lug": self.plate}, "clamp", ["pin", "hole"], radii)
+
+
+class BushingScene(Preset):
+    """A pin, sleeves around it and a housing; they touch on the load axis at first if the load is a force."""
+
+    bushing: Bushing = Field(description="radius of the pin, and mesh")
+    sleeve: list[Ring] = Field(default_factory=list, description="sleeves from the pin outward")
+    housing: Ring = Field(description="geometry and material of the housing")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> BushingScene:
+        names = ["sleeve"] * len(self.sleeve) + ["housing"]
+        self.bushing.check(self._rings(), names)
+        self._require_whole(names[0], self.bushing.radius, self._rings()[0][0])
+        return self
+
+    def _rings(self) -> list[list[float]]:
+        return [[ring.bore, ring.outer] for ring in (*self.sleeve, self.housing)]
+
+    def general(self) -> dict[str, Any]:
+        """The general scene that it stands for."""
+        solids: dict[str, Solid] = {f"sleeve {k}": sleeve for k, sleeve in enumerate(self.sleeve, 1)}
+        surfaces = ["pin", *(f"{name} {side}" for name in solids for side in ("inside", "outside")), "bore"]
+        shape = self.bushing.model_copy(update={"rings": self._rings(), "touching": self.load.force is not None})
+        radii = [shape.radius, *(r for ring in shape.rings for r in ring)][:-1]
+        return self._general(shape, solids | {"housing": self.housing}, "outer edge", surfaces, radii)
+
+
+PRESETS: dict[str, type[LugScene] | type[BushingScene]] = {"lug": LugScene, "bushing": BushingScene}
+
+
+def expand(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """The general scene that a preset's ``data`` stand for; those of another scene unchanged. Raises `InputError`."""
+    name = next((name for name in PRESETS if name in data), None)
+    scene: Any = PRESETS.get(str(name))
+    return data if scene is None else scene(source, origin, **data).general()

@@ -1,0 +1,161 @@
+"""Presets: what general scenes they stand for, and what is refused and how it is said."""
+
+import copy
+import tomllib
+
+import pytest
+from mpi4py import MPI
+
+from archord.presets.problem import general_problem
+from archord.scene.errors import InputError
+from archord.scene.file import parse_any, resolved
+from archord.scene.problem import ProblemScene
+from archord.solver.system import System
+
+STEEL = {"E": 210000.0, "nu": 0.3}
+LUG = {
+    "lug": {"radius": 9.9, "clearance": 0.1, "width": 40.0, "length": 60.0},
+    "pin": STEEL,
+    "plate": STEEL,
+    "load": {"displacement": 0.3, "steps": 15},
+}
+BUSHING = {
+    "bushing": {"radius": 10.0},
+    "pin": STEEL,
+    "sleeve": [{"bore": 10.05, "outer": 14.0, "E": 110000.0, "nu": 0.34}],
+    "housing": {"bore": 13.98, "outer": 30.0, "E": 70000.0, "nu": 0.33},
+    "load": {"displacement": [0.05, 0.2], "steps": [1, 3]},
+}
+
+
+def changed(data: dict, place: str, value) -> dict:
+    data = copy.deepcopy(data)
+    *path, last = place.split(".")
+    table = data
+    for part in path:
+        table = table[int(part)] if isinstance(table, list) else table[part]
+    if value is None:
+        table.pop(last)
+    else:
+        table[last] = value
+    return data
+
+
+@pytest.mark.parametrize("data", [LUG, BUSHING], ids=["lug", "bushing"])
+def test_a_preset_is_the_general_scene_that_it_prints(data):
+    scene = parse_any(data)
+    assert isinstance(scene, ProblemScene)
+    assert parse_any(tomllib.loads(resolved(scene))) == scene
+    assert scene.analysis.symmetry == 2
+
+
+def test_ten_lines_of_a_lug_say_all_of_it():
+    scene = parse_any(LUG)
+    assert scene.mesh.shape is not None
+    assert scene.mesh.shape.arguments() == {
+        "kind": "lug",
+        **LUG["lug"],
+        "edge_distance": 20.0,
+        "element_size": pytest.approx(0.396),
+        "growth": 0.25,
+        "end": "round",
+        "half": True,
+        "pin": "half",
+    }
+    assert [body.name for body in scene.body] == ["pin", "lug"]
+    assert [(s.on, s.fixed) for s in scene.support] == [("clamp", ["x", "y"]), ("axis", ["y"])]
+    assert (scene.load[0].on, scene.load[0].displacement, scene.path.steps) == ("flat", 0.3, 15)
+    assert not scene.fits
+
+
+def test_radii_of_a_bushing_make_its_fits():
+    scene = parse_any(BUSHING)
+    assert scene.mesh.shape is not None
+    assert scene.mesh.shape.rings == [[10.05, 14.0], [13.98, 30.0]]
+    assert [i.surfaces for i in scene.interaction] == [["pin", "sleeve 1 inside"], ["sleeve 1 outside", "bore"]]
+    assert [i.overlap for i in scene.interaction] == pytest.approx([0.0, 0.02])
+    assert scene.fits
+    assert scene.targets == pytest.approx([1, 2, 7 / 3, 8 / 3, 3])
+
+
+@pytest.mark.parametrize(
+    ("data", "place", "value", "said"),
+    [
+        (LUG, "lug.radius", -1.0, "lug.radius = -1.0 must be greater than 0."),
+        (LUG, "lug.widht", 40.0, "did you mean width?"),
+        (LUG, "lug.width", None, "lug.width is missing."),
+        (LUG, "lug.width", 20.1, "lug.width = 20.1 must leave a ligament of at least 0.02 R beside the hole."),
+        (LUG, "lug.edge_distance", 10.1, "must leave a ligament of at least 0.02 R before the hole."),
+        (LUG, "lug.length", 10.0, "must leave a ligament of at least 0.02 R behind the hole and the end's arc."),
+        (LUG, "lug.length", 1e5, "lug.length = 100000.0 must not exceed 1000 R."),
+        (LUG, "lug.clearance", 5.0, "lug.clearance = 5.0 must be between -0.03 and 0.5 times the radius."),
+        (
+            LUG,
+            "lug.clearance",
+            -0.1,
+            "lug.clearance = -0.1 needs pin.whole = true, as half a pin cannot be pressed in.",
+        ),
+        (LUG, "lug.element_size", 8.0, "lug.element_size = 8.0 must be between 1e-3 and 0.5 times the radius."),
+        (LUG, "lug.end", "pointed", "lug.end = \"pointed\" must be 'round' or 'square'."),
+        (LUG, "load.displacement", None, "load.displacement is missing (or force)."),
+        (LUG, "load.force", 1.0, "load.displacement = 0.3 must not be given together with force."),
+        (LUG, "load.steps", [1, 2], "path.steps = [1, 2] must have one number for each of the 1 stages."),
+        (LUG, "plate", None, "plate is missing."),
+        (LUG, "block", STEEL, "block is not a known key"),
+        (LUG, "pin", {"rigid": True, "whole": True}, "pin.whole = true is not for a rigid pin."),
+        (BUSHING, "sleeve.0.bore", None, "sleeve 1.bore is missing."),
+        (BUSHING, "sleeve.0.outer", 10.1, "must have a wall of at least 0.02 R."),
+        (BUSHING, "sleeve.0.bore", 9.9, "needs pin.whole = true, as half a pin cannot be pressed in."),
+        (BUSHING, "housing.bore", 13.0, "housing must not overlap what is inside by more than 0.03 of its radius"),
+        (BUSHING, "housing.bore", 22.0, "nor be wider by more than 0.5."),
+        (BUSHING, "housing.outer", 1e5, "housing must not exceed 1000 R."),
+        (BUSHING, "housing.E", None, "housing.E is missing."),
+    ],
+)
+def test_faults_are_said_in_one_sentence(data, place, value, said):
+    with pytest.raises(InputError) as error:
+        parse_any(changed(data, place, value))
+    assert said in str(error.value)
+    assert str(error.value).startswith("scene: ")
+    assert len(str(error.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(("width", "edge"), [(24.2, 20.0), (120.0, 60.0), (40.0, 12.0), (40.0, 60.0)])
+def test_lugs_from_slender_to_stout_are_allowed(width, edge):
+    """W/D from 1.2 to 6, e/D from 0.6 to 3."""
+    parse_any(changed(changed(LUG, "lug.width", width), "lug.edge_distance", edge))
+
+
+def test_walls_may_be_thin():
+    """Two walls of 0.02 R, the second with its bore in the first one's outside."""
+    sleeves = [STEEL | {"bore": 10.02, "outer": 10.22}, STEEL | {"bore": 10.21, "outer": 10.42}]
+    scene = parse_any(changed(BUSHING, "sleeve", sleeves) | {"housing": STEEL | {"bore": 10.42, "outer": 30.0}})
+    assert [i.overlap for i in scene.interaction] == pytest.approx([0.0, 0.01, 0.0])
+
+
+def pulled(data: dict, **sections) -> System:
+    """The solved coarse problem of a preset with other sections."""
+    shape = "lug" if "lug" in data else "bushing"
+    coarse = data | {shape: data[shape] | {"element_size": 1.5, "growth": 0.5}} | sections
+    scene = parse_any(coarse | {"load": {"displacement": 0.2, "steps": 2}})
+    system = System(general_problem(scene, MPI.COMM_SELF))
+    system.solve(scene.targets)
+    return system
+
+
+@pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"])
+def test_the_whole_lug_carries_what_twice_its_half_does(pin):
+    """Whatever pin pulls at it."""
+    half = pulled(LUG, pin=pin)
+    whole = pulled(changed(LUG, "lug.half", False), pin=pin)
+    assert half.drive_force("pull") > 0
+    assert whole.drive_force("pull") == pytest.approx(half.drive_force("pull"), rel=1e-3)
+    assert whole.drive_force("pull") == pytest.approx(-whole.reaction("clamp")[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"])
+def test_a_pin_pulls_at_its_bushing(pin):
+    """After the fit, with forces in balance at pin and housing but for the weak springs that hold loose bodies."""
+    system = pulled(BUSHING, pin=pin)
+    assert system.drive_force("pull") > 1e4
+    assert system.drive_force("pull") == pytest.approx(-system.reaction("outer edge")[0], rel=1e-6)
