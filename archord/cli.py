@@ -21,7 +21,7 @@ from archord.scene.errors import InputError
 
 FILES = {
     "solve_commands": ("solve", "scene"),
-    "result_commands": ("show", "compare", "export", "export-deck", "picture"),
+    "result_commands": ("show", "compare", "export", "export-deck", "picture", "probe"),
     "sweep_commands": ("sweep",),
     "law_commands": ("laws", "law", "fit"),
     "benchmark_commands": ("reproduce", "benchmark"),

@@ -1,4 +1,4 @@
-"""Commands that read what solves left: ``show``, ``compare``, ``export``, ``picture``; and ``export-deck``."""
+"""Commands that read what solves left: `show`, `compare`, `export`, `picture`, `probe`; and `export-deck`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def show(folder: Path, output: Path | None, pictures: bool) -> int:
     """Print a run's joint, state, history, peaks, cost and warnings, or a sweep's cases; and draw them."""
     from archord.output.folder import is_sweep
-    from archord.postprocess.pictures import draw_run, draw_runs
+    from archord.postprocess.pictures.pictures import draw_run, draw_runs
     from archord.postprocess.run import Run
     from archord.postprocess.sweep import Sweep
     from archord.postprocess.tables import run_text, sweep_text
@@ -55,7 +55,7 @@ def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
     comparison = compare_runs([Run(folder) for folder in folders])
     text = comparison_text(comparison)
     if pictures:
-        from archord.postprocess.pictures import draw_runs
+        from archord.postprocess.pictures.pictures import draw_runs
 
         text += f"\n\n{draw_runs(comparison.runs, names_of(comparison.runs), output)}"
     print(text)
@@ -92,10 +92,45 @@ def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, f
 @output("file to draw [RUN/picture.png]")
 def picture(folder: Path, output: Path | None) -> int:
     """Draw a run: plastic zone, contact pressure, P(delta)."""
-    from archord.postprocess.pictures import draw_run
+    from archord.postprocess.pictures.pictures import draw_run
     from archord.postprocess.run import Run
 
     print(draw_run(Run(folder), output or folder / "picture.png"))
+    return 0
+
+
+@click.command()
+@argument("folder", "RUN", "run folder")
+@click.option("--edge", metavar="NAME", default="", help="along this set of facets of the mesh")
+@click.option("--line", type=float, nargs=4, metavar="X0 Y0 X1 Y1", help="along this line")
+@click.option("--step", type=int, metavar="N", help="at this step [the last]")
+@click.option(
+    "--quantity", default="", help="hoop [of an edge], von_mises [of a line], pressure, stress_xx, p1, ux, ..."
+)
+@click.option("--angle", "angles", type=float, multiple=True, help="tell the value at this angle of an arc [°]")
+@click.option("--over", type=float, metavar="LENGTH", help="over P / LENGTH, the mean stress in a section")
+@output("table (.csv) or picture to write")
+def probe(
+    folder: Path,
+    edge: str,
+    line: tuple[float, float, float, float] | None,
+    step: int | None,
+    quantity: str,
+    angles: tuple[float, ...],
+    over: float | None,
+    output: Path | None,
+) -> int:
+    """Print a quantity along an edge or a line of a run, its largest value and where; and draw it."""
+    from archord.postprocess.run import Run
+    from archord.postprocess.tables import probe_text
+
+    found = Run(folder).probe(edge, quantity, step, line)
+    found = found.over(over) if over is not None else found
+    print(probe_text(found, angles))
+    if output is not None:
+        from archord.postprocess.pictures.pictures import draw_probe
+
+        print(f"\n{draw_probe(found, output)}")
     return 0
 
 

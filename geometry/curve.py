@@ -53,6 +53,19 @@ def lagrange(degree: int) -> Array:
     return np.ascontiguousarray(np.linalg.inv(np.vander(nodes, increasing=True)).T)
 
 
+def in_pieces(start: np.ndarray, end: np.ndarray, height: Array) -> np.ndarray:
+    """Order that links facets end to start: open pieces first, closed ones from their facet of least ``height`` on."""
+    by_start, ends = {int(s): i for i, s in enumerate(start)}, set(end.tolist())
+    firsts = np.argsort(height, kind="stable")
+    order: dict[int, None] = {}  # a set that keeps its order
+    for first in [*(i for i in firsts if int(start[i]) not in ends), *firsts]:
+        at: int | None = int(first)
+        while at is not None and at not in order:
+            order[at] = None
+            at = by_start.get(int(end[at]))
+    return np.array(list(order), dtype=np.int64)
+
+
 class Curve:
     """``n`` polynomial facets with nodes ``X`` ``(m, 2)``, piece by piece in the direction of travel.
 

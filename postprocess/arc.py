@@ -1,6 +1,8 @@
-"""The contact on the arcs of a run, as contact.h5 holds it."""
+"""The contact on the arcs of a joint, and on the surfaces of any run, as contact.h5 holds it."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -9,31 +11,41 @@ from archord.materials.material import Array
 from archord.output.step_file import step_name
 from archord.postprocess.curve import RunCurve
 from archord.presets.arc import ArcProfile
-from archord.presets.edge import PER_STEP
+from archord.presets.edge import PER_STEP, SurfaceProfile
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
+_FIXED = ("s", "weight", "X")
+
 
 def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
-    """The sides of ``run`` at ``step`` (from 1); a side whose arc was not integrated is absent.
+    """The sides of ``run``, of a joint, at ``step`` (from 1); a side whose arc was not integrated is absent.
 
     Raises `InputError` if contact.h5 is missing, damaged or does not hold the step.
     """
-    path = run.folder / "contact.h5" if run.folder else None
+    radius = {"pin": run.R, "hole": run.R + run.dR}
+    found = _read(run.folder, run.name, step, ("s", "weight"))
+    return {side: ArcProfile(**found[side], radius=radius[side]) for side in radius if side in found}
+
+
+def read_surfaces(folder: Path, step: int) -> dict[str, SurfaceProfile]:
+    """The integrated surfaces of a general run at ``step``, by name. Raises `InputError` as `read_arcs`."""
+    return {name: SurfaceProfile(**found) for name, found in _read(folder, str(folder), step, _FIXED).items()}
+
+
+def _read(folder: Path | None, said: str, step: int, fixed: tuple[str, ...]) -> dict[str, dict[str, Array]]:
+    path = folder / "contact.h5" if folder else None
     if path is None or not path.is_file():
-        raise InputError(f"{run.name}: is not a complete run folder: contact.h5 is missing.")
-    radius, found = {"pin": run.R, "hole": run.R + run.dR}, {}
+        raise InputError(f"{said}: is not a complete run folder: contact.h5 is missing.")
     try:
         with h5py.File(path) as file:
             if int(file["accepted"][()]) < step:
                 raise KeyError(step)
-            for side in (side for side in radius if side in file):
-                arrays = {name: file[f"{side}/{name}"][()] for name in ("s", "weight")}
-                arrays |= {name: file[f"{side}/{name}/{step_name(step)}"][()] for name in PER_STEP}
-                found[side] = ArcProfile(**arrays, radius=radius[side])
+            names = [*((name, name) for name in fixed), *((name, f"{name}/{step_name(step)}") for name in PER_STEP)]
+            groups = {key: group for key, group in file.items() if isinstance(group, h5py.Group)}
+            return {key: {name: group[at][()] for name, at in names} for key, group in groups.items()}
     except (OSError, KeyError, RuntimeError, TypeError, ValueError):
         raise InputError(f"{path}: cannot be read as the contact of a run.") from None
-    return found
 
 
 def undeformed(arc: ArcProfile, side: str, scene: Scene) -> Array:

@@ -30,7 +30,7 @@ class Comparison:
     """``r`` runs at ``n`` common displacements, in the form of `comparable`."""
 
     runs: list[Run]
-    labels: dict[str, str]  # of "delta" and of the quantities `COMPARED`
+    labels: dict[str, str]  # of "delta", or the load factor, and of the quantities: `COMPARED`, of a joint
     step_by_step: bool
     delta: Array  # (n,)
     values: dict[str, Array]  # (r, n)
@@ -51,6 +51,8 @@ def compare_runs(runs: list[Run]) -> Comparison:
     """Compare ``runs`` with the first. Raises `InputError` for fewer than two, one without steps, or no common load."""
     if len(runs) < 2:
         raise InputError("compare: needs two runs or more.")
+    if not any(run.is_joint for run in runs):
+        return _of_problems(runs)
     curves, labels, _ = comparable(runs)
     delta = curves[0].delta
     margin = _SAME * np.abs(delta).max()
@@ -67,6 +69,31 @@ def compare_runs(runs: list[Run]) -> Comparison:
         curves = [_at(delta, curve, k) for curve, k in zip(curves, between, strict=True)]
     values = {name: np.array([getattr(curve, name) for curve in curves]) for name in COMPARED}
     return Comparison(runs, labels, step_by_step, delta, values, between)
+
+
+def _of_problems(runs: list[Run]) -> Comparison:
+    """Forces, largest pressures and PEEQ that all ``runs`` of general scenes have, at load factors of the first."""
+    from scipy.interpolate import PchipInterpolator
+
+    for run in runs:
+        run.number(None)
+    paths = [np.array(run.path) for run in runs]
+    low, high = (ends(path[end] for path in paths) for ends, end in ((max, 0), (min, -1)))
+    at = paths[0][(paths[0] >= low - _SAME) & (paths[0] <= high + _SAME)]
+    units, ends = runs[0].history.attrs["units"], (" force", " largest pressure", " peeq_max")
+    names = [n for n in runs[0].columns if n.endswith(ends) and all(n in run.columns for run in runs)]
+    if not len(at) or not names:
+        raise InputError(f"{runs[0].folder}: shares no range of load factors, or no load, with the others.")
+    between = np.array([np.abs(at[:, None] - path).min(axis=1) > _SAME for path in paths])
+    values: dict[str, Array] = {name: np.empty((len(runs), len(at))) for name in names}
+    for k, (run, path) in enumerate(zip(runs, paths, strict=True)):
+        for name in names:
+            table = np.array(run.columns[name])
+            values[name][k] = table[np.abs(at[:, None] - path).argmin(axis=1)]
+            if between[k].any():
+                values[name][k, between[k]] = PchipInterpolator(path, table)(at[between[k]])
+    labels = {"delta": "load factor"} | {n: f"{n} [{units[n]}]" if n in units else n for n in names}
+    return Comparison(runs, labels, not between.any(), at, values, between)
 
 
 def _at(delta: Array, curve: RunCurve, between: np.ndarray) -> RunCurve:

@@ -23,8 +23,8 @@ _DATA_OF_ARC = ("pressure", "raw_pressure", "gap", "angle", "s")
 
 
 def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
-    """Write history.csv and contact.csv (all steps, with step and delta before the columns of `Run.pressure`) into
-    ``folder``, which is made if need be; returns the files. Columns are headed ``name [unit]``.
+    """Write history.csv and contact.csv (all steps, with step and delta, or the load factor, before the columns of
+    `Run.pressure`) into ``folder``, which is made if need be; returns the files. Columns are headed ``name [unit]``.
 
     Raises `InputError` if the run has no accepted step, a file of it is damaged, or one that would be written is there
     already and ``force`` is not given.
@@ -34,8 +34,8 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
     from archord.postprocess.frames import with_headings
 
     run.number(None)
-    steps = {(n, delta): run.pressure(n) for n, delta in enumerate(run.columns["delta"], 1)}
-    contact = pd.concat(steps, names=["step", "delta"]).reset_index(level=[0, 1])
+    steps = {(n, load): run.pressure(n) for n, load in enumerate(run.path, 1)}
+    contact = pd.concat(steps, names=["step", "delta" if run.is_joint else "load_factor"]).reset_index(level=[0, 1])
     contact.attrs["units"] = run.pressure().attrs["units"] | {"delta": run.scene.units.length}
     tables = {folder / "history.csv": run.history, folder / "contact.csv": contact}
     _check_new(tables, folder, force)
@@ -47,7 +47,7 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
 
 def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> list[Path]:
     """Write all steps of ``run``, or one ``step`` alone, into ``folder``, which is made if need be; returns the files,
-    the .pvd first. Time is delta; the number of the step, where delta does not only grow.
+    the .pvd first. Time is delta, or the load factor; the number of the step, where that does not only grow.
 
     Raises `InputError` if the run wrote no fields or has no such step, a file of it is damaged, or one that would be
     written is there already and ``force`` is not given.
@@ -57,7 +57,7 @@ def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool =
     steps = [run.number(step)] if step is not None else range(1, run.number(None) + 1)
     run.fields(steps[-1])
     files = {(n, part): folder / f"{part}_{step_name(n)}.vtu" for n in steps for part in ("bodies", "contact")}
-    collection, delta, entries = folder / "run.pvd", run.columns["delta"], ""
+    collection, delta, entries = folder / "run.pvd", run.path, ""
     _check_new([collection, *files.values()], folder, force)
     grows = all(a < b for a, b in pairwise(delta))
     for (n, part), file in files.items():
@@ -77,18 +77,19 @@ def _bodies(fields: Fields) -> dict:
     return {
         "points": np.pad(fields.coordinates, ((0, 0), (0, 1))),
         "cells": [({6: "triangle6", 9: "quad9"}[fields.cells.shape[1]], fields.cells)],
-        "point_data": {"displacement": np.pad(fields.displacement, ((0, 0), (0, 1)))},
+        "point_data": {"displacement": np.pad(fields.displacement, ((0, 0), (0, 1)))} | fields.nodal_fields(),
         "cell_data": {"body": [fields.body], **{name: [value] for name, value in fields.cell_fields().items()}},
     }
 
 
 def _contact(run: Run, step: int) -> dict:
     """The integration points of the arcs, joined by lines within each facet, and their data; ``side`` is 1 on the pin
-    and 2 on the hole."""
+    and 2 on the hole, or counts the surfaces of a general run."""
     table = run.pressure(step)
-    facet, side = table["facet"].to_numpy(), (table["side"] == "hole").to_numpy(np.int8) + 1
+    sides = ["pin", "hole"] if run.is_joint else list(table["side"].unique())
+    facet, side = table["facet"].to_numpy(), table["side"].map(sides.index).to_numpy(np.int8) + 1
     first = np.flatnonzero((np.diff(facet) == 0) & (np.diff(side) == 0))
-    data = {name: table[name].to_numpy() for name in _DATA_OF_ARC}
+    data = {name: table[name].to_numpy() for name in _DATA_OF_ARC if name in table}
     return {
         "points": np.pad(table[["x", "y"]], ((0, 0), (0, 1))),
         "cells": [("line", np.stack([first, first + 1], axis=1))],

@@ -100,9 +100,17 @@ class Fields:
         """Nodes ``(m, k, 3)`` of the straight triangles that every cell is drawn by."""
         return self.cells[:, _SUBTRIANGLES[self.cells.shape[1]]]
 
+    def facets(self) -> np.ndarray:
+        """Edges ``(k, 3)`` of all cells, which lie on the left: first node, the one between, last node."""
+        edges = self.cells[:, _EDGES[self.cells.shape[1]]]
+        a, b, c = np.moveaxis(self.coordinates[self.cells[:, :3]], 1, 0)
+        clockwise = np.linalg.det(np.stack([b - a, c - a], axis=1)) < 0
+        edges[clockwise] = edges[clockwise, :, ::-1]
+        return edges.reshape(-1, 3)
+
     def outline(self) -> np.ndarray:
-        """Edges ``(k, 3)`` on the boundary of the bodies: first node, the one between, last node."""
-        edges = self.cells[:, _EDGES[self.cells.shape[1]]].reshape(-1, 3)
+        """Those of the `facets` that are on the boundary of the bodies."""
+        edges = self.facets()
         _, first, count = np.unique(np.sort(edges[:, [0, 2]], axis=1), axis=0, return_index=True, return_counts=True)
         return edges[first[count == 1]]
 

@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 
 from archord.postprocess.arc import undeformed
-from archord.presets.arc import ArcProfile
-from archord.scene.scene import Scene
+from archord.presets.edge import SurfaceProfile
 
 _TEXT = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
 
@@ -44,8 +43,8 @@ def read_frame(path: Path) -> pd.DataFrame:
     return frame_of(table, {name: unit.removesuffix("]") for name, _, unit in parts})
 
 
-def contact_frame(arcs: dict[str, ArcProfile], scene: Scene) -> pd.DataFrame:
-    """The points of the arcs by side and, from the contact axis, by angle; x and y are undeformed coordinates.
+def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
+    """The points of the arcs by side and, of joints, by angle from the contact axis; x and y are undeformed.
 
     ``pressure`` is linear on each facet, ``raw_pressure`` as the solver integrates it, both positive in compression;
     ``weight`` is arc length; ``gap`` is positive when open.
@@ -54,9 +53,12 @@ def contact_frame(arcs: dict[str, ArcProfile], scene: Scene) -> pd.DataFrame:
     units |= {"angle": "rad"} | dict.fromkeys(("pressure", "raw_pressure"), scene.units.stress)
     parts = []
     for side, arc in arcs.items():
-        (x, y), moved = np.moveaxis(undeformed(arc, side, scene), -1, 0), arc.coordinates - undeformed(arc, side, scene)
+        X = arc.X if isinstance(arc, SurfaceProfile) else undeformed(arc, side, scene)
+        (x, y), moved = np.moveaxis(X, -1, 0), arc.coordinates - X
         facet = np.broadcast_to(np.arange(1, len(x) + 1)[:, None], x.shape)
-        columns = {"facet": facet} | {name: getattr(arc, name) for name in ("s", "angle", "weight")}
+        columns = {"facet": facet} | {
+            name: getattr(arc, name) for name in ("s", "angle", "weight") if hasattr(arc, name)
+        }
         columns |= {name: getattr(arc, name) for name in ("pressure", "raw_pressure", "gap")}
         columns |= {"x": x, "y": y, "ux": moved[..., 0], "uy": moved[..., 1]}
         parts.append(pd.DataFrame({"side": side} | {name: values.ravel() for name, values in columns.items()}))

@@ -14,10 +14,10 @@ import numpy as np
 
 from archord.output.folder import is_sweep
 from archord.output.history import read_history
-from archord.postprocess.arc import read_arcs
+from archord.postprocess.arc import read_arcs, read_surfaces
 from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
-from archord.presets.arc import ArcProfile
+from archord.postprocess.probe import Probe, probe_edge, probe_line
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
 from archord.scene.scene import Scene
@@ -83,14 +83,15 @@ class Run:
         columns["P"] = columns["P"] / self.scene.thickness
         return RunCurve(str(self.folder), self.scene, **columns, folder=self.folder)
 
-    def contact(self, step: int | None = None) -> dict[str, ArcProfile]:
-        """The contact along the arcs at ``step`` (the last), arrays by side: "pin", "hole".
+    def contact(self, step: int | None = None) -> dict[str, Any]:
+        """The contact along the surfaces at ``step`` (the last), arrays by name: of a joint "pin" and "hole".
 
-        A side whose arc is not integrated is absent. Raises `InputError` without such a step.
+        A side that is not integrated is absent. Raises `InputError` without such a step.
         """
-        return read_arcs(self.curve, self.number(step))
+        step = self.number(step)
+        return read_arcs(self.curve, step) if self.is_joint else read_surfaces(self.folder, step)
 
-    def arc(self, step: int | None = None, side: str | None = None) -> ArcProfile:
+    def arc(self, step: int | None = None, side: str | None = None) -> Any:
         """One ``side`` of `contact` (the hole, if both are there). Raises `InputError` without such a step or side."""
         arcs = self.contact(step)
         if side is not None and side not in arcs:
@@ -111,12 +112,40 @@ class Run:
 
         Raises `InputError` without such a step, and if the run wrote no fields.
         """
-        return read_fields(self.folder, self.scene, self.number(step), self.summary.get("bodies", BODIES))
+        return read_fields(self.folder, self.scene, self.number(step), self.bodies)
+
+    @property
+    def bodies(self) -> dict[str, int]:
+        """What marks the cells of each body in `fields`, by name."""
+        return {name: min(tags) for name, tags in self.summary.get("bodies", {}).items()} or BODIES
+
+    @property
+    def path(self) -> list[float]:
+        """How far the load was at every step: delta of a joint, else the load factor."""
+        return self.columns["delta" if self.is_joint else "load_factor"]
 
     def points(self, step: int | None = None) -> dict[str, np.ndarray]:
         """The integration points at ``step`` (the last) by name: "coordinates", "stress" and, where a body can yield,
         "plastic_strain" and "peeq". Raises `InputError` without such a step, and if the run did not write them."""
         return read_points(self.folder, self.scene, self.number(step))
+
+    def probe(
+        self,
+        edge: str = "",
+        quantity: str = "",
+        step: int | None = None,
+        line: tuple[float, float, float, float] | None = None,
+    ) -> Probe:
+        """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1 (von Mises') at ``step`` (the
+        last): see `probe_edge` and `probe_line`. Raises `InputError`."""
+        if bool(edge) == (line is not None):
+            raise InputError("probe: give an edge or a line.")
+        step = self.number(step)
+        return (
+            probe_line(self, line, quantity or "von_mises", step)
+            if line
+            else probe_edge(self, edge, quantity or "hoop", step)
+        )
 
     def number(self, step: int | None) -> int:
         """``step``, or that of the last accepted one. Raises `InputError` if the run has none such."""

@@ -8,7 +8,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from archord.postprocess.comparison import COMPARED, Comparison, differing_keys
+from archord.postprocess.comparison import Comparison, differing_keys
+from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.report.table import Table
@@ -16,6 +17,7 @@ from archord.scene.faults import shortened
 
 _MOST = 40  # rows of a table
 _LAST = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "steps", "iterations", "cutbacks", "seconds")
+_WHOLE = ("iterations", "cutbacks", "seconds")
 _OF_A_RUN = {  # what a comparison tells of each run
     "status": lambda run: run.status,
     "steps": lambda run: f"{run.steps} of {len(run.scene.targets)}",
@@ -31,9 +33,10 @@ def run_text(run: Run) -> str:
     """State, joint, history, peaks, cost and warnings of a run."""
     words = {"running": "running, or killed (if no archord works there, --restart continues it)"}
     state = f"{run.folder}: {words.get(run.status, run.status)}; {run.steps} of {len(run.scene.targets)} steps"
-    parts = [f"{state}: {run.message}" if run.message else state, Table("", "", rows=_joint(run), left=2)]
+    facts, history = (_joint, _history) if run.is_joint else (_problem, _loads)
+    parts = [f"{state}: {run.message}" if run.message else state, Table("", "", rows=facts(run), left=2)]
     if run.steps:
-        parts += [_thinned(_history(run), run.folder / "history.csv"), _peaks(run)]
+        parts += [_thinned(history(run), run.folder / "history.csv"), _peaks(run)]
     return "\n\n".join(map(str, (*parts, Table("", "", rows=_cost(run), left=2))))
 
 
@@ -55,11 +58,26 @@ def sweep_text(sweep: Sweep) -> str:
 def comparison_text(comparison: Comparison) -> str:
     """Each quantity of all runs at common loads, the keys in which the scenes differ, and how the runs went."""
     names = names_of(comparison.runs)
-    parts = [_thinned(_differences(comparison, name, names), "history.csv") for name in COMPARED]
+    parts = [_thinned(_differences(comparison, name, names), "history.csv") for name in comparison.values]
     rows = differing_keys([run.scene for run in comparison.runs])
     rows |= {name: [str(get(run)) for run in comparison.runs] for name, get in _OF_A_RUN.items()}
     cells = ([key, *(shortened(value) or "-" for value in values)] for key, values in rows.items())
     return "\n\n".join(map(str, (*parts, _note(comparison), Table("", *names, rows=cells, left=1 + len(names)))))
+
+
+def probe_text(probe: Probe, angles: Iterable[float]) -> str:
+    """A quantity along an edge or a line, its largest value and where that is, and its values at ``angles``."""
+    frame = probe.frame()
+    units = frame.attrs["units"]
+    table = Table(*(f"{name} [{units[name]}]" if name in units else name for name in frame))
+    for row in frame.itertuples(index=False):
+        table.add(*(f"{value:.6g}" for value in row))
+    k, unit = probe.largest, f" {probe.unit}".rstrip()
+    where = "" if probe.angle is None else f" at {probe.angle[k]:.4g}°"
+    force = f"step {probe.step}, {probe.by or 'force'} = {probe.force:.6g} per unit thickness"
+    lines = [_thinned(table, "-o FILE.csv"), "", f"{probe.quantity} along {probe.place}, {force}"]
+    lines += [f"largest: {probe.values[k]:.6g}{unit}{where}, x = {probe.x[k, 0]:.6g}, y = {probe.x[k, 1]:.6g}"]
+    return "\n".join([*lines, *(f"at {angle:g}°: {probe.at(angle):.6g}{unit}" for angle in angles)])
 
 
 def names_of(runs: Iterable[Run]) -> list[str]:
@@ -96,6 +114,27 @@ def _joint(run: Run) -> Iterable[tuple[str, str]]:
     yield "mesh", f"{counts}; ranks: {run.summary.get('ranks', '?')}"
 
 
+def _problem(run: Run) -> Iterable[tuple[str, str]]:
+    scene, mesh = run.scene, run.summary.get("mesh", {})
+    yield "problem", f"plane {scene.analysis.plane}, {scene.loading}"
+    for kind in ("body", "interaction", "coupling", "support", "load"):
+        for part in getattr(scene, kind):
+            said = part.model_dump(exclude_none=True, exclude={"name"}).items()
+            yield f"{kind} {part.name}", shortened(", ".join(f"{key} = {value}" for key, value in said if value))
+    counts = f"{mesh.get('cells', '?')} cells of degree {scene.analysis.degree}, {mesh.get('dofs', '?')} dofs"
+    yield "mesh", f"{counts}; ranks: {run.summary.get('ranks', '?')}"
+
+
+def _loads(run: Run) -> Table:
+    """The steps: what each load did, the largest pressure of each interaction, plastic strain, cost."""
+    units, ends = run.history.attrs["units"], (" displacement", " force", " largest pressure", " peeq_max")
+    names = ["step", "load_factor", *(name for name in run.columns if name.endswith(ends)), *_WHOLE]
+    table = Table(*(f"{name} [{units[name]}]" if name in units else name for name in names))
+    for row in zip(*(run.columns[name] for name in names), strict=True):
+        table.add(*(f"{value:.6g}" for value in row))
+    return table
+
+
 def _history(run: Run) -> Table:
     """The steps: load, force, pressure, angle, plastic strain, cost."""
     unit, h = run.scene.units, run.columns
@@ -116,11 +155,16 @@ def _history(run: Run) -> Table:
 def _peaks(run: Run) -> str:
     """Largest values over the run, and where it first yielded."""
     h, said = run.columns, []
-    for name, unit in {"P": run.scene.units.force, "p0": run.scene.units.stress, "eps": "rad", "peeq_max": ""}.items():
+    shown = {"P": run.scene.units.force, "p0": run.scene.units.stress, "eps": "rad", "peeq_max": ""}
+    if not run.is_joint:
+        units, ends = run.history.attrs["units"], (" force", " largest pressure", " peeq_max")
+        shown = {name: units.get(name, "") for name in h if name.endswith(ends)}
+    for name, unit in shown.items():
         k = int(np.argmax(h[name]))
         said.append(f"{name} = {' '.join([f'{h[name][k]:.6g}', unit]).rstrip()} at step {h['step'][k]:g}")
-    if any(h["peeq_max"]):
-        said.append(f"plastic strain first at step {h['step'][np.flatnonzero(h['peeq_max'])[0]]:g}")
+    yields = np.any([h[name] for name in shown if name.endswith("peeq_max")] or [[0.0]], axis=0)
+    if yields.any():
+        said.append(f"plastic strain first at step {h['step'][np.flatnonzero(yields)[0]]:g}")
     return f"largest: {', '.join(said)}"
 
 

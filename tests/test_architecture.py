@@ -25,6 +25,7 @@ ROOMS = [
     "presets",
     "output",
     "postprocess",
+    "postprocess.pictures",
     "postprocess.laws",
     "postprocess.decks",
     "studies",

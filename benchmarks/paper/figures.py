@@ -20,7 +20,7 @@ from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.elastic_laws import hertz, persson_load, persson_pressure
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
-from archord.postprocess.panels import field_panel
+from archord.postprocess.pictures.joint import field_panel
 from archord.report.figure import new_figure, save
 from archord.report.files import write_rows
 

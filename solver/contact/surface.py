@@ -13,7 +13,7 @@ import numpy.typing as npt
 from dolfinx import fem
 
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis, strain, strain_matrix
-from archord.geometry.curve import Curve, RigidCircle
+from archord.geometry.curve import Curve, RigidCircle, in_pieces
 from archord.materials.material import Material, Points
 
 _ASKEW = np.array([0.5257, 0.8507])  # a direction in which no two nodes of a closed piece should be equally far
@@ -54,7 +54,7 @@ class Surface:
         gathered = self.comm.allgather((np.take_along_axis(global_dofs, trace, axis=1), x, within))
         all_dofs, all_x, within = (np.concatenate(parts) for parts in zip(*gathered, strict=True))
         _refuse(name, all_dofs, all_x, within)
-        order = _pieces(all_dofs[:, 0], all_dofs[:, -1], all_x[:, 0] @ _ASKEW)
+        order = in_pieces(all_dofs[:, 0], all_dofs[:, -1], all_x[:, 0] @ _ASKEW)
         dofs, first, node = np.unique(all_dofs[order], return_index=True, return_inverse=True)
         ranked = np.argsort(first)  # the nodes in the order in which the curve runs
         self.curve_dofs, X = dofs[ranked], all_x[order].reshape(-1, 2)[first[ranked]]
@@ -201,16 +201,3 @@ def _refuse(name: str, dofs: np.ndarray, x: Array, within: np.ndarray) -> None:
         _, first, count = np.unique(dofs[:, end], return_index=True, return_counts=True)
         for a, b in x[first[count > 1], end]:
             raise ValueError(f"the contact surface {name!r} branches at ({a:g}, {b:g}), where three of its facets meet")
-
-
-def _pieces(start: np.ndarray, end: np.ndarray, height: Array) -> np.ndarray:
-    """Order that links facets end to start: open pieces first, closed ones from their facet of least ``height`` on."""
-    by_start, ends = {int(s): i for i, s in enumerate(start)}, set(end.tolist())
-    firsts = np.argsort(height, kind="stable")
-    order: dict[int, None] = {}  # a set that keeps its order
-    for first in [*(i for i in firsts if int(start[i]) not in ends), *firsts]:
-        at: int | None = int(first)
-        while at is not None and at not in order:
-            order[at] = None
-            at = by_start.get(int(end[at]))
-    return np.array(list(order), dtype=np.int64)

@@ -11,7 +11,8 @@ from dolfinx.mesh import compute_midpoints, create_mesh, exterior_facet_indices
 from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, strain
-from archord.solver.contact.surface import Surface, _pieces, neighbours
+from archord.geometry.curve import in_pieces
+from archord.solver.contact.surface import Surface, neighbours
 from tests.geometry.shapes.measures import Facets
 from tests.solver.parts import DR, ELASTIC, PERFECT, PLANE_STRESS, R, coordinates, joint_parts, space
 
@@ -153,7 +154,7 @@ def test_points_see_the_strain_of_their_own_cell(material):
     np.testing.assert_array_equal(tangent, np.broadcast_to(side.material.elastic_tangent, tangent.shape))
 
 
-def test_a_gap_leaves_two_pieces():
+def test_a_gap_leaves_twoin_pieces():
     """Of which each has its own arc length; neighbours and partners are found on both."""
     parts = joint_parts()
     hole = np.sort(parts.facets.find(Facets.HOLE_ARC))
@@ -200,9 +201,9 @@ def test_a_surface_lies_on_the_boundary():
     ],
     ids=["a chain", "a ring", "two pieces", "a piece and a ring", "two rings"],
 )
-def test_facets_are_ordered_end_to_start_by_pieces(start, end, order):
+def test_facets_are_ordered_end_to_start_byin_pieces(start, end, order):
     """Open ones first, and of each kind the lowest; a ring starts at its lowest."""
-    found = _pieces(np.array(start), np.array(end), np.arange(len(start), dtype=float))
+    found = in_pieces(np.array(start), np.array(end), np.arange(len(start), dtype=float))
     np.testing.assert_array_equal(found, order)
 
 

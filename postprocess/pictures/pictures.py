@@ -10,8 +10,9 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.output.user_file import writing
-from archord.postprocess import panels
-from archord.postprocess.comparison import comparable
+from archord.postprocess.comparison import comparable, compare_runs
+from archord.postprocess.pictures import joint, problems
+from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
 from archord.report.figure import new_figure, save
 from archord.scene.errors import InputError
@@ -32,18 +33,34 @@ def save_figure(figure: Figure, target: Path) -> Path:
 
 
 def draw_run(run: Run, target: Path) -> Path:
-    """Draw field, if the run wrote it, pressure and P(delta) of ``run`` as ``target``; returns the file.
+    """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``; returns the file.
 
     Raises `InputError` if the run has no accepted step, a file of it is damaged, or ``target`` cannot be written.
     """
     run.number(None)
-    widths = [1.0, 1.2, 1.1] if run.scene.output.fields else [1.2, 1.1]
+    if run.is_joint:
+        draws = [joint.field_panel] * run.scene.output.fields + [joint.arc_panel, joint.force_panel]
+    else:
+        draws = [problems.field_panel] * run.scene.output.fields
+        draws += [problems.contact_panel] * bool(run.scene.interaction) + [problems.load_panel]
+    widths = [1.0, 1.2, 1.1] if len(draws) == 3 else [1.2, 1.1][-len(draws) :]
     figure = new_figure(5.0 * len(widths), 4.4)
-    *field, arc, force = figure.subplots(1, len(widths), width_ratios=widths)
-    for axes in field:
-        panels.field_panel(axes, run)
-    panels.arc_panel(arc, run)
-    panels.force_panel(force, run)
+    for axes, draw in zip(np.atleast_1d(figure.subplots(1, len(widths), width_ratios=widths)), draws, strict=True):
+        draw(axes, run)
+    return save_figure(figure, target)
+
+
+def draw_probe(probe: Probe, target: Path) -> Path:
+    """Write ``probe`` as ``target``, a table if its name ends in .csv, else a picture; returns the file. Raises
+    `InputError`."""
+    if target.suffix == ".csv":
+        from archord.postprocess.frames import with_headings
+
+        with writing(target):
+            with_headings(probe.frame()).to_csv(target, index=False, float_format="%.12g", lineterminator="\n")
+        return target
+    figure = new_figure(6.0, 4.4)
+    problems.draw_probes(figure.subplots(), [probe], [f"{probe.place}, step {probe.step}"])
     return save_figure(figure, target)
 
 
@@ -55,6 +72,8 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
     """
     from matplotlib import colormaps
 
+    if not runs[0].is_joint:
+        return _draw_problems(runs, names, target)
     many = len(runs) > _FEW
     figure = new_figure(15, 4.6)
     force, pressure, angle = figure.subplots(1, 3)
@@ -75,6 +94,19 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
         axes.grid(alpha=0.3)
     if not many:
         figure.legend(*force.get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
+    return save_figure(figure, target)
+
+
+def _draw_problems(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
+    """The first three quantities that general ``runs`` share, over the load factor, as ``target``; returns the file."""
+    compared = list(compare_runs(list(runs)).labels.items())[1:4]
+    figure = new_figure(5.0 * len(compared), 4.4)
+    for axes, (column, label) in zip(np.atleast_1d(figure.subplots(1, len(compared))), compared, strict=True):
+        for run, name in zip(runs, names, strict=True):
+            axes.plot(run.path, run.columns[column], ".-", lw=1.3, label=name)
+        axes.set(xlabel="load factor", ylabel=label)
+        axes.grid(alpha=0.3)
+    axes.legend(frameon=False)
     return save_figure(figure, target)
 
 

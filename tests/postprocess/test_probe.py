@@ -1,0 +1,145 @@
+"""Stress along edges and lines of a lug, and what is printed and drawn of a general run."""
+
+import csv
+import shutil
+
+import numpy as np
+import pytest
+
+import archord
+from archord.cli import run as command
+from archord.postprocess.export import export_csv, export_vtk
+
+# Hoop stress at the hole's edge over P/(40 - 20): at 90 degrees and the largest, of two codes, one of them CalculiX
+# 2.20 (elements of order two), each refined until the digits stood.
+REFERENCE = {0.1: (3.424, 3.78), 0.3: (3.072, 3.190)}
+
+
+def solved(folder, size, displacement, **shape):
+    """An elastic lug with a hole of radius 10, its half or whole, in as many steps as there are displacements."""
+    lug = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+    lug |= {"element_size": size, "growth": 0.3, **shape}
+    steel = {"E": 210000.0, "nu": 0.3}
+    half = shape.get("half", True)
+    scene = archord.Problem(
+        {"shape": lug},
+        bodies=[{"name": name} | steel for name in ("pin", "lug")],
+        interactions=[{"name": "contact", "surfaces": ["pin", "hole"]}],
+        supports=[
+            {"name": "axis", "on": "axis", "fixed": ["y"]},
+            {"name": "clamp", "on": "clamp", "fixed": ["x", "y"]},
+        ],
+        loads=[{"name": "pull", "on": "flat", "direction": "x", "displacement": displacement}],
+        path={"steps": 1},
+        analysis={"symmetry": 2 if half else 1},
+        output={"points": True},
+    )
+    return archord.solve(scene, folder)
+
+
+@pytest.fixture(scope="module")
+def lug(tmp_path_factory):
+    return solved(tmp_path_factory.mktemp("lug") / "run", 0.7, list(REFERENCE))
+
+
+@pytest.mark.parametrize("step", [1, 2])
+def test_hoop_stress_at_the_hole_is_that_of_other_codes(lug, step):
+    """At 90 degrees within half a per cent, the largest within one, with 3 000 dofs."""
+    at_right_angle, largest = REFERENCE[lug.columns["pull displacement"][step - 1]]
+    hoop = lug.probe("hole", step=step)
+    assert hoop.force == lug.columns["pull force"][step - 1]
+    factor = hoop.over(20.0)
+    assert factor.at(90) == pytest.approx(at_right_angle, rel=5e-3)
+    assert factor.values[factor.largest] == pytest.approx(largest, rel=1e-2)
+    assert 70 < factor.angle[factor.largest] < 85
+    np.testing.assert_allclose(np.radians(hoop.angle) * 10, hoop.s, atol=1e-4)
+    assert hoop.s[-1] == pytest.approx(10 * np.pi, rel=1e-6)
+
+
+def test_the_stress_normal_to_an_edge_is_its_traction(lug):
+    """None beyond the contact and on the free end, but for the error of the recovery; the contact pressure within."""
+    hoop, normal, pressure = (lug.probe("hole", name) for name in ("hoop", "normal", "pressure"))
+    free = (normal.angle > 110) & (normal.angle < 170)
+    assert np.abs(normal.values[free]).max() < 0.01 * hoop.values.max()
+    for angle in (10, 40):
+        assert -normal.at(angle) == pytest.approx(pressure.at(angle), rel=0.03)
+    assert np.abs(lug.probe("end", "normal").values).max() < 0.03 * hoop.values.max()
+    tensor = lug.fields().nodal_fields()
+    assert lug.probe("hole", "stress_xx").at(90) == pytest.approx(hoop.at(90), rel=1e-3)
+    assert set(lug.points()) == {"coordinates", "stress"}
+    assert "peeq" not in tensor
+
+
+def test_a_line_crosses_bodies_and_leaves_gaps_out(lug):
+    """From the hole's edge to the side of the lug, where it meets what the edges have; the void is not counted."""
+    line = lug.probe(line=(-20.0, 0.0, 20.0, 0.0), quantity="stress_yy")
+    np.testing.assert_allclose(line.s, line.x[:, 0] + 20)
+    assert line.x[np.argmax(np.diff(line.x[:, 0])), 0] == pytest.approx(-10.0, abs=0.2)
+    up = lug.probe(line=(0.0, 10.001, 0.0, 19.999), quantity="stress_xx")
+    assert up.values[0] == pytest.approx(lug.probe("hole").at(90), rel=1e-2)
+    assert np.trapezoid(up.values, up.s) < lug.columns["pull force"][-1]
+
+
+def test_a_whole_hole_runs_round_once(tmp_path):
+    """From 0 to 360 degrees, symmetric about the axis of the load."""
+    hoop = solved(tmp_path / "run", 2.0, 0.1, half=False).probe("hole")
+    assert hoop.angle[[0, -1]] == pytest.approx([0, 360], abs=1e-3)
+    assert hoop.s[-1] == pytest.approx(20 * np.pi, rel=1e-3)
+    assert hoop.at(90) == pytest.approx(hoop.at(270), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"edge": "bore"}, "has no edge 'bore'; its edges are"),
+        ({"edge": "hole", "quantity": "temperature"}, "has no 'temperature' there; there are hoop"),
+        ({"line": (100.0, 0.0, 101.0, 0.0)}, "no body lies on the line"),
+        ({"edge": "end", "quantity": "pressure"}, "has no side 'end'; its sides are"),
+        ({}, "give an edge or a line"),
+    ],
+)
+def test_what_cannot_be_probed_is_said(lug, asked, said):
+    with pytest.raises(archord.InputError, match=said):
+        lug.probe(**asked)
+    with pytest.raises(archord.InputError, match="has no point at 300 degrees"):
+        lug.probe("hole").at(300)
+
+
+def test_the_command_prints_and_draws(lug, tmp_path, capsys):
+    """The table, the largest value and where, the factor at an angle; a CSV file or a picture."""
+    asked = ["probe", str(lug.folder), "--edge", "hole", "--step", "2", "--over", "20", "--angle", "90", "-o"]
+    for name in ("probe.csv", "probe.png"):
+        assert command([*asked, str(tmp_path / name)]) == 0
+    out = capsys.readouterr().out
+    factor = lug.probe("hole", step=2).over(20)
+    assert f"at 90°: {factor.at(90):.6g}" in out
+    assert f"largest: {factor.values[factor.largest]:.6g} at" in out
+    with (tmp_path / "probe.csv").open(newline="") as file:
+        heading, *rows = csv.reader(file)
+    assert heading == ["s", "angle [°]", "x", "y", "hoop/(P/L)"]
+    assert len(rows) == len(factor.s)
+    assert (tmp_path / "probe.png").stat().st_size > 10_000
+
+
+def test_general_runs_are_shown_compared_and_exported(lug, tmp_path, capsys):
+    """Every command that reads a run reads this one."""
+    shutil.copytree(lug.folder, tmp_path / "other")
+    for arguments in (
+        ["show", str(lug.folder), "-o", str(tmp_path / "show.png")],
+        ["picture", str(lug.folder), "-o", str(tmp_path / "picture.png")],
+        ["compare", str(lug.folder), str(tmp_path / "other"), "-o", str(tmp_path / "compare.png")],
+    ):
+        assert command(arguments) == 0
+        assert (tmp_path / f"{arguments[0]}.png").stat().st_size > 10_000
+    out = capsys.readouterr().out
+    assert "pull force [N/mm]" in out
+    assert "largest difference" in out
+    assert "plastic strain first" not in out
+    assert len(export_csv(lug, tmp_path / "csv")) == 2
+    import meshio
+
+    files = export_vtk(lug, tmp_path / "vtk")
+    bodies = meshio.read(tmp_path / "vtk" / "bodies_0002.vtu")
+    assert {"stress_xx", "p1", "von_mises", "displacement"} <= set(bodies.point_data)
+    assert set(np.unique(bodies.cell_data["body"][0])) == set(lug.bodies.values())
+    assert len(files) == 5
