@@ -94,7 +94,7 @@ class MeshOrder:
         """Both vertices ``(k, 2)`` of every facet of the named sets, as nodes of the mesh, on rank 0. Collective."""
         tagged, comm = self.system.problem.mesh, self.system.comm
         mesh, found = tagged.mesh, {}
-        for name in tagged.facet_sets:
+        for name in (name for name, tags in tagged.facet_sets.items() if tags):
             facets = tagged.facets_in(name)
             ends = np.zeros((0, 2), dtype=np.int32)
             if len(facets):  # dolfinx divides by their number
