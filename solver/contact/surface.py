@@ -195,7 +195,8 @@ def _refuse(name: str, dofs: np.ndarray, x: Array, within: np.ndarray) -> None:
     """Raise ValueError unless the facets with nodes ``dofs`` ``(n, p + 1)`` at ``x`` are the boundary of a body."""
     if not len(dofs):
         raise ValueError(f"the contact surface {name!r} has no facets")
-    for a, b in x[within].mean(axis=1):
+    _, which, count = np.unique(np.sort(dofs[:, [0, -1]]), axis=0, return_inverse=True, return_counts=True)
+    for a, b in x[within | (count[which.ravel()] > 1)].mean(axis=1):  # two ranks may have a cell each
         raise ValueError(f"the contact surface {name!r} has facets within its body, the first at ({a:g}, {b:g})")
     for end in (0, -1):
         _, first, count = np.unique(dofs[:, end], return_index=True, return_counts=True)

@@ -269,6 +269,41 @@ def test_a_lost_point_is_an_error(monkeypatch, broken, name, value, said):
         closest(c, x, outward)
 
 
+def circle(n, centre=(0.0, 0.0)):
+    """A hole of radius 1 all the way round: its nodes, of ``n`` quadratic facets."""
+    angle = -np.pi * np.arange(2 * n) / n
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1) + centre
+
+
+def joined(*pieces):
+    """Closed pieces with nodes of quadratic facets in one curve."""
+    start = np.cumsum([0, *map(len, pieces)])
+    closed = [
+        s + (2 * np.arange(len(x) // 2)[:, None] + np.arange(3)) % len(x)
+        for s, x in zip(start[:-1], pieces, strict=True)
+    ]
+    return Curve(np.concatenate(pieces), 2, np.concatenate(closed))
+
+
+@pytest.mark.parametrize(("n", "start"), [(3, "near"), (5, "near"), (12, "near"), (12, 0), (12, "other")])
+def test_closest_points_on_several_pieces(n, start):
+    """Points within two holes find the nearest point of theirs, wherever the search starts; pieces of few facets too."""
+    c, rng = joined(circle(n), circle(n, (2.5, 0.0))), np.random.default_rng(1)
+    assert c.n_pieces == 2
+    lengths = c.arc_length(np.array([0.0, 1.0]))
+    np.testing.assert_allclose(lengths[[0, n], 0], 0, atol=1e-15)
+    assert lengths[n - 1, 1] == pytest.approx(lengths[-1, 1], rel=1e-12)
+    hole, angle = np.arange(40) % 2, rng.uniform(-np.pi, np.pi, 40)
+    ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    x = 0.9 * ray + [2.5, 0.0] * hole[:, None]
+    facet = {"near": None, "other": n * (1 - hole)}.get(start, np.full(40, start))
+    found = closest(c, x, ray, facet)
+    np.testing.assert_array_equal(found.facet // n, hole)
+    distance = np.linalg.norm(found.point - x, axis=1)
+    assert np.all(distance < brute_force(c, x) + 1e-12)
+    assert np.all(distance > brute_force(c, x) - 1e-3)
+
+
 def test_a_closed_curve_has_no_end():
     """A hole run all the way round: points that slide over the node where the chain closes keep exact partners."""
     whole = interpolate(lambda s: np.stack([np.cos(-2 * np.pi * s), np.sin(-2 * np.pi * s)], axis=-1), 12)

@@ -7,7 +7,14 @@ from dataclasses import replace
 import basix.ufl
 import numpy as np
 import pytest
-from dolfinx.mesh import compute_midpoints, create_mesh, exterior_facet_indices
+from dolfinx.mesh import (
+    CellType,
+    compute_midpoints,
+    create_mesh,
+    create_rectangle,
+    exterior_facet_indices,
+    locate_entities,
+)
 from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, strain
@@ -179,15 +186,15 @@ def test_a_gap_leaves_twoin_pieces():
     assert found.found.all()
 
 
-def test_a_surface_lies_on_the_boundary():
-    """A line within a body, and none at all, are refused."""
-    parts = joint_parts()
-    parts.V.mesh.topology.create_connectivity(1, 2)
-    links = parts.V.mesh.topology.connectivity(1, 2)
-    inner = next(f for f in range(links.num_nodes) if len(links.links(f)) == 2)
-    for facets, said in ([inner], "within its body"), ([], "no facets"):
-        with pytest.raises(ValueError, match=f"'hole'.*{said}"):
-            Surface(parts.V, np.array(facets, dtype=np.int32), ELASTIC, "hole")
+@pytest.mark.mpi
+def test_a_surface_lies_on_the_boundary(comm):
+    """A line within a body, between ranks too, and none at all, are refused."""
+    V = space(create_rectangle(comm, [[0, 0], [2.0, 3.0]], [4, 6], cell_type=CellType.quadrilateral))
+    V.mesh.topology.create_connectivity(1, 2)
+    for x, y in ((1.0, None), (None, 1.0), (None, 1.5), (None, 2.0), (5.0, None)):
+        facets = locate_entities(V.mesh, 1, lambda p, x=x, y=y: np.isclose(p[0] if y is None else p[1], y or x))
+        with pytest.raises(ValueError, match="'hole' has no facets" if x == 5 else "'hole' has facets within its body"):
+            Surface(V, facets, ELASTIC, "hole")
 
 
 @pytest.mark.parametrize(
