@@ -287,7 +287,7 @@ def joined(*pieces):
 
 @pytest.mark.parametrize(("n", "start"), [(3, "near"), (5, "near"), (12, "near"), (12, 0), (12, "other")])
 def test_closest_points_on_several_pieces(n, start):
-    """Points within two holes find the nearest point of theirs, wherever the search starts; pieces of few facets too."""
+    """Points within two holes find the nearest point of theirs, wherever the search starts; of few facets, too."""
     c, rng = joined(circle(n), circle(n, (2.5, 0.0))), np.random.default_rng(1)
     assert c.n_pieces == 2
     lengths = c.arc_length(np.array([0.0, 1.0]))
