@@ -55,6 +55,12 @@ class GeneralAccount:
         with timer("mesh"):
             problem = general_problem(scene, comm, partitioner)
         self.scene = scene
+        self._warnings: list[str] = []
+        with as_input_error(scene), timer("mesh"):
+            if scene.mesh.shape is None:
+                from archord.presets.held import check  # with scipy, which solves of presets do without
+
+                self._warnings = check(scene, problem)
         with as_input_error(scene):
             self.system = System(problem, timer=timer)
         self._supports = list(dict.fromkeys(s.name for s in problem.supports if s.name not in self.system.drive_names))
@@ -149,7 +155,7 @@ class GeneralAccount:
 
     def warnings(self) -> list[str]:
         """What to warn of before the first step."""
-        return []
+        return self._warnings
 
     def step_warnings(self, m: Record, profiles: Mapping[str, SurfaceProfile], residual: float) -> list[str]:
         """What to warn of after the step ``m``. Collective."""

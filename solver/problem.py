@@ -204,6 +204,8 @@ class Problem:
         """The body that a facet set belongs to. Collective; raises ValueError if it is not one."""
         tags = self.mesh.tags_behind(facets)
         found = [body for body in self.bodies if tags & set(self.mesh.cell_tags(body.cells or body.name))]
-        if len(found) != 1 or not tags <= set(self.mesh.cell_tags(found[0].cells or found[0].name)):
+        if not found:
+            raise ValueError(f"the facet set {facets!r} is of no body; is one missing?")
+        if len(found) > 1 or not tags <= set(self.mesh.cell_tags(found[0].cells or found[0].name)):
             raise ValueError(f"the facet set {facets!r} belongs to {len(tags)} cell sets, a surface to one body")
         return found[0]

@@ -32,4 +32,4 @@ def test_the_force_of_a_lug_is_that_of_other_codes(comm, monkeypatch, tmp_path):
 
 
 def test_every_example_is_tested():
-    assert {path.stem for path in FOLDER.glob("*.py")} == {"two_squares", "three_stack", "lug"}
+    assert {path.stem for path in FOLDER.glob("*.py")} == {"two_squares", "three_stack", "lug", "margin_of_safety"}

@@ -1,0 +1,77 @@
+"""Checks of a general scene on its mesh: what the mesh lacks, and whether something holds every body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from archord.geometry.meshes.check import check_mesh, free_motions
+from archord.geometry.meshes.fenicsx import gathered
+from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.materials.material import Array
+from archord.scene.problem import ProblemScene
+from archord.solver.problem import Problem
+
+_ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
+
+
+def check(scene: ProblemScene, problem: Problem) -> list[str]:
+    """Warnings about the mesh of ``scene`` and ``problem``. Collective; raises ValueError on all ranks for a mesh that
+    is at fault and a body that nothing holds."""
+    mesh = problem.mesh
+    cells = {body.name: body.cells for body in problem.bodies}
+    overlap = max((part.overlap + part.interference for part in scene.interaction), default=0.0)
+    in_mm = (scene.units.length, scene.units.stress) == ("mm", "MPa")
+    warnings = check_mesh(mesh, cells, [part.surfaces for part in scene.interaction], overlap, in_mm)
+    whole, failure = gathered(mesh), ""
+    owner = {name: problem.body_of(name).name for part in scene.interaction for name in part.surfaces}
+    if whole is not None:
+        failure = next(_loose(scene, mesh, whole, cells, owner), "")
+    if failure := mesh.mesh.comm.bcast(failure):
+        raise ValueError(failure)
+    return warnings
+
+
+def _loose(
+    scene: ProblemScene, mesh: TaggedMesh, whole: PlaneMesh, cells: dict[str, str], owner: dict[str, str]
+) -> Iterator[str]:
+    """What is said of bodies that neither supports nor contact hold; a turning one in contact is no fault."""
+    facets = {c.name: c.facets for c in scene.coupling}
+    held: dict[str, list[tuple[Array, Array]]] = {body: [] for body in cells}
+    given: list[tuple[str, str]] = [(s.on, freedom) for s in scene.support for freedom in s.fixed]
+    given += [(load.on, load.direction or "") for load in scene.load if load.displacement is not None]
+    inside = {body: _nodes(whole, name, of_cells=True) for body, name in cells.items()}
+    for on, freedom in given:
+        nodes = _nodes(whole, facets.get(on, on))
+        for body, of_body in inside.items():
+            here = np.intersect1d(nodes, of_body)
+            if len(here) and freedom in _ALONG:
+                held[body].append((whole.x[here], np.tile(_ALONG[freedom], (len(here), 1))))
+    links = []
+    for part in scene.interaction:
+        edges = whole.x[whole.edges[np.isin(whole.tags, whole.facet_sets[part.surfaces[-1]])][:, :2]]
+        middle, chord = edges.mean(axis=1), edges[:, 1] - edges[:, 0]
+        normals = [np.stack([chord[:, 1], -chord[:, 0]], axis=1) / np.linalg.norm(chord, axis=1)[:, None]]
+        if part.law == "tied":
+            normals.append(chord / np.linalg.norm(chord, axis=1)[:, None])
+        for normal in normals:
+            if part.rigid:
+                held[owner[part.surfaces[-1]]].append((middle, normal))
+            else:
+                links.append((owner[part.surfaces[0]], owner[part.surfaces[1]], middle, normal))
+    touched = {body for a, b, _, _ in links for body in (a, b)} | {owner[p.surfaces[-1]] for p in scene.interaction}
+    for body, free in free_motions(held, links).items():
+        free = [motion for motion in free if motion != "rotation" or body not in touched]
+        if free:
+            yield f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a [[support]]"
+
+
+def _nodes(whole: PlaneMesh, name: str, of_cells: bool = False) -> np.ndarray:
+    """Nodes of a facet, point or cell set, or of the cell set alone; none of another name."""
+    if name in whole.facet_sets and not of_cells:
+        return np.unique(whole.edges[np.isin(whole.tags, whole.facet_sets[name])])
+    if name in whole.point_sets and not of_cells:
+        return whole.point_sets[name]
+    return np.unique(whole.cells[np.isin(whole.bodies, whole.cell_sets.get(name, ()))])

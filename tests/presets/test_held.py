@@ -1,0 +1,84 @@
+"""What is said of a general scene on a mesh file that cannot be right."""
+
+import gmsh
+import pytest
+from mpi4py import MPI
+
+from archord.presets.general import GeneralAccount
+from archord.scene.errors import InputError
+from archord.scene.file import parse_any
+
+STEEL = {"E": 210000.0, "nu": 0.3}
+
+
+@pytest.fixture(scope="module")
+def squares(tmp_path_factory):
+    """Two squares of 10 mm, one on the other, their sides named by bottom, right, top and left."""
+    path = str(tmp_path_factory.mktemp("mesh") / "squares.msh")
+    gmsh.initialize()
+    gmsh.option.setNumber("General.Terminal", 0)
+    for k, name in enumerate(("lower", "upper")):
+        face = gmsh.model.occ.addRectangle(0, 10 * k, 0, 10, 10)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [face], name=name)
+        for side, (_, line) in zip("brtl", gmsh.model.getBoundary([(2, face)], oriented=False), strict=True):
+            gmsh.model.addPhysicalGroup(1, [line], name=f"{name} {side}")
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 5)
+    gmsh.model.mesh.generate(2)
+    gmsh.write(path)
+    gmsh.finalize()
+    return path
+
+
+def account(file: str, **changes) -> GeneralAccount:
+    data = {
+        "mesh": {},
+        "body": [{"name": "lower"} | STEEL, {"name": "upper"} | STEEL],
+        "interaction": [{"name": "contact", "surfaces": ["lower t", "upper b"]}],
+        "support": [
+            {"name": "base", "on": "lower b", "fixed": ["x", "y"]},
+            {"name": "wall", "on": "upper l", "fixed": ["x"]},
+        ],
+        "load": [{"name": "press", "on": "upper t", "direction": "y", "displacement": -0.01}],
+    }
+    data["mesh"] = {"file": file, **changes.pop("mesh", {})}
+    return GeneralAccount(parse_any(data | changes), MPI.COMM_SELF)
+
+
+def test_two_squares_are_no_fault(squares):
+    assert account(squares).warnings() == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"support": []}, "nothing holds the body 'lower': it is free in x; add"),
+        (
+            {"support": [{"name": "base", "on": "lower b", "fixed": ["y"]}]},
+            "nothing holds the body 'lower': it is free in x",
+        ),
+        (
+            {"support": [{"name": "base", "on": "lower b", "fixed": ["x", "y"]}]},
+            "nothing holds the body 'upper': it is free in x; add a ..support",
+        ),
+        ({"body": [{"name": "lower"} | STEEL]}, "the facet set .upper .. is of no body; is one missing"),
+        ({"interaction": [{"name": "c", "surfaces": ["lower t", "upper bb"]}]}, "'upper bb' .did you mean 'upper b'"),
+        ({"units": {"length": "mm"}, "mesh": {"scale": 0.001}}, "large; is it in metres"),
+        ({"load": [{"name": "p", "on": "top", "direction": "y", "displacement": 1.0}]}, "there is no .* 'top'"),
+    ],
+)
+def test_a_fault_is_said(squares, changes, said):
+    with pytest.raises(InputError, match=said) as fault:
+        account(squares, **changes)
+    assert len(str(fault.value).splitlines()) == 1
+
+
+def test_a_file_that_is_not_there():
+    with pytest.raises(InputError, match=r"nowhere.msh: No such file"):
+        account("nowhere.msh")
+
+
+def test_a_tie_holds_in_both_directions(squares):
+    tie = [{"name": "tie", "surfaces": ["lower t", "upper b"], "law": "tied"}]
+    support = [{"name": "base", "on": "lower b", "fixed": ["x", "y"]}]
+    assert account(squares, interaction=tie, support=support).warnings() == []
