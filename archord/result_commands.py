@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -110,21 +110,12 @@ def picture(folder: Path, output: Path | None) -> int:
 @click.option("--angle", "angles", type=float, multiple=True, help="tell the value at this angle of an arc [°]")
 @click.option("--over", type=float, metavar="LENGTH", help="over P / LENGTH, the mean stress in a section")
 @output("table (.csv) or picture to write")
-def probe(
-    folder: Path,
-    edge: str,
-    line: tuple[float, float, float, float] | None,
-    step: int | None,
-    quantity: str,
-    angles: tuple[float, ...],
-    over: float | None,
-    output: Path | None,
-) -> int:
+def probe(folder: Path, angles: tuple[float, ...], over: float | None, output: Path | None, **asked: Any) -> int:
     """Print a quantity along an edge or a line of a run, its largest value and where; and draw it."""
     from archord.postprocess.run import Run
     from archord.postprocess.tables import probe_text
 
-    found = Run(folder).probe(edge, quantity, step, line)
+    found = Run(folder).probe(**asked)
     found = found.over(over) if over is not None else found
     print(probe_text(found, angles))
     if output is not None:

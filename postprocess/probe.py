@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -83,8 +84,9 @@ def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
         angle = None if round_ is None else np.degrees(np.arctan2(*(x - round_[0]).T[::-1]))
         return Probe(*head, x, table["s"].to_numpy(), table[quantity].to_numpy(), angle)
     fields = run.fields(step)
-    if edge not in fields.edges:
-        raise InputError(f"{run.folder}: has no edge {edge!r}; its edges are {', '.join(fields.edges) or 'none'}.")
+    edges = [name for name, facets in fields.edges.items() if len(facets)]
+    if edge not in edges:
+        raise InputError(f"{run.folder}: has no edge {edge!r}; its edges are {', '.join(edges) or 'none'}.")
     rows, begins, radius = _oriented(fields, edge)
     nodes, index = np.unique(rows, return_inverse=True)
     curve = Curve(fields.coordinates[nodes], 2, index.reshape(rows.shape))
@@ -92,19 +94,19 @@ def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
     first = np.maximum.accumulate(np.where(s[:, 0] == 0, np.arange(len(rows)), 0))  # facet of each piece
     angle = begins[first, None] + np.degrees(s / radius)
     tangent, joined = _tangents(curve)
-    known = at_nodes(fields, run)
-    xx, yy, xy = (known[f"stress_{c}"][rows] for c in ("xx", "yy", "xy"))
-    c, d = np.moveaxis(tangent, -1, 0)
-    hoop = xx * c**2 + yy * d**2 + 2 * xy * c * d
-    values = {"hoop": hoop, "normal": xx + yy - hoop, "shear": (yy - xx) * c * d + xy * (c**2 - d**2)}
-    values |= {name: whole[rows] for name, whole in known.items()}
+    values = {name: whole[rows] for name, whole in at_nodes(fields).items()}
+    if fields.stress is not None:
+        xx, yy, _, xy = np.moveaxis(fields.stress[rows], -1, 0)
+        c, d = np.moveaxis(tangent, -1, 0)
+        hoop = xx * c**2 + yy * d**2 + 2 * xy * c * d
+        values |= {"hoop": hoop, "normal": xx + yy - hoop, "shear": (yy - xx) * c * d + xy * (c**2 - d**2)}
     shown = np.ones(rows.shape, dtype=bool)
     shown[:, 2] = ~joined
     at = (fields.coordinates[rows], s, _one(values, quantity, run), *([angle] if radius < np.inf else []))
     return Probe(*head, *(array[shown] for array in at))
 
 
-def probe_line(run: Run, line: tuple[float, float, float, float], quantity: str, step: int) -> Probe:
+def probe_line(run: Run, line: Sequence[float], quantity: str, step: int) -> Probe:
     """One of `at_nodes` on the straight ``line`` from (x0, y0) to (x1, y1) where it is in a body before it is loaded,
     linear between nodes. Raises `InputError`."""
     from matplotlib.tri import LinearTriInterpolator, Triangulation
@@ -112,7 +114,7 @@ def probe_line(run: Run, line: tuple[float, float, float, float], quantity: str,
     start, end, share = np.array(line[:2]), np.array(line[2:]), np.linspace(0, 1, _SAMPLES)
     fields, x = run.fields(step), start + share[:, None] * (end - start)
     found: Array = np.full(_SAMPLES, np.nan)
-    values = _one(at_nodes(fields, run), quantity, run)
+    values = _one(at_nodes(fields), quantity, run)
     for body in fields.bodies.values():
         triangles = Triangulation(*fields.coordinates.T, fields.triangles[fields.body == body].reshape(-1, 3))
         here = np.ma.filled(LinearTriInterpolator(triangles, values)(*x.T), np.nan)
@@ -126,16 +128,15 @@ def probe_line(run: Run, line: tuple[float, float, float, float], quantity: str,
     )
 
 
-def at_nodes(fields: Fields, run: Run) -> dict[str, Array]:
-    """What there is to probe: values ``(n,)`` at the nodes by name. Raises `InputError` if no stress is among them."""
-    if fields.stress is None:
-        raise InputError(f"{run.folder}: has no stress at nodes: it was solved with output.stress = false.")
+def at_nodes(fields: Fields) -> dict[str, Array]:
+    """What there is to probe: values ``(n,)`` at the nodes by name; stresses only where `output.stress` wrote them."""
     return fields.nodal_fields() | {"ux": fields.displacement[:, 0], "uy": fields.displacement[:, 1]}
 
 
 def _one(known: dict[str, Array], quantity: str, run: Run) -> Array:
     if quantity not in known:
-        raise InputError(f"{run.folder}: has no {quantity!r} there; there are {', '.join([*known, *CONTACT])}.")
+        why = "" if run.scene.output.stress else " (the run was solved with output.stress = false)"
+        raise InputError(f"{run.folder}: has no {quantity!r} there, but {', '.join(known)}{why}.")
     return known[quantity]
 
 

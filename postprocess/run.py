@@ -6,6 +6,7 @@ Arrays and tables are read when they are asked for, and pandas is imported only 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -129,23 +130,14 @@ class Run:
         "plastic_strain" and "peeq". Raises `InputError` without such a step, and if the run did not write them."""
         return read_points(self.folder, self.scene, self.number(step))
 
-    def probe(
-        self,
-        edge: str = "",
-        quantity: str = "",
-        step: int | None = None,
-        line: tuple[float, float, float, float] | None = None,
-    ) -> Probe:
+    def probe(self, edge: str = "", quantity: str = "", step: int | None = None, line: Sequence[float] = ()) -> Probe:
         """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1 (von Mises') at ``step`` (the
         last): see `probe_edge` and `probe_line`. Raises `InputError`."""
-        if bool(edge) == (line is not None):
+        if bool(edge) == bool(line):
             raise InputError("probe: give an edge or a line.")
-        step = self.number(step)
-        return (
-            probe_line(self, line, quantity or "von_mises", step)
-            if line
-            else probe_edge(self, edge, quantity or "hoop", step)
-        )
+        if line:
+            return probe_line(self, line, quantity or "von_mises", self.number(step))
+        return probe_edge(self, edge, quantity or "hoop", self.number(step))
 
     def number(self, step: int | None) -> int:
         """``step``, or that of the last accepted one. Raises `InputError` if the run has none such."""

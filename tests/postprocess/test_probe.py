@@ -92,7 +92,7 @@ def test_a_whole_hole_runs_round_once(tmp_path):
     ("asked", "said"),
     [
         ({"edge": "bore"}, "has no edge 'bore'; its edges are"),
-        ({"edge": "hole", "quantity": "temperature"}, "has no 'temperature' there; there are hoop"),
+        ({"edge": "hole", "quantity": "temperature"}, "has no 'temperature' there, but stress_xx"),
         ({"line": (100.0, 0.0, 101.0, 0.0)}, "no body lies on the line"),
         ({"edge": "end", "quantity": "pressure"}, "has no side 'end'; its sides are"),
         ({}, "give an edge or a line"),
@@ -143,3 +143,14 @@ def test_general_runs_are_shown_compared_and_exported(lug, tmp_path, capsys):
     assert {"stress_xx", "p1", "von_mises", "displacement"} <= set(bodies.point_data)
     assert set(np.unique(bodies.cell_data["body"][0])) == set(lug.bodies.values())
     assert len(files) == 5
+
+
+def test_a_joint_is_probed_too_but_for_what_it_did_not_write(runs):
+    """Pressure and displacement of a run without stress, which a sentence says."""
+    joint = archord.load(runs["coarse"])
+    pressure = joint.probe("hole", "pressure")
+    assert pressure.force == joint.columns["P"][-1]
+    assert pressure.at(-90) == pytest.approx(joint.columns["p0"][-1], rel=0.02)
+    assert np.abs(joint.probe("hole", "ux").values).max() > 0
+    with pytest.raises(archord.InputError, match="has no 'hoop' there, but ux, uy .*output.stress = false"):
+        joint.probe("hole")
