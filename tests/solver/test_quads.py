@@ -44,6 +44,10 @@ def test_contact_patch(order, degree, quads, comm):
     assert -system.reaction("lid")[1] == pytest.approx(pressure, rel=1e-9)
     for pair in system.contact.pairs:
         np.testing.assert_allclose(pair.pressure, pressure, rtol=1e-9)
+    fields = collect_fields(MeshOrder(system), at_points=False)
+    touching = fields["contact_state"] > 0
+    np.testing.assert_allclose(fields["contact_pressure"][touching], pressure, rtol=1e-9)
+    assert comm.bcast(int(touching.sum())) == 4 + 6
     u = system.equilibrium.displacement()
     expected = DEPTH / 2 * np.stack([NU / (1 - NU) * x[:, 0], -1 - x[:, 1]], axis=1)
     np.testing.assert_allclose(u, expected, rtol=0, atol=1e-9 * DEPTH)

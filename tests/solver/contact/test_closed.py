@@ -61,7 +61,9 @@ def rings(comm: MPI.Comm, quarters: int, gap: bool = False, **options) -> Tagged
     return gmsh_to_mesh(comm, build, lambda x, tag: on_circle(x, 0, radii[tag]) if tag in radii else x, **options)
 
 
-def press(mesh: TaggedMesh, angle: float = 0.0, symmetry: float = 1.0, **contact) -> tuple[System, float]:
+def press(
+    mesh: TaggedMesh, angle: float = 0.0, symmetry: float = 1.0, degree: int = 2, **contact
+) -> tuple[System, float]:
     """The bush's bore moved by ``PUSH``, down and turned by ``angle``; the system and the force along that way."""
     way = np.array([np.sin(angle), -np.cos(angle)])
     supports = [Support("outer", "outer", axis) for axis in range(2)]
@@ -69,7 +71,7 @@ def press(mesh: TaggedMesh, angle: float = 0.0, symmetry: float = 1.0, **contact
     supports += [Support("cuts", "cuts", 0)] if symmetry > 1 else []
     bodies = [Body("bush", ELASTIC), Body("ring", ELASTIC)]
     contact = Interaction("contact", ("pin", "hole"), **contact)
-    system = solve(Problem(mesh, bodies, [contact], supports, symmetry=symmetry), [PUSH])
+    system = solve(Problem(mesh, bodies, [contact], supports, symmetry=symmetry, degree=degree), [PUSH])
     force = system.contact_force()
     balance = max(np.abs(force + system.reaction("outer")).max(), np.abs(force - system.reaction("bore")).max())
     assert symmetry > 1 or balance < 1e-9 * np.abs(force).max()
@@ -97,6 +99,17 @@ def test_a_whole_pin_in_a_whole_hole_is_twice_its_half(quads, kinematics):
     force, x = (hole.weight * pair.pressure).sum(axis=1), hole.point.mean(axis=1)
     left, right = (force[np.sign(x[:, 0]) == s][np.argsort(x[np.sign(x[:, 0]) == s, 1])] for s in (-1, 1))
     assert np.abs(left - right).max() < 0.02 * force.max()
+
+
+@pytest.mark.parametrize("quads", [False, True])
+def test_cells_and_orders_agree(quads):
+    """Triangles and quads, geometry and displacements of second and third order, also one of each: P and its peak."""
+    fine, expected = press(rings(MPI.COMM_SELF, 4, quads=not quads, order=3), degree=3)
+    peak = fine.contact.pair_of(fine.sides["hole"]).pressure.max()
+    for order, degree in ((2, 2), (2, 3), (3, 2)):
+        system, force = press(rings(MPI.COMM_SELF, 4, quads=quads, order=order), degree=degree)
+        assert force == pytest.approx(expected, rel=2e-4)
+        assert system.contact.pair_of(system.sides["hole"]).pressure.max() == pytest.approx(peak, rel=0.01)
 
 
 def test_forces_do_not_depend_on_where_the_seam_lies():
