@@ -22,6 +22,7 @@ from archord.scene.errors import InputError
 FILES = {
     "solve_commands": ("solve", "scene"),
     "result_commands": ("show", "compare", "export", "export-deck", "picture", "probe"),
+    "mesh_commands": ("mesh",),
     "sweep_commands": ("sweep",),
     "law_commands": ("laws", "law", "fit"),
     "benchmark_commands": ("reproduce", "benchmark"),

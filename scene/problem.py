@@ -19,6 +19,13 @@ CHOSEN = ("stepping", "initial"), ("stepping", "maximum")  # what an accuracy ch
 LIVE: dict[str, Any] = {}  # meshes given from Python, by what stands in the place of their file
 
 
+class MeshScene(Checked):
+    """A mesh alone, with the keys of its section."""
+
+    newest: ClassVar[int] = FORMAT
+    mesh: Mesh = Field(description="the mesh")
+
+
 class ProblemScene(Checked):
     """Bodies on a mesh, what they touch, what holds them and what loads them.
 

@@ -29,6 +29,12 @@ RUN, OTHER = "{coarse}", "{elastic}"
         (["fit", RUN, "--json", "/dev/full"], "/dev/full: cannot be written: No space left on device."),
         (["reproduce", "fig2", "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be used for results: File"),
         (["export-deck", SCENE, "-o", RUN], f"{RUN}: cannot be written: it is a folder."),
+        (["mesh", "nowhere.msh"], "nowhere.msh: No such file or directory."),
+        (["mesh", "empty"], "empty: is none of the files of meshes that are read: .msh, .inp, .xdmf."),
+        (
+            ["mesh", "x.msh", "--set", "mesh.scal=2"],
+            "--set mesh.scal=2: mesh.scal is not a known key; did you mean ",
+        ),
         (
             ["solve", SCENE, "--set", "analysis.accuracy=0.02", "--set", "joint.growth=0.5"],
             "--set joint.growth=0.5: joint.growth must not be given together with analysis.accuracy, which chooses it.",

@@ -33,8 +33,7 @@ def _at(x: Array) -> str:
 
 def faults(mesh: PlaneMesh) -> list[str]:
     """Why nothing can be computed on ``mesh``: cells that are folded, collapsed, there twice, or three at an edge."""
-    (kind, order), said, middle = cell_kind(mesh.cells.shape[1]), [], mesh.x[mesh.cells].mean(axis=1)
-    J = np.einsum("jqa,nai->nqij", tabulate(kind, order, bulk_quadrature(kind, order + 1)[0])[1:], mesh.x[mesh.cells])
+    J, said, middle = _jacobians(mesh)[0], [], mesh.x[mesh.cells].mean(axis=1)
     det, size = np.linalg.det(J), (J**2).sum(axis=(2, 3)).max(axis=1)
     bad = (det.min(axis=1) <= _FLAT * size) & (det.max(axis=1) >= -_FLAT * size)
     if bad.any():
@@ -48,6 +47,19 @@ def faults(mesh: PlaneMesh) -> list[str]:
         place = mesh.x[sides_of(mesh.cells)[crowded[0]]].mean(axis=0)
         said.append(f"{len(crowded)} edges belong to more than two cells, the first at {_at(place)}: cells overlap")
     return said
+
+
+def _jacobians(mesh: PlaneMesh) -> tuple[Array, Array]:
+    """At ``q`` points of each cell ``(n, q, 2, 2)``, and the points' weights."""
+    kind, order = cell_kind(mesh.cells.shape[1])
+    X, w = bulk_quadrature(kind, order + 1)
+    return np.einsum("jqa,nai->nqij", tabulate(kind, order, X)[1:], mesh.x[mesh.cells]), w
+
+
+def areas(mesh: PlaneMesh) -> Array:
+    """Area ``(n,)`` of each cell."""
+    J, w = _jacobians(mesh)
+    return np.abs(np.linalg.det(J)) @ w
 
 
 def check_mesh(
@@ -74,7 +86,7 @@ def check_mesh(
         checks = [*every, *(_of_surface(mesh, inside, name) for pair in pairs for name in pair)]
         checks += [_overlaps(mesh, inside, overlap), *(sagitta(mesh, *pair) for pair in pairs if len(pair) == 2)]
         found = next((said for check in checks for said in check), "")
-        warnings = [said for body, cells in inside.items() for said in _cracks(mesh, body, cells)]
+        warnings = [said for body, cells in inside.items() for said in cracks(mesh, body, cells)]
     found, warnings = tagged.mesh.comm.bcast((found, warnings))
     if found:
         raise ValueError(found)
@@ -170,7 +182,8 @@ def _distance(x: Array, start: Array, end: Array) -> Array:
     return np.linalg.norm(to - xi[..., None] * along, axis=2).min(axis=1, initial=np.inf)
 
 
-def _cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
+def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
+    """A warning of nodes of a ``body`` of these ``cells`` that ought to be one."""
     sides = sides_of(mesh.cells[cells])
     first, which = distinct_edges(sides[:, :2])
     nodes = np.unique(sides[first[np.bincount(which) == 1], :2])

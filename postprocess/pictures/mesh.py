@@ -1,0 +1,87 @@
+"""A mesh for people: its cells, named sets and circles as text, and a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from archord.geometry.basis import Array, cell_kind
+from archord.geometry.curve import Curve
+from archord.geometry.meshes.check import areas, circle_through, cracks, parts
+from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_of
+from archord.postprocess.pictures.pictures import save_figure
+from archord.report.figure import new_figure
+from archord.report.table import Table
+
+
+def mesh_text(name: str, mesh: PlaneMesh) -> str:
+    """What is in ``mesh``, in tables with a row a set; warnings come last."""
+    (kind, order), area = cell_kind(mesh.cells.shape[1]), areas(mesh)
+    size, low = np.ptp(mesh.x, axis=0), mesh.x.min(axis=0)
+    extent = f"{size[0]:g} by {size[1]:g} from ({low[0]:g}, {low[1]:g})"
+    head = f"{name}: {len(mesh.cells)} {kind.name}s of order {order}, {len(mesh.x)} nodes, {extent}"
+    cells = {name: np.isin(mesh.bodies, tags) for name, tags in mesh.cell_sets.items()}
+    bodies = Table("cell set", "cells", "area", "parts", left=1)
+    for name, inside in cells.items():
+        bodies.add(name, inside.sum(), f"{area[inside].sum():.6g}", parts(mesh.cells[inside]).max(initial=-1) + 1)
+    facets = Table("facet set", "of", "circle", "facets", "length", "shortest", "longest", left=3)
+    for name, tags in mesh.facet_sets.items():
+        facets.add(name, *_facet_row(mesh, mesh.edges[np.isin(mesh.tags, tags)], cells))
+    points = Table("point set", "nodes", left=1, rows=((name, len(nodes)) for name, nodes in mesh.point_sets.items()))
+    warnings = [f"warning: {said}" for name, inside in cells.items() for said in cracks(mesh, name, inside)]
+    tables = [str(table) for table in (bodies, facets, points) if table.rows]
+    return "\n\n".join([head, *tables, *filter(None, ["\n".join(warnings)])])
+
+
+def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarray]) -> list[object]:
+    nodes, count = np.unique(edges[:, :2], return_counts=True)
+    behind = sides_between(mesh.cells, edges[:, :2]) * len(mesh.cells) // len(sides_of(mesh.cells))
+    owners = ", ".join(name for name, inside in cells.items() if inside[behind].any())
+    length, circle = _lengths(mesh, edges), circle_through(mesh.x[nodes]) if len(nodes) else None
+    said = ["closed"] if len(nodes) and (count == 2).all() else []
+    if circle:
+        (x, y), radius = circle[0].round(9) + 0.0, circle[1]
+        straight = [f"sagitta {length.max() ** 2 / (8 * radius):.2g}"] if edges.shape[1] == 2 else []
+        said = [f"({x:.5g}, {y:.5g}) R {radius:.8g}", *straight, *said]
+    sizes = length.sum(), length.min(initial=np.inf), length.max(initial=0.0)
+    return [owners, ", ".join(said), len(edges), *(f"{value:.5g}" for value in sizes)]
+
+
+def _along(edges: np.ndarray) -> np.ndarray:
+    """The nodes of ``edges`` from end to end."""
+    return edges[:, [0, *range(2, edges.shape[1]), 1]]
+
+
+def _lengths(mesh: PlaneMesh, edges: np.ndarray) -> Array:
+    q, w = np.polynomial.legendre.leggauss(8)
+    _, slope = Curve(np.zeros((edges.shape[1], 2)), edges.shape[1] - 1).shapes((q + 1) / 2)
+    return np.linalg.norm(np.einsum("qa,kai->kqi", slope, mesh.x[_along(edges)]), axis=2) @ w / 2
+
+
+def draw_mesh(mesh: PlaneMesh, target: Path) -> Path:
+    """The cells, facets and points of named sets, each set in a colour, small ones over large; returns ``target``.
+    Raises `InputError`."""
+    from matplotlib import colormaps
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    size = np.ptp(mesh.x, axis=0)
+    figure = new_figure(9.0, float(np.clip(9.0 * size[1] / size[0], 3.0, 12.0)))
+    axes, colours, faint = figure.add_subplot(), colormaps["tab10"], colormaps["Pastel2"]
+    sides = mesh.x[_along(sides_of(mesh.cells))]
+    around = [[0, 1, 2], [0, 1, 3, 2]][len(sides) // len(mesh.cells) - 3]
+    for k, (name, tags) in enumerate(mesh.cell_sets.items()):
+        inside = mesh.x[mesh.cells[np.isin(mesh.bodies, tags)]][:, around]
+        axes.add_collection(PolyCollection(inside, facecolors=[faint(k % 8)], label=name, zorder=-len(inside)))
+    axes.add_collection(LineCollection(sides, colors="0.5", linewidths=0.3, zorder=1))
+    for k, (name, tags) in enumerate(mesh.facet_sets.items()):
+        edges = mesh.x[_along(mesh.edges[np.isin(mesh.tags, tags)])]
+        above = 3 - len(edges) / len(mesh.edges)
+        axes.add_collection(LineCollection(edges, colors=[colours(k % 10)], linewidths=2.0, label=name, zorder=above))
+    for k, (name, nodes) in enumerate(mesh.point_sets.items()):
+        axes.plot(*mesh.x[nodes].T, ".", color=colours((k + len(mesh.facet_sets)) % 10), label=name)
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    figure.legend(loc="outside right upper")
+    return save_figure(figure, target)
