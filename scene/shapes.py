@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from archord.scene.keys import Positive, Section, key, require
 from archord.scene.scene import Checked
-from archord.scene.sections import Modelling, Output, Pin, Solid, Stepping, Steps, Targets, Units
+from archord.scene.sections import Modelling, Pin, ProblemOutput, Solid, Stepping, Steps, Targets, Units
 
 _THINNEST, _DEEPEST, _FARTHEST = 0.02, 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
 PinPart = Literal["half", "whole", "none"]
@@ -134,7 +134,7 @@ class Preset(Checked):
     load: PinLoad = Field(description="loading")
     analysis: Modelling = Field(default_factory=Modelling, description="model and solver")
     stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
-    output: Output = Field(default_factory=Output, description="what is written")
+    output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
     def _require_whole(self, name: str, inner: float, outer: float) -> None:
         whole = self.pin.whole or self.pin.rigid or inner <= outer
