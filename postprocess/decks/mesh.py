@@ -58,7 +58,8 @@ class DeckMesh:
 
     def forces(self, of_dofs: Array) -> Array:
         """Nodal forces ``(n, 2)`` that do the work of those of the dofs."""
-        out = np.concatenate([of_dofs, np.zeros((self.dofs.max(initial=0) + 1 - len(of_dofs), 2))])
+        out = np.zeros((max(len(of_dofs), self.dofs.max() + 1), 2))
+        out[: len(of_dofs)] = of_dofs
         np.add.at(out, self.middles[:, :8], _OF_MIDDLE[:, None] * out[self.middles[:, 8:]])
         return out[self.dofs]
 

@@ -7,13 +7,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from archord.benchmarks.case import paper_joint
 from archord.benchmarks.peers.calculix import areas
 from archord.cli import run
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.shapes.bushing import bushing
+from archord.materials.elasticity import Elastic
 from archord.postprocess.decks.deck import contact_stiffness, deck, system_of
 from archord.postprocess.decks.mesh import deck_mesh
 from archord.scene.file import resolved
+from archord.solver.problem import Body, Drive, Interaction, Load, Mean, Problem, Support
+from archord.solver.system import System
 
 W, DR, STEPS = 4.0, 0.005, 3
 COARSE = {"element_size": 0.2, "block_size": W, "growth": 0.5}
@@ -179,6 +185,74 @@ def test_a_rigid_pin_moves_as_a_whole():
     assert sorted({round(r, 12) for r in radii}) == [0.8, 1.0]
 
 
+def press_fit(drawn):
+    """The deck of a pin in a sleeve, which interferes with its housing by 0.02: drawn so, or to be drawn so."""
+    joint = bushing(MPI.COMM_SELF, 10.0, [(10.05, 14.0), (13.98 if drawn else 14.0, 30.0)], 2.0, 0.5)
+    bodies = [Body(name, Elastic(2e5, 0.3, "strain")) for name in ("pin", "sleeve 1", "housing")]
+    fit = Interaction("fit", ("sleeve 1 outside", "bore"), **{"overlap" if drawn else "interference": 0.02})
+    supports = [Support("held", "outer edge", 0), Support("held", "outer edge", 1), Support("axis", "axis", 1)]
+    drives = [Drive("press", (0.0, 0.0, 100.0), "force")]
+    problem = Problem(
+        joint, bodies, [Interaction("inside", ("pin", "sleeve 1 inside")), fit],
+        [*supports, Support("press", "flat", 0, 1.0, "press")],
+        drives=drives, fit=True, stabilise=True, symmetry=2.0,
+    )  # fmt: skip
+    system = System(problem)
+    mesh = deck_mesh(system)
+    return read(deck(system, mesh, [1.0, 1.5, 2.0])), mesh
+
+
+def test_an_interference_is_drawn_and_what_floats_hangs_on_springs():
+    """Radii of the sleeve's outer nodes; springs in two directions for bodies that no support holds sideways. Half the
+    force on a node of its own, of which the nodes of the flat side are equals."""
+    for drawn in (False, True):
+        found, _ = press_fit(drawn)
+        radii = {name: [math.hypot(*found.nodes[n]) for n in found.sets[name]] for name in ("SLEEVE_1_OUTSIDE", "BORE")}
+        apart = np.mean(radii["SLEEVE_1_OUTSIDE"]) - np.mean(radii["BORE"])
+        assert apart == pytest.approx(0.02, rel=1e-3)
+    springs = [p["ELSET"] for keyword, p, _ in found.blocks if keyword == "*SPRING"]
+    assert springs == ["PIN_SPRINGS_1", "PIN_SPRINGS_2", "SLEEVE_1_SPRINGS_1", "SLEEVE_1_SPRINGS_2"]
+    (own,) = found.sets["DRIVES"] if "DRIVES" in found.sets else [max(found.nodes)]
+    assert [rows for keyword, _, rows in found.blocks if keyword == "*CLOAD"] == [
+        [[str(own), "1", force]] for force in ("0.0", "25.0", "50.0")
+    ]
+    equations = [rows for keyword, _, rows in found.blocks if keyword == "*EQUATION"]
+    assert {int(rows[1][0]) for rows in equations} == found.sets["FLAT"]
+    assert all(rows[1][3:] == [str(own), "1", "-1.0"] for rows in equations)
+
+
+@pytest.mark.parametrize("control", ["displacement", "force"])
+def test_a_mean_and_a_body_force_on_quadrilaterals(control):
+    """Nodal forces sum to half the force on the whole although the middles of nine nodes are gone; a mean displacement
+    is an equation whose factors sum to zero."""
+
+    def build(gmsh):
+        face = gmsh.model.occ.addRectangle(0, 0, 0, 4, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [face], name="bar")
+        for line, name in ((4, "left"), (2, "right")):
+            gmsh.model.addPhysicalGroup(1, [line], name=name)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+
+    wall = [Support("wall", "left", axis) for axis in (0, 1)]
+    problem = Problem(
+        gmsh_to_mesh(MPI.COMM_SELF, build, quads=True), [Body("bar", Elastic(2e5, 0.3, "strain"))], (), wall,
+        [Load("bar", (1.0, 0.0), drive="weight")], [Mean("end", "right", 1, (4.0, 0.5), "end")],
+        [Drive("weight", (0.0, 8.0)), Drive("end", (0.0, 3.0), control)], symmetry=2.0,
+    )  # fmt: skip
+    system = System(problem)
+    mesh = deck_mesh(system)
+    found = read(deck(system, mesh, [1.0]))
+    assert {len(nodes) for nodes in found.elements.values()} == {8}
+    assert sum(areas(mesh.x[mesh.elements["bar"]])) == pytest.approx(4)
+    loads = np.array([row for keyword, _, rows in found.blocks if keyword == "*CLOAD" for row in rows], float)
+    sums = [loads[loads[:, 1] == axis, 2].sum() for axis in (1, 2)]
+    assert sums == pytest.approx([4.0, 1.5 if control == "force" else 0.0])
+    factors = [row for keyword, _, rows in found.blocks if keyword == "*EQUATION" for row in rows[1:]]
+    assert bool(factors) == (control == "displacement")
+    assert sum(float(f) for row in factors for f in row[2::3]) == pytest.approx(0, abs=1e-12)
+
+
 @pytest.mark.parametrize("unit", [1000.0, 1e-3])
 def test_the_deck_does_not_depend_on_the_unit_of_length(unit):
     """Nodes scale to the digits of the format, and the penetration with them."""
@@ -188,7 +262,7 @@ def test_the_deck_does_not_depend_on_the_unit_of_length(unit):
     np.testing.assert_allclose(np.array(list(b.nodes.values())) / unit, list(a.nodes.values()), rtol=0, atol=1e-12)
     stiff, stiffer = (contact_stiffness(d.system.problem, d.mesh, d.system.problem.interactions[0]) for d in (a, b))
     assert stiffer * unit == pytest.approx(stiff)
-    assert stiff == pytest.approx(1e4 / 4)
+    assert stiff == pytest.approx(2500)
 
 
 def test_the_command_writes_a_deck_and_nothing_over_what_is_there(tmp_path, monkeypatch, capsys, refused):
