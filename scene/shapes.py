@@ -12,7 +12,7 @@ from archord.scene.keys import Positive, Section, key, require
 from archord.scene.scene import Checked
 from archord.scene.sections import Modelling, Pin, ProblemOutput, Solid, Stepping, Steps, Targets, Units
 
-_THINNEST, _DEEPEST, _FARTHEST = 0.02, 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
+_THINNEST, _DEEPEST, _FARTHEST = 0.02 * (1 - 1e-9), 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
 PinPart = Literal["half", "whole", "none"]
 
 
@@ -83,7 +83,10 @@ class Bushing(Shape):
         default=[],
         other=[[10.05, 14.0], [13.98, 30.0]],
     )
-    touching: bool = key("bodies with clearance touch on the load axis at first, or are concentric", default=False)
+    touching: bool = key(
+        "bodies with clearance touch on the load axis at first, as they do for a force, or are concentric",
+        default=False,
+    )
     kind: Literal["bushing"] = "bushing"
 
     @model_validator(mode="after")
@@ -213,7 +216,8 @@ class BushingScene(Preset):
         """The general scene that it stands for."""
         solids: dict[str, Solid] = {f"sleeve {k}": sleeve for k, sleeve in enumerate(self.sleeve, 1)}
         surfaces = ["pin", *(f"{name} {side}" for name in solids for side in ("inside", "outside")), "bore"]
-        shape = self.bushing.model_copy(update={"rings": self._rings(), "touching": self.load.force is not None})
+        touching = self.bushing.touching or self.load.force is not None
+        shape = self.bushing.model_copy(update={"rings": self._rings(), "touching": touching})
         radii = [shape.radius, *(r for ring in shape.rings for r in ring)][:-1]
         return self._general(shape, solids | {"housing": self.housing}, "outer edge", surfaces, radii)
 

@@ -127,10 +127,19 @@ def test_lugs_from_slender_to_stout_are_allowed(width, edge):
 
 
 def test_walls_may_be_thin():
-    """Two walls of 0.02 R, the second with its bore in the first one's outside."""
-    sleeves = [STEEL | {"bore": 10.02, "outer": 10.22}, STEEL | {"bore": 10.21, "outer": 10.42}]
-    scene = parse_any(changed(BUSHING, "sleeve", sleeves) | {"housing": STEEL | {"bore": 10.42, "outer": 30.0}})
+    """Two walls of 0.02 R to round-off, the second with its bore in the first one's outside."""
+    sleeves = [STEEL | {"bore": 10.24, "outer": 10.44}, STEEL | {"bore": 10.43, "outer": 10.63}]
+    scene = parse_any(changed(BUSHING, "sleeve", sleeves) | {"housing": STEEL | {"bore": 10.63, "outer": 30.0}})
     assert [i.overlap for i in scene.interaction] == pytest.approx([0.0, 0.01, 0.0])
+
+
+def test_bodies_touch_at_first_under_a_force():
+    """Or where the scene says so; else they are concentric."""
+    shapes = [
+        parse_any(data).mesh.shape
+        for data in (BUSHING, changed(BUSHING, "bushing.touching", True), BUSHING | {"load": {"force": 1.0}})
+    ]
+    assert [shape.touching for shape in shapes] == [False, True, True]
 
 
 def pulled(data: dict, **sections) -> System:
