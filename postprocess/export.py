@@ -34,10 +34,12 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
     from archord.postprocess.frames import with_headings
 
     run.number(None)
-    steps = {(n, load): run.pressure(n) for n, load in enumerate(run.path, 1)}
-    contact = pd.concat(steps, names=["step", "delta" if run.is_joint else "load_factor"]).reset_index(level=[0, 1])
-    contact.attrs["units"] = run.pressure().attrs["units"] | {"delta": run.scene.units.length}
-    tables = {folder / "history.csv": run.history, folder / "contact.csv": contact}
+    tables = {folder / "history.csv": run.history}
+    if run.has_contact:
+        steps = {(n, load): run.pressure(n) for n, load in enumerate(run.path, 1)}
+        contact = pd.concat(steps, names=["step", "delta" if run.is_joint else "load_factor"]).reset_index(level=[0, 1])
+        contact.attrs["units"] = run.pressure().attrs["units"] | {"delta": run.scene.units.length}
+        tables[folder / "contact.csv"] = contact
     _check_new(tables, folder, force)
     for file, table in tables.items():
         with writing(file):
@@ -56,7 +58,8 @@ def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool =
 
     steps = [run.number(step)] if step is not None else range(1, run.number(None) + 1)
     run.fields(steps[-1])
-    files = {(n, part): folder / f"{part}_{step_name(n)}.vtu" for n in steps for part in ("bodies", "contact")}
+    parts = ("bodies", "contact")[: 1 + run.has_contact]
+    files = {(n, part): folder / f"{part}_{step_name(n)}.vtu" for n in steps for part in parts}
     collection, delta, entries = folder / "run.pvd", run.path, ""
     _check_new([collection, *files.values()], folder, force)
     grows = all(a < b for a, b in pairwise(delta))

@@ -87,9 +87,11 @@ class Run:
     def contact(self, step: int | None = None) -> dict[str, Any]:
         """The contact along the surfaces at ``step`` (the last), arrays by name: of a joint "pin" and "hole".
 
-        A side that is not integrated is absent. Raises `InputError` without such a step.
+        A side that is not integrated is absent. Raises `InputError` without such a step, and where nothing touches.
         """
         step = self.number(step)
+        if not self.has_contact:
+            raise InputError(f"{self.folder}: has no contact: its scene has no interaction.")
         return read_arcs(self.curve, step) if self.is_joint else read_surfaces(self.folder, step)
 
     def arc(self, step: int | None = None, side: str | None = None) -> Any:
@@ -119,6 +121,11 @@ class Run:
     def bodies(self) -> dict[str, int]:
         """What marks the cells of each body in `fields`, by name."""
         return {name: min(tags) for name, tags in self.summary.get("bodies", {}).items()} or BODIES
+
+    @property
+    def has_contact(self) -> bool:
+        """Whether anything may touch."""
+        return self.is_joint or bool(self.scene.interaction)
 
     @property
     def path(self) -> list[float]:

@@ -42,7 +42,7 @@ def draw_run(run: Run, target: Path) -> Path:
         draws = [joint.field_panel] * run.scene.output.fields + [joint.arc_panel, joint.force_panel]
     else:
         draws = [problems.field_panel] * run.scene.output.fields
-        draws += [problems.contact_panel] * bool(run.scene.interaction) + [problems.load_panel]
+        draws += [problems.contact_panel] * run.has_contact + [problems.load_panel]
     widths = [1.0, 1.2, 1.1] if len(draws) == 3 else [1.2, 1.1][-len(draws) :]
     figure = new_figure(5.0 * len(widths), 4.4)
     for axes, draw in zip(np.atleast_1d(figure.subplots(1, len(widths), width_ratios=widths)), draws, strict=True):

@@ -14,18 +14,18 @@ _EDGE = np.array([[1.0, 0.0, 0.0], [0.375, 0.75, -0.125], [0.0, 1.0, 0.0], [-0.1
 
 
 def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
-    """PEEQ, or von Mises stress where nothing can yield, at ``step`` (the last) on the deformed bodies, with their
+    """PEEQ, or von Mises stress where nothing has yielded, at ``step`` (the last) on the deformed bodies, with their
     outlines; displacements are magnified by the factor in the title, and not where bodies may touch, as they would
     then overlap."""
     from matplotlib.collections import LineCollection
 
     fields, length = run.fields(step), run.scene.units.length
     size, farthest = np.ptp(fields.coordinates, axis=0).max(), np.abs(fields.displacement).max()
-    free = not run.scene.interaction and farthest > 0
+    free = not run.has_contact and farthest > 0
     factor = max(float(f"{_MAGNIFIED * size / farthest:.0e}"), 1.0) if free else 1.0
     x = fields.coordinates + factor * fields.displacement
     values, label, cmap = fields.von_mises, f"von Mises stress [{run.scene.units.stress}]", "viridis"
-    if fields.peeq is not None:
+    if fields.peeq is not None and fields.peeq.any():
         values, label, cmap = 100 * fields.peeq, "equivalent plastic strain [%]", "inferno_r"
     triangles = fields.triangles.reshape(-1, 3)
     shown = {"facecolors": np.repeat(values, fields.triangles.shape[1])}

@@ -154,3 +154,41 @@ def test_a_joint_is_probed_too_but_for_what_it_did_not_write(runs):
     assert np.abs(joint.probe("hole", "ux").values).max() > 0
     with pytest.raises(archord.InputError, match=r"has no 'hoop' there, but ux, uy .*output.stress = false"):
         joint.probe("hole")
+
+
+def test_a_plate_without_contact_is_shown_and_exported_too(tmp_path, capsys):
+    """Pulled by a uniform strain in plane stress: one stress everywhere, drawn magnified."""
+    import gmsh
+
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addRectangle(0, 0, 0, 20, 10)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [1], name="plate")
+        for tag, name in enumerate(("bottom", "right", "top", "left"), 1):
+            gmsh.model.addPhysicalGroup(1, [tag], name=name)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 4)
+        scene = archord.Problem(
+            gmsh,
+            bodies=[{"name": "plate", "E": 1000.0, "nu": 0.3}],
+            supports=[{"name": side, "on": side, "fixed": [f]} for side, f in (("left", "x"), ("bottom", "y"))],
+            loads=[{"name": "pull", "on": "right", "direction": "x", "displacement": 0.02}],
+            path={"steps": 1},
+            analysis={"plane": "stress"},
+        )
+        run = archord.solve(scene, tmp_path / "run")
+    finally:
+        gmsh.finalize()
+    assert run.columns["pull force"] == pytest.approx([10.0], rel=1e-9)
+    np.testing.assert_allclose(run.probe("top").over(10.0).values, 1.0, rtol=1e-9)
+    np.testing.assert_allclose(
+        run.fields().stress, np.outer(np.ones(len(run.fields().stress)), [1, 0, 0, 0]), atol=1e-9
+    )
+    for name in ("show", "picture"):
+        assert command([name, str(run.folder), "-o", str(tmp_path / f"{name}.png")]) == 0
+    assert command(["export", str(run.folder), "--csv", str(tmp_path / "c"), "--vtk", str(tmp_path / "v")]) == 0
+    assert [file.name for file in (tmp_path / "c").iterdir()] == ["history.csv"]
+    with pytest.raises(archord.InputError, match="has no contact"):
+        run.pressure()
+    assert "pull force [N/mm]" in capsys.readouterr().out
