@@ -12,8 +12,8 @@ import archord
 
 run = archord.load(sys.argv[1] if len(sys.argv) > 1 else "runs/lug")
 lug, body = run.scene.mesh.shape, run.scene.body[-1]
-R, W, e, fy = lug["radius"], lug["width"], lug["edge_distance"], body.yield_stress
-D = 2 * (R + lug["clearance"])
+R, W, e, fy = lug.radius, lug.width, lug.edge_distance, body.yield_stress
+D = 2 * (R + lug.clearance)
 
 hand = {
     "net section": fy * (W - D),
