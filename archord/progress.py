@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Self
 
 from archord.ranks import on_terminal
+from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.problem import ProblemScene
 from archord.scene.scene import Scene
@@ -177,12 +179,12 @@ def solve_and_report(
     from archord.output.folder import claim_folder
     from archord.output.ranks import agreed
 
-    def claimed() -> AnyScene:
-        scene = load()
+    def claimed() -> tuple[AnyScene, bool]:
+        scene, new = load(), not folder.exists()
         claim_folder(folder, force)
-        return scene
+        return scene, new
 
-    scene = agreed(comm, claimed)
+    scene, new = agreed(comm, claimed)
     from archord.solver.timer import Timer
     from archord.studies.accuracy import solve_as_asked  # with all of dolfinx: bad input is told before
 
@@ -192,7 +194,13 @@ def solve_and_report(
     elif begun is not None:
         options["timer"] = Timer({"start-up": perf_counter() - begun})
     options |= {"on_start": report.start, "on_step": report.step, "on_attempt": report.attempt}
-    with report:
-        outcome = solve_as_asked(scene, folder, comm, start=start, **options)
+    try:
+        with report:
+            outcome = solve_as_asked(scene, folder, comm, start=start, **options)
+    except InputError:  # found by the mesh: nothing is left of a scene that is refused
+        if new and comm.rank == 0:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
     report.finish(outcome)
     return scene, outcome

@@ -10,7 +10,7 @@ from typing import Any, get_args
 from archord.scene.keys import SEPARATOR, Section, toml_value
 
 _MOST_SENTENCES = 20
-_KINDS = ("number", "list", "law", "float", "int", "constrained-int")  # of values that a key may have
+_KINDS = ("number", "list", "law", "float", "int", "constrained-int", "lug", "bushing")  # of values that a key may have
 _PHRASES = {
     "missing": "is missing",
     "extra_forbidden": "is not a known key; {hint}{kind} are {known}",
@@ -28,6 +28,8 @@ _PHRASES = {
     "less_than_equal": "must be at most {le:g}",
     "literal_error": "must be {expected}",
     "list_type": "must be a list",
+    "union_tag_invalid": "must have a kind among {expected_tags}",
+    "union_tag_not_found": "must have a kind",
     "too_short": "must have {min_length} or more entries",
     "too_long": "must have at most {max_length} entries",
 }
@@ -61,7 +63,7 @@ def _in_table(location: tuple, data: dict[str, Any]) -> tuple[tuple, dict[str, A
         return location, data
     table = data[location[0]][location[1]]
     named = table.get("name") if isinstance(table, dict) else None
-    label = f"{location[0]} {json.dumps(named or location[1] + 1, ensure_ascii=True)}"
+    label = f"{location[0]} {json.dumps(named or location[1] + 1, default=str)}"
     return (label, *location[2:]), {label: table}
 
 
@@ -74,17 +76,15 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
             location = parts[0], [table["name"] for table in data[parts[0]]].index(parts[1]), *parts[2:]
         else:
             location = *location, *filter(None, name.split("."))
-    field = location[:1]
     location, data = _in_table(location, data)
     place, inner = list(location[:2]), location[2:]  # section and key, and where in its value
     place += [part for part in inner if isinstance(part, str) and part not in _KINDS and "[" not in part]
     if error["type"] != "value_error":
         if error["type"] == "extra_forbidden":
-            context |= _known_keys(model, [*field, *place[1:]])
+            context |= _known_keys(model, [part for part in error["loc"] if isinstance(part, str)])
         empty = context.get("min_length") == 1
-        said = _PHRASES.get("string_too_short" if empty else error["type"], error["msg"]).format(
-            **context, name=place[-1]
-        )
+        phrase = _PHRASES.get("string_too_short" if empty else error["type"])
+        said = error["msg"] if phrase is None else phrase.format(**context, name=place[-1])
     value: Any = data
     for part in place:
         value = value.get(part) if isinstance(value, dict) else None
@@ -98,19 +98,24 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
 
 def _known_keys(model: Any, place: list[str]) -> dict[str, str]:
     """What may stand in the ``place`` of an unknown key or section, and which of it may be meant."""
+    of_kind: dict[str, Any] = {}
     for part in place[:-1]:
-        model = _section(model.model_fields[part].annotation)
+        if part in model.model_fields:
+            of_kind = _sections(model.model_fields[part].annotation)
+            model = next(iter(of_kind.values()), model)
+        model = of_kind.get(part, model)
     known = list(model.model_fields)
     near = difflib.get_close_matches(place[-1], known, 1)
     hint = f"did you mean {near[0]}? " if near else ""
     return {"known": ", ".join(known), "kind": "Sections" if len(place) == 1 else "Keys", "hint": hint}
 
 
-def _section(kind: Any) -> Any:
-    """The section among the kinds of values that a key may have."""
+def _sections(kind: Any) -> dict[str, Any]:
+    """The sections among the kinds of values that a key may have, by their own ``kind``."""
     if isinstance(kind, type):
-        return kind if issubclass(kind, Section) else None
-    return next(filter(None, map(_section, get_args(kind))), None)
+        name = getattr(kind, "model_fields", {}).get("kind")
+        return {str(name and name.default): kind} if issubclass(kind, Section) else {}
+    return {name: found for part in get_args(kind) for name, found in _sections(part).items()}
 
 
 def _key_shown(part: str) -> str:

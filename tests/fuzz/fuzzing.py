@@ -9,6 +9,7 @@ slow, which is no fault. ``pytest tests/fuzz --cases 1000`` solves that many.
 from __future__ import annotations
 
 import resource
+import shutil
 import signal
 from pathlib import Path
 from random import Random
@@ -16,7 +17,7 @@ from typing import NamedTuple
 
 from archord.benchmarks.stability.run import not_finite
 from tests.forked import start
-from tests.fuzz.mutations import base_scenes, mutate
+from tests.fuzz.mutations import GENERAL, base_scenes, mutate
 
 _MEMORY, _FILE = 8 * 2**30, 2 * 2**30  # bytes that a case may use
 _LIMIT, _GRACE = 20.0, 10.0  # seconds that a case may take, and between SIGTERM and SIGKILL after them
@@ -43,6 +44,8 @@ def run_case(number: int, folder: Path) -> FuzzCase:
     kind, content = scene_of(number)
     folder.mkdir(parents=True)
     (folder / "scene.toml").write_bytes(content)
+    for mesh in GENERAL.glob("*.inp"):
+        shutil.copy(mesh, folder)
     arguments = ["solve", "scene.toml", "-o", "run"]
     process = start(arguments, folder, folder / "stdout", folder / "stderr", before=_limit_resources)
     process.join(_LIMIT)

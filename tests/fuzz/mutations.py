@@ -11,14 +11,19 @@ import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
-from typing import Any
+from typing import Any, get_args
 
 import tomli_w
+from pydantic import BaseModel
 
+from archord.scene.file import parse_any, resolved
+from archord.scene.problem import ProblemScene
 from archord.scene.reference import example
 from archord.scene.scene import Scene
+from archord.scene.shapes import PRESETS
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
+GENERAL = Path(__file__).with_name("scenes")  # general ones and presets, of few elements in two steps
 
 _TOKENS = (
     *("0", "-0.0", "-1", "1", "1e308", "-1e308", "1e-308", "5e-324", "1e400", "nan", "-nan", "inf", "-inf", "1e16"),
@@ -28,27 +33,66 @@ _TOKENS = (
     *("1979-05-27", "07:32:00", "1979-05-27T07:32:00Z", "null", "None", "1,5", "10 mm", "''''''", '"""a\nb"""', ""),
 )
 _NAMES = ("", " ", "ключ", "a.b", "__class__", "model_config", "\u202e", "x" * 3000, "mesh", "radius", "E", "force")
-_WORDS = ("block", "ring", "strain", "stress", "current", "reference", "both", "pin", "Block", "")
+_WORDS = (
+    *("block", "ring", "strain", "stress", "current", "reference", "both", "pin", "Block", ""),
+    *("hole", "flat", "clamp", "axis", "centre", "sleeve 1 inside", "bore", "lug", "tied", "rigid", "distributing"),
+    *("x", "y", "rotation", "half", "whole", "none", "round", "square", "S355", ["x", "rotation"], ["pin", "hole"]),
+    *([0.1, -0.1], [0.1, 0.2, 0.0], [1, 2], [[0.0, 300.0], [0.1, 400.0]], [[1e4, 100.0]], [], {}, [{}], [[]]),
+    *({"centre": [0.0, 0.0], "radius": 9.0}, {"saturation": 500.0, "rate": 20.0}, {"engineering": [[0.0, 1.0]]}),
+)
 _EXTREMES = (0.0, 1.0, -1.0, 0.5, 0.499999, 0.5 - 1e-12, 1 - 1e-12, 0, 1, 3, 50, -5, 10**12, True, False)
 _UNITS = (  # keys of one unit
-    ("radius", "clearance", "block_size", "element_size", "displacement_absolute"),
-    ("E", "yield_stress", "hardening", "force"),
+    ("radius", "clearance", "block_size", "element_size", "displacement_absolute", "width", "outer", "displacement"),
+    ("E", "yield_stress", "hardening", "force", "pressure"),
 )
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?(?![\w.])")
 _VALUE = re.compile(r"(?<= = )[^#\n]+")
 
 
 def base_scenes() -> dict[str, str]:
-    """The repository's scenes and the printed example, by name, on coarse meshes and in two steps."""
-    files = (path for path in sorted(SCENES.glob("*.toml")) if not path.stem.endswith(".sweep"))
-    texts = {path.stem: path.read_text(encoding="utf-8") for path in files}
-    return {name: _coarse(text) for name, text in (texts | {"example": example()}).items()}
+    """The repository's scenes, the printed examples, and the scenes of `GENERAL` with what presets stand for, by name,
+    on coarse meshes and in two steps."""
+    files = [path for path in sorted(SCENES.glob("*.toml")) if not path.stem.endswith(".sweep")]
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in files} | {"example": example()}
+    found = {name: _coarse(text) for name, text in texts.items() if "[joint]" in text}
+    for path in sorted(GENERAL.glob("*.toml")):
+        found[path.stem] = text = path.read_text(encoding="utf-8")
+        if path.stem in PRESETS:
+            found[f"{path.stem} expanded"] = resolved(parse_any(tomllib.loads(text)))
+    return found | {"general example": re.sub("steps = 20", "steps = 2", example(general=True))}
 
 
 def _coarse(text: str) -> str:
     text = re.sub(r"^(relative_element_size|growth|steps) = .*\n", "", text, flags=re.MULTILINE)
     text = re.sub(r"^(\[joint\].*\n)", r"\1relative_element_size = 0.25\ngrowth = 1.0\n", text, flags=re.MULTILINE)
     return re.sub(r"^(\[load\].*\n)", r"\1steps = 2\n", text, flags=re.MULTILINE)
+
+
+def _tables(data: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """The tables in ``data`` by the name of their section or key: one by one, in lists, and in one another."""
+    found = []
+    for name, value in data.items():
+        for table in value if isinstance(value, list) else [value]:
+            if isinstance(table, dict):
+                found += [(name, table), *_tables(table)]
+    return found
+
+
+def _known_keys(kind: Any, name: str = "") -> dict[str, set[str]]:
+    """The keys of all sections of a model by the name of the section or key that holds it."""
+    if not (isinstance(kind, type) and issubclass(kind, BaseModel)):
+        found = [_known_keys(part, name) for part in get_args(kind)]
+    else:
+        found = [{name: set(kind.model_fields)}]
+        found += [_known_keys(field.annotation, key) for key, field in kind.model_fields.items()]
+    names = {name for part in found for name in part}
+    return {name: set().union(*(part.get(name, ()) for part in found)) for name in names}
+
+
+_KEYS = {
+    name: sorted(keys)
+    for name, keys in _known_keys(tuple[(Scene, ProblemScene, *PRESETS.values())]).items()  # type: ignore[misc]
+}
 
 
 def mutate(rng: Random, text: str) -> tuple[str, bytes]:
@@ -100,14 +144,14 @@ def _structure(rng: Random, text: str) -> bytes:
             lines.insert(rng.randrange(len(lines) + 1), line.lstrip(rng.choice(("", "# "))))
         return "".join(lines).encode()
     data = tomllib.loads(text)
-    section = rng.choice([name for name, value in data.items() if isinstance(value, dict)] or [""])
-    table = data.get(section, {})
+    section, table = rng.choice(_tables(data) or [("", {})])
     key, copy = rng.choice(list(table) or ["radius"]), dict(table)
     nested: Any = table.get(key, 1)
     for _ in range(rng.choice((1, 3, 30, 80))):
         nested = {key: nested}
     parent, name = rng.choice(((table, key), (data, section)))
-    change = rng.randrange(5)
+    lists = [value for value in data.values() if isinstance(value, list) and value]
+    change = rng.randrange(6 if lists else 5)
     if change == 0:
         parent.pop(name, None)
     elif change == 1:
@@ -115,30 +159,32 @@ def _structure(rng: Random, text: str) -> bytes:
     elif change == 2:
         parent[name] = rng.choice(([copy], [], [copy, copy], "text", 3, True, {}, nested))
     elif change == 3:
-        data[rng.choice((*Scene.model_fields, "mesh"))] = copy
-    else:
+        data[rng.choice([*_KEYS])] = copy
+    elif change == 4:
         data = {section: data}
+    else:
+        some, other = rng.choice(lists), rng.choice(lists)
+        some.insert(0, other.pop(rng.randrange(len(other))) if rng.random() < 0.7 else other[-1])
     return tomli_w.dumps(data).encode()
 
 
 def _values(rng: Random, text: str) -> bytes:
     """Some numbers of the scene times powers of ten, other values for any of its keys, or another unit."""
     data = tomllib.loads(text)
-    tables = {name: table for name, table in data.items() if isinstance(table, dict) and name in Scene.model_fields}
+    tables = [(name, table) for name, table in _tables(data) if name in _KEYS]
     for _ in range(rng.choice((1, 1, 2, 3)) if tables else 0):
-        section, kind = rng.choice(list(tables)), rng.random()
+        (section, table), kind = rng.choice(tables), rng.random()
         if kind < 0.1:
             names, scale = rng.choice(_UNITS), 10 ** rng.uniform(-40, 40)
-            for table in tables.values():
-                table.update({key: table[key] * scale for key in names if isinstance(table.get(key), float)})
+            for _, other in tables:
+                other.update({key: other[key] * scale for key in names if isinstance(other.get(key), float)})
         elif kind < 0.6:
-            key = rng.choice([key for key, value in tables[section].items() if isinstance(value, float)] or ["radius"])
-            far = rng.choice((1, 3, 12))
-            tables[section][key] = tables[section].get(key, 1.0) * float(f"{10 ** rng.uniform(-far, far):.3g}")
+            key = rng.choice([key for key, value in table.items() if isinstance(value, float)] or ["radius"])
+            far, value = rng.choice((1, 3, 12)), table.get(key, 1.0)
+            table[key] = (value if isinstance(value, float) else 1.0) * float(f"{10 ** rng.uniform(-far, far):.3g}")
         else:
-            model: Any = Scene.model_fields[section].annotation
             pool = rng.choice((_WORDS, _EXTREMES, [rng.choice((-1, 1)) * 10 ** rng.uniform(-12, 12)]))
-            tables[section][rng.choice(list(model.model_fields))] = rng.choice(pool)
+            table[rng.choice(_KEYS[section])] = rng.choice(pool)
     return tomli_w.dumps(data).encode()
 
 

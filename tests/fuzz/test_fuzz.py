@@ -6,7 +6,7 @@ import tomllib
 import pytest
 
 from archord.scene.errors import InputError
-from archord.scene.file import load_scene, parse_scene, resolved
+from archord.scene.file import load_scene, parse_any, resolved
 from tests.fuzz.fuzzing import faults, run_case, scene_of
 from tests.fuzz.mutations import KINDS, base_scenes
 
@@ -14,7 +14,7 @@ from tests.fuzz.mutations import KINDS, base_scenes
 def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
     """Nothing but `InputError`, in lines that end like sentences; a file that is accepted is resolved to itself."""
     path, refused, kinds = tmp_path / "scene.toml", 0, set()
-    for number in range(150):
+    for number in range(300):
         kind, content = scene_of(number)
         assert (kind, content) == scene_of(number)
         kinds.add(kind)
@@ -27,10 +27,11 @@ def test_a_mutated_file_is_a_scene_or_refused_in_sentences(tmp_path):
             assert lines, number
             assert all(line.startswith(str(path)) and line.endswith(".") and len(line) < 1000 for line in lines), number
         else:
-            again = parse_scene(tomllib.loads(resolved(scene)))
-            assert (again.targets, again.E_star, again.joint.h) == (scene.targets, scene.E_star, scene.joint.h), number
+            again = parse_any(tomllib.loads(resolved(scene)))
+            assert tomllib.loads(resolved(again)) == tomllib.loads(resolved(scene)), number
+            assert again.targets == scene.targets, number
     assert kinds == set(KINDS)
-    assert 30 < refused < 140
+    assert 60 < refused < 290
 
 
 def test_the_command_ends_in_order_on_mutated_files(tmp_path, request):
@@ -47,7 +48,7 @@ def test_the_command_ends_in_order_on_mutated_files(tmp_path, request):
 def test_what_is_mutated_was_a_scene():
     assert scene_of(0) != scene_of(1)
     for name, text in base_scenes().items():
-        assert parse_scene(tomllib.loads(text), name).load.steps == 2
+        assert len(parse_any(tomllib.loads(text), name).targets) <= 7, name
 
 
 @pytest.mark.parametrize(
