@@ -1,25 +1,33 @@
-"""A second opinion: CalculiX on the deck of a scene, and what its result files say."""
+"""A second opinion: CalculiX on the deck of a scene, and what its result files say.
+
+As a program, ``python3 -m archord.benchmarks.peers.calculix SCENE``, it solves a scene by archord and by CalculiX on
+the same mesh, whole processes with one thread each, and prints their last forces and times.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from archord.benchmarks.timing import Failure, Process
+from archord.benchmarks.timing import Failure, Process, run_once
 from archord.geometry.basis import Array
 from archord.postprocess.decks.deck import deck, moved_sets, system_of, thickness
 from archord.postprocess.decks.mesh import DeckMesh, Elements, deck_mesh, label, surface_name
-from archord.scene.file import AnyScene
+from archord.postprocess.run import Run
+from archord.report.table import Table
+from archord.scene.file import AnyScene, load_scene
 from archord.scene.scene import Scene
 from archord.solver.system import System
 
 _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")
 _EXPONENT = re.compile(r"(?<=\d)(?=[+-]\d{3}$)")  # Fortran leaves out the E before three digits
 _NEAR_THE_AXIS = 0.2  # radians
+_LONG = 3600.0  # seconds
 
 Printed = list[tuple[str, str, float, Array]]  # tables of a ``.dat`` file: quantity, set, time, rows ``(n, columns)``
 
@@ -158,3 +166,20 @@ def read_contact_pressure(text: str, n_nodes: int) -> Array:
         if line.startswith(" -1"):
             pressure[int(line[3:13]) - 1] = float(line[49:61])
     return pressure
+
+
+def compare(scene: Path, folder: Path) -> Table:
+    """archord and CalculiX on ``scene``, in ``folder``. Raises `InputError` and `Failure`."""
+    command = (sys.executable, "-m", "archord", "solve", str(scene.resolve()), "-o", "run", "--force", "--quiet")
+    ours = run_once(Process(command, folder, lambda: Run(folder / "run").columns))
+    theirs = run_once(replace(process(load_scene(scene), "quadratic", folder / "calculix"), limit=_LONG))
+    table = Table("load", "force: archord", "CalculiX", "difference", "seconds: archord", "CalculiX", "times", left=1)
+    for load, forces in theirs.result.forces.items():
+        P, other = ours.result[f"{load} force" if load else "P"][-1], forces[-1]
+        cells = f"{P:.6g}", f"{other:.6g}", f"{other / P - 1:+.2%}", f"{ours.seconds:.1f}", f"{theirs.seconds:.1f}"
+        table.add(load, *cells, f"{theirs.seconds / ours.seconds:.1f}")
+    return table
+
+
+if __name__ == "__main__":
+    print(compare(Path(sys.argv[1]), Path("runs/calculix")))

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
@@ -26,7 +25,7 @@ from archord.solver.problem import Interaction, Problem, Rigid
 from archord.solver.system import System
 
 PENETRATION = 4e-4  # over the size of the surfaces, under a pressure of the contact modulus
-SLICE = 0.1  # thickness of a slice in plane stress, in the shortest edge of a surface
+SLICE = 0.1  # thickness of a slice in plane stress, in the shortest edge
 _WEAK = 1e-7  # stiffness of the springs that hold floating bodies, over Young's modulus
 
 
@@ -56,9 +55,7 @@ def thickness(problem: Problem, mesh: DeckMesh) -> float:
     """
     if problem.bodies[0].material.plane == "strain":
         return 1.0
-    ends = [mesh.x[s.nodes[:, :2]] for s in mesh.surfaces.values()] or [
-        mesh.x[nodes[:, :2]] for nodes in mesh.elements.values()
-    ]
+    ends = [mesh.x[nodes[:, :2]] for nodes in mesh.elements.values()]
     return SLICE * min(float(np.linalg.norm(np.diff(x, axis=1), axis=2).min()) for x in ends)
 
 
@@ -125,12 +122,12 @@ class _Writer:
         drives, self.moved = system.equilibrium.drives, moved_sets(system, mesh)
         by_force = {drive.name for drive in self.problem.all_drives if drive.control == "force"}
         applied = {name: mesh.forces(forces) for name, forces in zip(drives.names, drives.applied, strict=False)}
-        means = [mean.drive for mean in self.problem.means if mean.drive not in by_force]
-        self.means = {name: self.problem.symmetry * applied[name] for name in means}
-        self.loads = {name: thick * f for name, f in applied.items() if f.any() and name not in means}
+        self.loads = {name: thick * f for name, f in applied.items() if f.any()}
+        if means := [mean.name for mean in self.problem.means if mean.drive not in by_force]:
+            raise ValueError(f"the mean displacement of {means[0]!r} cannot be exported; a force on it can")
         self.hung = [m for m in self.moved if by_force & set(m.rates)]
         self.held = [m for m in self.moved if not by_force & set(m.rates)]
-        own = dict.fromkeys([*(drive for m in self.hung for drive in m.rates), *means])
+        own = dict.fromkeys(drive for m in self.hung for drive in m.rates)
         self.own = {drive: len(mesh.x) + k for k, drive in enumerate(own, 1)}  # labels of their nodes
         self.pulled = by_force & set(own)
 
@@ -201,7 +198,6 @@ class _Writer:
             for k, node in enumerate(m.nodes):
                 terms = [(self.own[drive], 1, -rate[k]) for drive, rate in m.rates.items() if rate[k]]
                 yield from _equation([(node + 1, m.axis + 1, 1.0), *terms])
-        yield from self._mean_lines()
         held = [row for m in self.held if not m.rates for row in m.boundary({})]
         yield from ["*BOUNDARY", *held] if held else []
 
@@ -219,21 +215,6 @@ class _Writer:
                     yield from (f"*SPRING, ELSET={name}", str(axis), number(_WEAK * body.material.E * self.thick))
                     first += 2
 
-    def _mean_lines(self) -> Iterator[str]:
-        """Equations of mean displacements, each solved for another displacement that nothing else prescribes."""
-        if not self.means:
-            return
-        free = np.ones((len(self.mesh.x), 2), dtype=bool)
-        for m in self.moved:
-            free[m.nodes, m.axis] = False
-        rows = np.array([motion.ravel() for motion in self.means.values()])
-        first = scipy.linalg.qr(np.where(free.ravel(), rows, 0.0), mode="r", pivoting=True)[1][: len(rows)]
-        inverse = np.linalg.inv(rows[:, first])
-        for k, row in enumerate(inverse @ rows):
-            others = np.setdiff1d(np.flatnonzero(row), first)
-            terms = [(n // 2 + 1, n % 2 + 1, row[n]) for n in (first[k], *others)]
-            yield from _equation([*terms, *((self.own[d], 1, -f) for d, f in zip(self.means, inverse[k], strict=True))])
-
     def step_lines(self, targets: Sequence[float]) -> Iterator[str]:
         """A step to each of the ``targets``: displacements, forces, and what is to be printed."""
         printed = dict.fromkeys(label(m.node_set) for m in self.moved)
@@ -249,11 +230,10 @@ class _Writer:
             rows += [f"{n}, 1, 1, {number(values[d])}" for d, n in self.own.items() if d not in self.pulled]
             yield from ["*BOUNDARY", *rows] if rows else []
             forces = sum((values[drive] * f for drive, f in self.loads.items()), np.zeros_like(self.mesh.x))
-            rows = [f"{n + 1}, {axis + 1}, {number(forces[n, axis])}" for n, axis in np.argwhere(forces)]
+            loaded = np.argwhere(sum(np.abs(f) for f in self.loads.values())) if self.loads else ()
+            rows = [f"{n + 1}, {axis + 1}, {number(forces[n, axis])}" for n, axis in loaded]
             share = self.thick / self.problem.symmetry
-            rows += [
-                f"{self.own[drive]}, 1, {number(values[drive] * share)}" for drive in self.own if drive in self.pulled
-            ]
+            rows += [f"{n}, 1, {number(values[d] * share)}" for d, n in self.own.items() if d in self.pulled]
             yield from ["*CLOAD", *rows] if rows else []
             for name in printed:
                 yield from (f"*NODE PRINT, NSET={name}, TOTALS=ONLY", "RF")
