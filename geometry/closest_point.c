@@ -5,6 +5,7 @@
 #include "closest_point.h"
 
 enum { MOST = 5 }; /* nodes of a facet (degree 4) */
+static const double TIE = 1e-10; /* of two facets as near, which meet at an angle, the first one, whatever the rounding */
 
 typedef struct {
     double y[2], t[2], k[2]; /* position, first and second derivative */
@@ -74,7 +75,7 @@ int32_t closest_points(int32_t m, const double *x, const double *outward, int32_
             const double at = closest_on_facet(p, coefficients, X + 2 * (p + 1) * k, x, 1 - 0.5 * c, low, high, steps);
             const Frame f = frame(p, coefficients, X + 2 * (p + 1) * k, at, N, dN);
             const double d2 = (x[0] - f.y[0]) * (x[0] - f.y[0]) + (x[1] - f.y[1]) * (x[1] - f.y[1]);
-            if (d2 < least || facet[i] < 0) {
+            if (d2 < least * (1 - TIE) || facet[i] < 0) {
                 least = d2, facet[i] = k, xi[i] = at, low_best = low, high_best = high;
             }
         }

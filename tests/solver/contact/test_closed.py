@@ -19,9 +19,10 @@ RADII = {"bore": 0.4 * R, "pin": R, "hole": R + DR, "outer": 2 * R}
 PUSH = 2 * DR
 
 
-def rings(comm: MPI.Comm, quarters: int, gap: bool = False, **options) -> TaggedMesh:
+def rings(comm: MPI.Comm, quarters: int, gap: bool = False, edges: int = 9, **options) -> TaggedMesh:
     """A "bush" with a bore in a "ring", so many ``quarters`` of them from the bottom on; with a ``gap`` in the set
-    "hole" at an angle of 120 to 150 degrees. Sets are the circles, and the "cuts" where they end."""
+    "hole" at an angle of 120 to 150 degrees. Twice as many ``edges`` are on a quarter of the hole, 16 on one of the
+    pin. Sets are the circles, and the "cuts" where they end."""
 
     def build(gmsh) -> None:
         geo = gmsh.model.geo
@@ -35,7 +36,7 @@ def rings(comm: MPI.Comm, quarters: int, gap: bool = False, **options) -> Tagged
             points += points[:1] if whole else []
             arcs[name] = [geo.addCircleArc(a, centre, b) for a, b in pairwise(points)]
             for arc, turned in zip(arcs[name], np.diff(angles), strict=True):
-                geo.mesh.setTransfiniteCurve(arc, 1 + 2 * round((9 if name == "hole" else 8) * turned / np.pi * 2))
+                geo.mesh.setTransfiniteCurve(arc, 1 + 2 * round((edges if name == "hole" else 8) * turned / np.pi * 2))
             ends.append((points[0], points[-1]))
         cuts = []
         for body, (inner, outer) in {"bush": (0, 1), "ring": (2, 3)}.items():
@@ -112,11 +113,13 @@ def test_cells_and_orders_agree(quads):
         assert system.contact.pair_of(system.sides["hole"]).pressure.max() == pytest.approx(peak, rel=0.01)
 
 
-def test_forces_do_not_depend_on_where_the_seam_lies():
-    """The mesh turned with the load, so that the seam lies in, beside and opposite to the contact."""
+@pytest.mark.parametrize("edges", [8, 9])
+def test_forces_do_not_depend_on_where_the_seam_lies(edges):
+    """The mesh turned with the load, so that the seam lies in, beside and opposite to the contact; nor on rounding,
+    which might choose between two facets where vertices face each other."""
     forces, seams = [], []
     for angle in np.radians([0, 70, 145, 210, 328]):
-        system, force = press(turned(rings(MPI.COMM_SELF, 4), angle), angle)
+        system, force = press(turned(rings(MPI.COMM_SELF, 4, edges=edges), angle), angle)
         forces.append(force)
         x = system.sides["hole"].curve.X[0]
         seams.append(np.degrees((np.arctan2(x[0], -x[1]) - angle) % (2 * np.pi)))
