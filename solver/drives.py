@@ -191,7 +191,7 @@ class Drives:
         length = self.integral(one * ds)
         centre = np.array([self.integral(x[i] * ds) for i in (0, 1)]) / length
         arm = x - fem.Constant(mesh, centre)
-        lever = np.array(mean.point) - centre
+        lever = np.zeros(2) if mean.point is None else np.array(mean.point) - centre
         rotation = np.array([-lever[1], lever[0], 1.0])[mean.axis] / self.integral(ufl.inner(arm, arm) * ds)
         shift, turn = (fem.Constant(mesh, c) for c in (np.eye(3)[mean.axis, :2] / length, rotation))
         return self._vector((ufl.inner(shift, v) + turn * (arm[0] * v[1] - arm[1] * v[0])) * ds)

@@ -93,14 +93,15 @@ class Mean:
 
     With mean displacement ``w`` and mean rotation ``t = integral of (x - c) x u / integral of |x - c|^2`` about the
     centroid ``c``, the point moves by ``w + t x (point - c)``. The ``drive`` prescribes that motion, or the force
-    (moment) on the point, which the facets get spread as the motion's derivative says: statically equivalent. Means of
-    one ``name`` have one reaction. A drive has one mean at most.
+    (moment) on the point, which the facets get spread as the motion's derivative says: statically equivalent. Without a
+    point it is the centroid, as also of facets that a symmetric half shows of an edge across its axis: the mirrored
+    facets take up the moment. Means of one ``name`` have one reaction. A drive has one mean at most.
     """
 
     name: str
     facets: str
     axis: int
-    point: Vector
+    point: Vector | None = None
     drive: str = ""
 
 

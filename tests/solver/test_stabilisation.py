@@ -12,7 +12,7 @@ from archord.geometry.shapes.lug import lug
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
-from archord.solver.problem import Body, Drive, Interaction, Load, Problem, Rigid, Support
+from archord.solver.problem import Body, Drive, Interaction, Load, Mean, Problem, Rigid, Support
 from archord.solver.stepping import StepRules
 from archord.solver.system import System
 from tests.solver.parts import ELASTIC, E, blocks, solve
@@ -103,3 +103,16 @@ def test_bodies_that_supports_hold_get_no_springs():
     pushed = [*held[:2], Support("lid", "lid", 0), Support("lid", "lid", 1, 1.0, "push")]
     assert springs(supports=pushed, drives=[Drive("push", (0, 1.0))]) is None
     assert springs(supports=pushed, drives=[Drive("push", (0, 1.0), "force")]) is not None
+
+
+def test_a_mean_motion_of_half_an_edge_is_that_of_the_whole():
+    """A pin's flat face moved in the mean: half of it on the axis of symmetry, and all of it."""
+    found = []
+    for half in (True, False):
+        mesh = lug(MPI.COMM_SELF, 10.0, 0.1, 40.0, 20.0, 60.0, 1.5, 0.4, half=half)
+        supports = [Support("clamp", "clamp", axis) for axis in (0, 1)] + [Support("axis", "axis", 1)] * half
+        bodies, contact = [Body("pin", STEEL), Body("lug", STEEL)], Interaction("contact", ("pin", "hole"))
+        means, drives = [Mean("flat", "flat", 0, None if half else (0.1, 0.0), "pull")], [Drive("pull", (0, 0.1))]
+        parts = {"means": means, "drives": drives, "symmetry": 1.0 + half, "stabilise": True}
+        found.append(steps_of(Problem(mesh, bodies, [contact], supports, **parts), [0.5, 1.0])[0].drive_force("pull"))
+    assert found[0] == pytest.approx(found[1], rel=1e-4)
