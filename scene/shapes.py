@@ -117,6 +117,9 @@ class PinLoad(Section):
 
     displacement: Targets | None = key("displacement of the pin", "length", default=None, example=0.1)
     force: Targets | None = key("force on the whole pin, instead", "force", default=None, other=1000.0)
+    at: Literal["diameter", "centre"] = key(
+        "where a force acts: on the diameter, which stays straight, or on the pin's centre alone", default="diameter"
+    )
     steps: Steps | Annotated[list[Steps], Field(min_length=1)] = key("output steps up to each target", default=20)
 
     @model_validator(mode="after")
@@ -124,6 +127,7 @@ class PinLoad(Section):
         none, both = self.displacement is None and self.force is None, None not in (self.displacement, self.force)
         require(not none, "displacement", "is missing (or force)")
         require(not both, "displacement", "must not be given together with force")
+        require(self.at == "diameter" or self.force is not None, "at", 'must be "diameter" for a displacement')
         return self
 
 
@@ -165,7 +169,8 @@ class Preset(Checked):
         if half or not rigid:
             supports.append({"name": "axis", "on": "axis" if half else "centre", "fixed": ["y"]})
         part = "none" if rigid else "whole" if self.pin.whole else "half"
-        load = {"name": "pull", "on": contacts[0]["name"] if rigid else "flat", "direction": "x"}
+        place = contacts[0]["name"] if rigid else {"diameter": "flat"}.get(self.load.at, "centre")
+        load = {"name": "pull", "on": place, "direction": "x"}
         return said | {
             "format": 2,
             "analysis": said["analysis"] | {"symmetry": 2 if half else 1},
@@ -173,7 +178,7 @@ class Preset(Checked):
             "body": [{"name": n} | s.model_dump(exclude_none=True, include=material) for n, s in bodies.items()],
             "interaction": contacts,
             "support": supports,
-            "load": [load | self.load.model_dump(exclude_none=True, exclude={"steps"})],
+            "load": [load | self.load.model_dump(exclude_none=True, exclude={"steps", "at"})],
             "path": {"steps": self.load.steps},
         }
 

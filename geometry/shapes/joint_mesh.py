@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Literal, NamedTuple
@@ -47,10 +48,10 @@ def mesh_joint(
 ) -> TaggedMesh:
     """Mesh what ``draw(gmsh.model.geo)`` returns, times ``radius``.
 
-    ``circles`` are the centres (x, y) and the radii of sets of arcs, on which all their nodes are put; ``key`` is all
-    that enters the drawing. The mesh is made with larger elements, which are then cut in four as often as
-    ``refinements`` says: much quicker. ``partitioner`` is a dolfinx cell partitioner (tests cut meshes in unusual
-    ways). Collective over ``comm``; rank 0 meshes.
+    ``circles`` are the centres (x, y) and the radii of sets of arcs, on which all their nodes are put; that of the set
+    "pin" becomes the point set "centre". ``key`` is all that enters the drawing. The mesh is made with larger elements,
+    which are then cut in four as often as ``refinements`` says: much quicker. ``partitioner`` is a dolfinx cell
+    partitioner (tests cut meshes in unusual ways). Collective over ``comm``; rank 0 meshes.
     """
 
     names: list[str] = []
@@ -90,7 +91,8 @@ def mesh_joint(
     how = {"order": degree, "refinements": refinements, "partitioner": partitioner}
     joint = gmsh_to_mesh(comm, build, exact, **how, key=key)
     joint.mesh.geometry.x[:] *= radius
-    return joint
+    centre = radius * np.array([circles["pin"][:2]])
+    return replace(joint, point_sets={"centre": centre} if joint.facet_sets.get("pin") else {})
 
 
 class Sketch:

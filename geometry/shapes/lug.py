@@ -8,10 +8,8 @@ from the clamp x = -length to the apex x = edge distance of its end, and from y 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Literal
 
-import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
@@ -42,7 +40,6 @@ def lug(
     pin and hole, shorter if less than three would lie across the narrowest ligament; away from the arcs it grows by
     ``growth`` per unit of distance. Sets: "pin", "hole", "end", "sides", "clamp", "axis" (y = 0) and "flat", the pin's
     line x = dR, which halves a whole pin and bounds the front half of a ``half`` one. The half y >= 0 is meshed or all.
-    The point set "centre" is the pin's centre.
     """
     hole, side, tip, back = (v / radius for v in (radius + clearance, width / 2, edge_distance, length))
     size, x = min(element_size / radius, (min(side, tip) - hole) / _ACROSS), max(hole - 1, 0.0)
@@ -66,5 +63,4 @@ def lug(
 
     circles = {"pin": (x, 0.0, 1.0), "hole": (0.0, 0.0, hole)} | ({"end": (tip - side, 0.0, side)} if round_end else {})
     key = ("lug", hole, side, tip, back, size, growth, end, half, pin)
-    joint = mesh_joint(comm, draw, circles, key, radius=radius, **options)
-    return joint if pin == "none" else replace(joint, point_sets={"centre": radius * np.array([[x, 0.0]])})
+    return mesh_joint(comm, draw, circles, key, radius=radius, **options)

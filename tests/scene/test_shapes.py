@@ -99,6 +99,7 @@ def test_radii_of_a_bushing_make_its_fits():
         (LUG, "lug.end", "pointed", "lug.end = \"pointed\" must be 'round' or 'square'."),
         (LUG, "load.displacement", None, "load.displacement is missing (or force)."),
         (LUG, "load.force", 1.0, "load.displacement = 0.3 must not be given together with force."),
+        (LUG, "load.at", "centre", 'load.at = "centre" must be "diameter" for a displacement.'),
         (LUG, "load.steps", [1, 2], "path.steps = [1, 2] must have one number for each of the 1 stages."),
         (LUG, "plate", None, "plate is missing."),
         (LUG, "block", STEEL, "block is not a known key"),
@@ -160,6 +161,23 @@ def test_the_whole_lug_carries_what_twice_its_half_does(pin):
     assert half.drive_force("pull") > 0
     assert whole.drive_force("pull") == pytest.approx(half.drive_force("pull"), rel=1e-3)
     assert whole.drive_force("pull") == pytest.approx(-whole.reaction("clamp")[0], rel=1e-6)
+
+
+def test_a_loaded_pin_without_clearance():
+    """NAFEMS R0094, benchmark 4, in two dimensions: a force of 20 kN/mm at the centre of a steel pin in a softer sheet.
+    Displacement at the hole's edge on the load axis 0.760, pressure there 189 MPa (1 %); it takes 9983 of 10000 N."""
+    lug = {"radius": 50.0, "clearance": 0.0, "width": 200.0, "length": 200.0, "element_size": 4.0}
+    load = {"force": 20000.0, "at": "centre", "steps": 1}
+    scene = parse_any({"lug": lug, "pin": STEEL | {"whole": True}, "plate": {"E": 70000.0, "nu": 0.3}, "load": load})
+    system = System(general_problem(scene, MPI.COMM_SELF))
+    system.solve(scene.targets)
+    assert system.reaction("clamp")[0] == pytest.approx(-20000.0, rel=1e-6)
+    nodes = system.problem.mesh.dofs_in(system.V, "hole")
+    x = system.V.tabulate_dof_coordinates()[nodes, 0]
+    assert system.equilibrium.displacement()[nodes[x.argmax()], 0] == pytest.approx(0.760, rel=5e-3)
+    side = system.sides["hole"]
+    pressure, first = system.contact.pair_of(side).pressure, side.point[..., 0].mean(axis=1).argmax()
+    assert (side.weight * pressure)[first].sum() / side.weight[first].sum() == pytest.approx(189.0, rel=0.02)
 
 
 @pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"])
