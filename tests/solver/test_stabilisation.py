@@ -34,7 +34,7 @@ def steps_of(problem: Problem, loads) -> tuple[System, float]:
 
 def sleeves(comm=MPI.COMM_SELF, material=STEEL) -> Problem:
     """A pin that is pushed through the clearances of two sleeves, which nothing else holds along the push."""
-    mesh = bushing(comm, 10.0, [(10.05, 12.0), (12.03, 14.0)], 14.04, 30.0, 1.5, 0.4)
+    mesh = bushing(comm, 10.0, [(10.05, 12.0), (12.03, 14.0), (14.04, 30.0)], 1.5, 0.4)
     between = {"a": ("pin", "sleeve 1 inside"), "b": ("sleeve 1 outside", "sleeve 2 inside")}
     between["c"] = ("sleeve 2 outside", "bore")
     supports = [Support("axis", "axis", 1), Support("flat", "flat", 0, 1.0)]
