@@ -41,11 +41,17 @@ def faults(mesh: PlaneMesh) -> list[str]:
     _, first, count = np.unique(np.sort(mesh.cells, axis=1), axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
         said.append(f"{(count > 1).sum()} cells are there twice, the first at {_at(middle[first[count > 1][0]])}")
-    first, which = distinct_edges(sides_of(mesh.cells)[:, :2])
+    sides = sides_of(mesh.cells)
+    first, which = distinct_edges(sides[:, :2])
     crowded = first[np.bincount(which) > 2]
     if len(crowded):
-        place = mesh.x[sides_of(mesh.cells)[crowded[0]]].mean(axis=0)
-        said.append(f"{len(crowded)} edges belong to more than two cells, the first at {_at(place)}: cells overlap")
+        at = _at(mesh.x[sides[crowded[0]]].mean(axis=0))
+        said.append(f"{len(crowded)} edges belong to more than two cells, the first at {at}: cells overlap")
+    unlike = (np.sort(sides, axis=1) != np.sort(sides[first][which], axis=1)).any(axis=1)
+    within = mesh.cells.size - sides[:, 1:].size  # nodes inside cells
+    if unlike.any() or len(np.unique(sides[:, :2])) + sides[first, 2:].size + within != len(np.unique(mesh.cells)):
+        at = f", as at {_at(mesh.x[sides[unlike][0, 0]])}" if unlike.any() else ""
+        said.append(f"cells do not have all nodes of their common sides in common{at}")
     return said
 
 

@@ -1,5 +1,7 @@
 """What is said of meshes that nothing can be computed on, one sentence for each fault."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -138,6 +140,12 @@ def test_cells_that_cannot_be_used(mirrored):
     x, cells = grid(2, 1)
     twice = PlaneMesh.of_sets(x, np.concatenate([cells, cells[:1]]), {}, {}, {})
     assert faults(twice)[0] == "1 cells are there twice, the first at (0.25, 0.5)"
+    curved = refined(PlaneMesh.of_sets(x, cells, {}, {}, {}), order=2)
+    apart, bound = curved.cells.copy(), curved.cells.copy()
+    apart[1, 5] = apart[1, 6]
+    bound[0, 4] = bound[1, 1]
+    for wrong in (apart, bound):
+        assert "do not have all nodes of their common sides in common" in " ".join(faults(replace(curved, cells=wrong)))
     third = np.concatenate([cells, [[1, 6, 4, 7]]])
     crowded = PlaneMesh.of_sets(np.concatenate([x, [[2.0, 0], [2, 1]]]), third, {}, {}, {})
     assert faults(crowded)[0] == "1 edges belong to more than two cells, the first at (0.5, 0.5): cells overlap"
