@@ -19,7 +19,7 @@ PinPart = Literal["half", "whole", "none"]
 class Shape(Section):
     """A shape around a pin, and how finely it is meshed."""
 
-    radius: Positive = key("radius R of the pin", "length", example=10.0)
+    radius: float = key("radius R of the pin", "length", example=10.0, ge=1e-30, le=1e30)
     element_size: Positive | None = key(
         "edge length of the elements on the arcs, 1e-3 to 0.5 R; 0.04 R if absent", "length", default=None, other=0.4
     )

@@ -81,7 +81,7 @@ def test_radii_of_a_bushing_make_its_fits():
 @pytest.mark.parametrize(
     ("data", "place", "value", "said"),
     [
-        (LUG, "lug.radius", -1.0, "lug.radius = -1.0 must be greater than 0."),
+        (LUG, "lug.radius", -1.0, "lug.radius = -1.0 must be at least 1e-30."),
         (LUG, "lug.widht", 40.0, "did you mean width?"),
         (LUG, "lug.width", None, "lug.width is missing."),
         (LUG, "lug.width", 20.1, "lug.width = 20.1 must leave a ligament of at least 0.02 R beside the hole."),
