@@ -99,10 +99,13 @@ def scene(example: bool, general: bool, reference: bool, materials: bool, expand
     if example + general + reference + materials + (expand is not None) != 1:
         raise click.UsageError("choose one of --example, --general, --reference, --materials and --expand")
     from archord.scene import reference as pages
-    from archord.scene.file import load_scene, resolved
+    from archord.scene.file import load_scene, parse_any, resolved
+    from archord.scene.scene import Scene
+    from archord.scene.shapes import general_joint
 
     if expand is not None:
-        print(resolved(load_scene(expand)), end="")
+        given = load_scene(expand)
+        print(resolved(parse_any(general_joint(given)) if isinstance(given, Scene) else given), end="")
     elif materials:
         print(pages.materials(), end="")
     else:

@@ -6,6 +6,9 @@ horizontal diameter; "ring" is half a whole pin in a ring, loaded by a force at 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import numpy as np
 import ufl
 from mpi4py import MPI
@@ -16,6 +19,7 @@ from archord.geometry.shapes.half_ring import half_ring
 from archord.geometry.shapes.joint_mesh import refinements
 from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.presets.arc import SYMMETRY
+from archord.scene.geometry import JointGeometry
 from archord.scene.scene import Scene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Rigid, Support
 from archord.solver.system import System
@@ -49,8 +53,8 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         slide=travel - abs(g.dR),
     )
 
-    def core(x):
-        return ufl.max_value(1 - ufl.dot(x, x) / (scene.load.core_radius * g.radius) ** 2, 0)
+    core = core_density((0.0, 0.0), scene.load.core_radius * g.radius)
+    part = "none" if rigid else "whole" if scene.pin.whole else "half"
 
     def guess(load: float) -> Guess:
         """The pin moved down by the load, or by about what a force would press it, the block at rest."""
@@ -58,7 +62,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
         return Guess(shift, {"pin": (0.0, -shift)})
 
     return Problem(
-        _mesh(scene, comm, partitioner),
+        joint_mesh(comm, g, part, scene.load.core_radius, analysis.degree, partitioner),
         [Body(name, solid.constitutive(analysis.plane)) for name, solid in scene.solids.items()],
         [contact],
         supports,
@@ -76,15 +80,28 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     )
 
 
-def _mesh(scene: Scene, comm: MPI.Comm, partitioner) -> TaggedMesh:
-    g = scene.joint
+def joint_mesh(
+    comm: MPI.Comm, geometry: JointGeometry, pin: str, core_radius: float, degree: int, partitioner=None
+) -> TaggedMesh:
+    """The mesh of a joint with its ``pin`` "half", "whole" or "none"; a ring's core has ``core_radius``, over R."""
+    g = geometry
     sizes = g.radius, g.dR, g.W, g.h, g.growth
-    options = {"size_ratio": g.size_ratio, "degree": scene.analysis.degree, "partitioner": partitioner}
+    options = {"size_ratio": g.size_ratio, "degree": degree, "partitioner": partitioner}
     options["refinements"] = refinements(g.expected_cells)
     if g.is_ring:
-        return half_ring(comm, *sizes, scene.load.core_radius * g.radius, **options)
+        return half_ring(comm, *sizes, core_radius * g.radius, **options)
     edge = None if g.edge_angle is None else (g.edge_angle, g.edge_ratio * g.h)
-    return quarter_joint(comm, *sizes, edge=edge, rigid_pin=scene.pin.rigid, whole_pin=scene.pin.whole, **options)
+    return quarter_joint(comm, *sizes, edge=edge, rigid_pin=pin == "none", whole_pin=pin == "whole", **options)
+
+
+def core_density(centre: Sequence[float], radius: float) -> Callable[[Any], Any]:
+    """Density of a force, as `Load` takes it: a paraboloid within a circle."""
+
+    def density(x):
+        ray = x - ufl.as_vector(list(centre))
+        return ufl.max_value(1 - ufl.dot(ray, ray) / radius**2, 0)
+
+    return density
 
 
 def _coarser(scene: Scene) -> Scene:

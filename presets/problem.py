@@ -16,12 +16,13 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.bushing import bushing
 from archord.geometry.shapes.lug import lug
 from archord.materials.material import Array
+from archord.presets.joint import core_density, joint_mesh
 from archord.scene import parts
 from archord.scene.errors import InputError
 from archord.scene.problem import LIVE, ProblemScene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
 
-_SHAPES: dict[str, Callable[..., TaggedMesh]] = {"lug": lug, "bushing": bushing}
+_SHAPES: dict[str, Callable[..., TaggedMesh]] = {"lug": lug, "bushing": bushing, "joint": joint_mesh}
 _AXES = {"x": 0, "y": 1, "rotation": 2}
 
 
@@ -106,14 +107,19 @@ class _Builder:
     def _load(self, load: parts.Load, on_disc: bool) -> None:
         by_force = load.kind == "force"
         on_set = load.on not in self.couplings and not on_disc
-        spread = load.kind == "pressure" or (on_set and by_force and load.on not in self._edges_and_points())
+        spread = (
+            load.kind == "pressure"
+            or load.core is not None
+            or (on_set and by_force and load.on not in self._edges_and_points())
+        )
         control: Literal["displacement", "force"] = "force" if by_force and not spread else "displacement"
         self.drives.append(Drive(load.name, self.scene.values(load), control))
         if load.pressure is not None:
             self.loads.append(Load(facets=load.on, pressure=1.0, drive=load.name))
         elif spread:
             force = (1.0, 0.0) if load.direction == "x" else (0.0, 1.0)
-            self.loads.append(Load(cells=load.on, force=force, drive=load.name))
+            density = core_density(load.core.centre, load.core.radius) if load.core else None
+            self.loads.append(Load(cells=load.on, force=force, density=density, drive=load.name))
         elif on_set:
             self.supports.append(Support(load.name, load.on, _AXES[load.direction or "x"], 1.0, load.name))
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from archord.scene.keys import LINE, Positive, Section, key, require
 from archord.scene.sections import Modelling, NotNegative, Solid, Steps, Targets
-from archord.scene.shapes import Bushing, Lug
+from archord.scene.shapes import Bushing, JointShape, Lug
 
 Point = Annotated[list[float], Field(min_length=2, max_length=2)]
 Freedom = Literal["x", "y", "rotation"]
@@ -49,7 +49,7 @@ class Mesh(Section):
     )
     refine: int = key("how often every cell is cut in four", default=0, ge=0, le=6)
     circle: list[Circle] = Field(default_factory=list, description="circles that facet sets lie on")
-    shape: Annotated[Lug | Bushing, Field(discriminator="kind")] | None = Field(
+    shape: Annotated[Lug | Bushing | JointShape, Field(discriminator="kind")] | None = Field(
         None, description="the shape of a preset, as `archord scene --expand` prints it"
     )
 
@@ -149,6 +149,11 @@ class Load(Section):
         default=None,
         other=1e3,
     )
+    core: RigidCircle | None = key(
+        "circle in which a force on cells is spread, less and less outward, instead of evenly",
+        default=None,
+        other={"centre": [0.0, 0.0], "radius": 1.0},
+    )
     pressure: Targets | None = key("pressure on a facet set", "stress", default=None, other=10.0)
 
     @model_validator(mode="after")
@@ -156,6 +161,7 @@ class Load(Section):
         given = [name for name in VALUES if getattr(self, name) is not None]
         require(len(given) > 0, "displacement", "is missing (or force, pressure)")
         require(len(given) == 1, given[0], f"must not be given together with {' and '.join(given[1:])}")
+        require(self.core is None or self.force is not None, "core", "is for a force on cells")
         directed = (self.direction is None) == (self.pressure is not None)
         said = "is missing" if self.pressure is None else "is not for a pressure, which acts along the normal"
         require(directed, "direction", said)

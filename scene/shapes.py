@@ -8,8 +8,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from archord.scene.geometry import JointGeometry
 from archord.scene.keys import Positive, Section, key, require
-from archord.scene.scene import Checked
+from archord.scene.scene import Checked, Scene
 from archord.scene.sections import Modelling, Pin, ProblemOutput, Solid, Stepping, Steps, Targets, Units
 
 _THINNEST, _DEEPEST, _FARTHEST = 0.02 * (1 - 1e-9), 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
@@ -103,6 +104,18 @@ class Bushing(Shape):
             require(outer <= _FARTHEST * R, name, f"must not exceed {_FARTHEST:g} R")
             require(-_DEEPEST <= inner / edge - 1 <= 0.5, name, fits)
             edge = outer
+
+
+class JointShape(JointGeometry):
+    """The paper's joint: half a block or a ring with a pin."""
+
+    pin: PinPart = key("part of the pin that is meshed; [pin] says it in a preset", default="half", other="whole")
+    core_radius: float = key("ring: radius over R of the core that the force acts on", default=0.1)
+    kind: Literal["joint"] = "joint"
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws it."""
+        return {"kind": "joint", "geometry": self, "pin": self.pin, "core_radius": self.core_radius}
 
 
 class Ring(Solid):
@@ -225,6 +238,39 @@ class BushingScene(Preset):
         shape = self.bushing.model_copy(update={"rings": self._rings(), "touching": touching})
         radii = [shape.radius, *(r for ring in shape.rings for r in ring)][:-1]
         return self._general(shape, solids | {"housing": self.housing}, "outer edge", surfaces, radii)
+
+
+def general_joint(scene: Scene) -> dict[str, Any]:
+    """The general scene that the ``scene`` of a joint stands for; its pin is pressed along -y."""
+    g, pin, load = scene.joint, scene.pin, scene.load
+    said = scene.model_dump(exclude_none=True, include={"units", "analysis", "stepping", "output"})
+    said["analysis"].pop("integration")
+    material = {*Solid.model_fields}
+    bodies = [{"name": n} | s.model_dump(exclude_none=True, include=material) for n, s in scene.solids.items()]
+    contact: dict[str, Any] = {"name": "contact", "surfaces": ["pin", "hole"], "overlap": max(-g.dR, 0.0)}
+    if pin.rigid:
+        contact |= {"surfaces": ["hole"], "rigid": {"centre": [0.0, -g.dR], "radius": g.radius}}
+    elif scene.analysis.integration != "both":
+        contact["integrated"] = "pin" if scene.analysis.integration == "pin" else "hole"
+    part = "none" if pin.rigid else "whole" if pin.whole else "half"
+    on = "contact" if pin.rigid else "pin" if g.is_ring else "pin top"
+    press: dict[str, Any] = {"name": "press", "on": on, "direction": "y"}
+    press["force" if scene.force_controlled else "displacement"] = [-leg * scene.load_unit for leg in load.legs]
+    if g.is_ring:
+        press["core"] = {"centre": [0.0, 0.0], "radius": load.core_radius * g.radius}
+    shape = g.model_dump(exclude_none=True) | {"kind": "joint", "pin": part, "core_radius": load.core_radius}
+    return said | {
+        "analysis": said["analysis"] | {"symmetry": 2},
+        "mesh": {"shape": shape},
+        "body": bodies,
+        "interaction": [contact],
+        "support": [
+            {"name": "axis", "on": "symmetry", "fixed": ["x"]},
+            {"name": "block", "on": "block held", "fixed": ["x", "y"]},
+        ],
+        "load": [press],
+        "path": {"steps": load.leg_steps},
+    }
 
 
 PRESETS: dict[str, type[LugScene] | type[BushingScene]] = {"lug": LugScene, "bushing": BushingScene}

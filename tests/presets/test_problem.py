@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.benchmarks.case import paper_joint
 from archord.presets.general import GeneralAccount
 from archord.scene.file import parse_any
+from archord.scene.shapes import general_joint
 from archord.solver.stepping import march
+from tests.solver.solving import solve
 
 STEEL = {"E": 210000.0, "nu": 0.3}
 SHAPE = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
@@ -110,3 +113,28 @@ def test_a_rigid_disc_presses_as_a_stiff_pin(pressed):
 def test_a_force_on_cells_is_spread_over_them():
     found = solved([load(on="lug", force=80.0)], pin="none")[1]
     assert found["clamp x"] == pytest.approx(-80, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"pin": {"rigid": True}},
+        {"load": {"displacement": None, "relative_force": [0.003, 0.001], "steps": 2}},
+        {"joint": {"radius": 1.0, "clearance": -0.002, "block_size": 4.0, "model": "ring", "element_size": 0.2}}
+        | {"load": {"displacement": None, "relative_force": 0.003, "steps": 2}},
+    ],
+)
+def test_a_joint_stands_for_a_general_scene(changes):
+    """Which has the same force and displacement, step by step, after the stage in which an interference arises."""
+    scene = paper_joint(0.2, 2, **changes)
+    general = parse_any(general_joint(scene))
+    account, steps = GeneralAccount(general, MPI.COMM_SELF), []
+
+    def done(step, position):
+        q, force = account.driven()
+        steps.append((-q[0], -force[0]))
+
+    march(account.system.load_path(), general.targets, target_done=done)
+    expected = [(m.delta, m.P) for m in solve(scene).steps]
+    assert np.array(steps)[general.fits :] == pytest.approx(np.array(expected), rel=1e-6, abs=1e-9)
