@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from archord.postprocess.run import Run
 
-CONTACT = ("pressure", "gap")
+CONTACT = {"pressure": "pressure", "facet_pressure": "pressure", "gap": "gap"}
 _ROUND = 1e-3  # of the radius, by which nodes may miss the circle of an arc
 _SMOOTH = 0.9  # cosine of the angle between facets without a corner
 _SAMPLES = 201  # on a line
@@ -75,14 +75,18 @@ class Probe:
 
 def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
     """A ``quantity`` at the nodes along an ``edge`` of the mesh: its "hoop", "normal" or "shear" stress, or one of
-    `at_nodes`; or "pressure" or "gap" at the integration points of a surface. Raises `InputError`."""
+    `at_nodes`; or "pressure" or "gap" at the integration points of a surface, or "facet_pressure", the mean of each
+    facet, which scatters less where bodies yield. Raises `InputError`."""
     head = (edge, quantity, _unit(run, quantity), step, *_driving(run, step))
     if quantity in CONTACT:
         table = run.pressure(step, edge)
+        circle, weight, facet = _circle(table[["x", "y"]].to_numpy()), table["weight"], table["facet"]
+        if quantity == "facet_pressure":
+            weighted = table[["x", "y", "s", "pressure"]].mul(weight, axis=0).groupby(facet).sum()
+            table = weighted.div(weight.groupby(facet).sum(), axis=0)
         x = table[["x", "y"]].to_numpy()
-        round_ = _circle(x)
-        angle = None if round_ is None else np.degrees(np.arctan2(*(x - round_[0]).T[::-1]))
-        return Probe(*head, x, table["s"].to_numpy(), table[quantity].to_numpy(), angle)
+        angle = None if circle is None else np.degrees(np.arctan2(*(x - circle[0]).T[::-1]))
+        return Probe(*head, x, table["s"].to_numpy(), table[CONTACT[quantity]].to_numpy(), angle)
     fields = run.fields(step)
     edges = [name for name, facets in fields.edges.items() if len(facets)]
     if edge not in edges:

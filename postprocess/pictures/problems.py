@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from archord.postprocess.probe import CONTACT, Probe, probe_edge
+from archord.postprocess.probe import Probe, probe_edge
 from archord.postprocess.run import Run
 
 _MAGNIFIED = 0.05  # largest displacement over the size of the bodies, as drawn, where nothing touches
@@ -38,8 +38,8 @@ def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
 
 
 def contact_panel(axes: Any, run: Run) -> None:
-    """Contact pressure along every integrated surface at the last step, over the angle where all are arcs."""
-    probes = [probe_edge(run, name, CONTACT[0], run.number(None)) for name in run.contact()]
+    """Mean contact pressure of each facet at the last step, over the angle where all surfaces are arcs."""
+    probes = [probe_edge(run, name, "facet_pressure", run.number(None)) for name in run.contact()]
     draw_probes(axes, probes, [probe.place for probe in probes])
     axes.set(title=f"contact pressure, step {run.steps}", ylim=(0, None))
 

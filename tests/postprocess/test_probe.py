@@ -64,6 +64,9 @@ def test_the_stress_normal_to_an_edge_is_its_traction(lug):
     for angle in (10, 40):
         assert -normal.at(angle) == pytest.approx(pressure.at(angle), rel=0.03)
     assert np.abs(lug.probe("end", "normal").values).max() < 0.03 * hoop.values.max()
+    means = lug.probe("hole", "facet_pressure")
+    assert 4 * len(means.s) <= len(pressure.s)
+    assert means.at(40) == pytest.approx(pressure.at(40), rel=0.02)
     tensor = lug.fields().nodal_fields()
     assert lug.probe("hole", "stress_xx").at(90) == pytest.approx(hoop.at(90), rel=1e-3)
     assert set(lug.points()) == {"coordinates", "stress"}
