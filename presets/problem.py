@@ -10,7 +10,6 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
-from archord.geometry.meshes.read import read_mesh, tagged
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.bushing import bushing
@@ -51,6 +50,8 @@ def scene_mesh(scene: ProblemScene, comm: MPI.Comm, partitioner=None) -> TaggedM
     if mesh.shape is not None:
         shape = mesh.shape.arguments()
         return _SHAPES[shape.pop("kind")](comm, degree=scene.analysis.degree, partitioner=partitioner, **shape)
+    from archord.geometry.meshes.read import read_mesh, tagged  # with scipy, which solves of presets do without
+
     source = LIVE.get(mesh.file or "", mesh.file)
     circles = [Circle(circle.facets, (circle.centre[0], circle.centre[1]), circle.radius) for circle in mesh.circle]
     options = {"scale": mesh.scale, "order": mesh.order, "refine": mesh.refine, "partitioner": partitioner}
