@@ -90,7 +90,7 @@ def check_mesh(
         inside = {body: np.isin(mesh.bodies, mesh.cell_sets[cells]) for body, cells in bodies.items()}
         every = [faults(mesh), _metres(mesh) if millimetres else [], _of_bodies(mesh, inside)]
         checks = [*every, *(_of_surface(mesh, inside, name) for pair in pairs for name in pair)]
-        checks += [_overlaps(mesh, inside, overlap), *(sagitta(mesh, *pair) for pair in pairs if len(pair) == 2)]
+        checks += [*(sagitta(mesh, *pair) for pair in pairs if len(pair) == 2), _overlaps(mesh, inside, overlap)]
         found = next((said for check in checks for said in check), "")
         warnings = [said for body, cells in inside.items() for said in cracks(mesh, body, cells)]
     found, warnings = tagged.mesh.comm.bcast((found, warnings))
@@ -161,12 +161,12 @@ def _overlaps(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], allowed: float)
         start, end = outlines[b][:, :-1].reshape(-1, 2), outlines[b][:, 1:].reshape(-1, 2)
         points = outlines[a][:, 0]
         points = points[((points > start.min(axis=0)) & (points < start.max(axis=0))).all(axis=1)]
-        side = np.linalg.norm(outlines[b][:, -1] - outlines[b][:, 0], axis=1).max()
-        into = allowed + _INTO[mesh.edges.shape[1] > 2] * side
+        spare = allowed + _INTO[mesh.edges.shape[1] > 2] * _PIECES * np.linalg.norm(end - start, axis=1)
         for part in np.array_split(points, 1 + len(points) * len(start) // _AT_ONCE):
             part = part[_within(part, start, end)]
-            depth = _distance(part, start, end)
-            if depth.max(initial=0) > into:
+            depth, nearest = _distance(part, start, end)
+            depth[depth <= spare[nearest]] = 0.0
+            if depth.any():
                 at = _at(part[depth.argmax()])
                 yield f"the body {a!r} lies {depth.max():.3g} deep in the body {b!r} at {at}"
                 break
@@ -181,11 +181,12 @@ def _within(x: Array, start: Array, end: Array) -> np.ndarray:
     return (crosses & right).sum(axis=1) % 2 == 1
 
 
-def _distance(x: Array, start: Array, end: Array) -> Array:
-    """Distance ``(m,)`` of ``x`` from the nearest of the segments."""
+def _distance(x: Array, start: Array, end: Array) -> tuple[Array, np.ndarray]:
+    """Distance ``(m,)`` of ``x`` from the nearest of the segments, and which one that is."""
     along, to = end - start, x[:, None] - start
     xi = np.clip((to * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
-    return np.linalg.norm(to - xi[..., None] * along, axis=2).min(axis=1, initial=np.inf)
+    away = np.linalg.norm(to - xi[..., None] * along, axis=2)
+    return away.min(axis=1), away.argmin(axis=1)
 
 
 def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:

@@ -77,6 +77,13 @@ def test_each_fault_has_its_sentence(comm, made, bodies, options, said):
         check(comm, (x * options.pop("scale", 1.0), cells, {**cell_sets, "both": both}, facet_sets), bodies, **options)
 
 
+def test_large_sides_elsewhere_hide_no_overlap():
+    x, cells, sets, facets = joined(grid(2, 2), grid(9, 2, (0.0, 0.99)))
+    x[-1] = [50.0, 40.0]
+    with pytest.raises(ValueError, match=r"lies 0\.01 deep in the body"):
+        check(MPI.COMM_SELF, (x, cells, sets, facets), BOTH)
+
+
 def test_bodies_may_lie_in_each_other_as_far_as_is_said():
     made = joined(grid(2, 2), grid(3, 2, (0.0, 0.9)))
     assert check(MPI.COMM_SELF, made, BOTH, overlap=0.1) == []
