@@ -150,7 +150,8 @@ class _Builder:
                 self.supports.append(Support(coupling.name, coupling.facets, axis, rate, drive))
 
     def _mean_point(self, coupling: parts.Coupling) -> None:
-        point = (coupling.point[0], coupling.point[1])
+        mirrored = self.scene.analysis.symmetry > 1  # with its mirror image an edge moves along the symmetry line alone
+        point = None if mirrored else (coupling.point[0], coupling.point[1])
         for freedom, axis in _AXES.items():
             load = self.loaded.get((coupling.name, freedom))
             drive = load.name if load else f"{coupling.name} {freedom}"
@@ -158,6 +159,8 @@ class _Builder:
                 self.drives.append(Drive(drive, (0.0, 0.0)))
             elif load is None:
                 continue
+            if mirrored and freedom == "rotation":
+                raise ValueError(f"the coupling {coupling.name!r} of a part with mirror images cannot turn")
             self.means.append(Mean(coupling.name, coupling.facets, axis, point, drive))
 
     def _interaction(self, part: parts.Interaction, slide: float) -> Interaction:
