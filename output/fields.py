@@ -112,7 +112,7 @@ class FieldWriter:
 
     def _grid(self, step: int, time: float, of_nodes: list[str], of_cells: list[str]) -> str:
         n_nodes, n_cells, of_cell = self._sizes
-        nodal, body = _data(f"{n_nodes} 3", step, "displacement"), _data(f"{n_cells}", 0, "mesh/body", "Char", 1)
+        nodal, body = _data(f"{n_nodes} 3", step, "displacement"), _data(f"{n_cells}", 0, "mesh/body", "Int", 4)
         cells = _data(f"{n_cells} {of_cell}", 0, "mesh/cells", "Int")
         lines = [
             f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>',

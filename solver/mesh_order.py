@@ -84,7 +84,7 @@ class MeshOrder:
 
     def bodies(self) -> np.ndarray:
         """Tag of the body of every cell ``(n,)`` on rank 0, nothing elsewhere. Collective."""
-        problem, of_cells = self.system.problem, np.zeros(self.n_cells, dtype=np.int8)
+        problem, of_cells = self.system.problem, np.zeros(self.n_cells, dtype=np.int32)
         for body in problem.bodies:
             cells = problem.cells_of(body)
             of_cells[cells[cells < self.n_cells]] = problem.tag(body)
