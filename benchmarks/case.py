@@ -14,8 +14,7 @@ from mpi4py import MPI
 
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome, solve_scene
-from archord.presets.measures import Measures
-from archord.scene.file import parse_scene, resolved
+from archord.scene.file import AnyScene, parse_scene, resolved
 from archord.scene.scene import Scene
 
 E = 2 * (1 - 0.3**2)  # E* = 1 for two like bodies in plane strain
@@ -46,7 +45,7 @@ class Case:
     """
 
     name: str
-    scene: Scene
+    scene: Any  # `AnyScene`
     group: str = ""
     expected: tuple[Expected, ...] = ()
     stops: str = ""
@@ -116,8 +115,10 @@ def _overridden(data: dict[str, Any], sections: dict[str, dict]) -> dict[str, An
     }
 
 
-def quantities(scene: Scene, last: Measures) -> dict[str, float]:
-    """What cases are compared by at the step ``last``, without units."""
+def quantities(scene: AnyScene, last: Any) -> dict[str, float]:
+    """What cases are compared by at the step ``last``: of a joint without units, of a general scene the columns."""
+    if not isinstance(scene, Scene):
+        return last.values
     E_star, R = scene.E_star, scene.joint.radius
     return {
         "P/(E* R)": last.P / (E_star * R),
@@ -126,6 +127,13 @@ def quantities(scene: Scene, last: Measures) -> dict[str, float]:
         "delta/dR": last.delta / scene.joint.dR,
         "p0/P": last.p0 * R / last.P if last.P else 0.0,
     }
+
+
+def driven(scene: AnyScene, m: Any) -> list[tuple[float, float]]:
+    """Force and displacement of every load at the step ``m``."""
+    if isinstance(scene, Scene):
+        return [(m.P, m.delta)]
+    return [(m.values[f"{load.name} force"], m.values[f"{load.name} displacement"]) for load in scene.load]
 
 
 def slug(name: str) -> str:

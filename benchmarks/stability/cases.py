@@ -1,4 +1,4 @@
-"""The cases of the stability benchmark, read from ``cases.toml``: a joint each, and what it must give.
+"""The cases of the stability benchmark: joints read from ``cases.toml``, general scenes, and what each must give.
 
 A case names what its numbers must agree with: a closed form; another case of the same run that gets there another way
 (other units, other steps, the other control); or the same joint on a fine mesh, stored in ``fine.json``, which
@@ -10,12 +10,15 @@ from __future__ import annotations
 import json
 import tempfile
 import tomllib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from archord.benchmarks.case import Case, Expected, paper_joint, quantities, varied
 from archord.benchmarks.persson import persson_joint, theory
+from archord.benchmarks.stability.problems import groups, problem_scene
+from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
 
 Values = dict[str, dict[str, float]]  # by case and quantity
@@ -29,27 +32,33 @@ _TINY_LOAD = 0.02  # delta/dR up to which the contact is tiny
 
 def cases() -> dict[str, Case]:
     """All cases by name, in the order of the table."""
-    groups = tomllib.loads(Path(__file__).with_name("cases.toml").read_text(encoding="utf-8"))
-    return {name: _case(name, group, keys) for group, table in groups.items() for name, keys in table.items()}
+    joints = tomllib.loads(Path(__file__).with_name("cases.toml").read_text(encoding="utf-8"))
+    kinds = (joints, _scene, "P/(E* R)"), (groups(), problem_scene, "")  # what is compared by default
+    return {
+        name: _case(name, group, keys, scene, default)
+        for table, scene, default in kinds
+        for group, cases in table.items()
+        for name, keys in cases.items()
+    }
 
 
-def _case(name: str, group: str, keys: dict[str, Any]) -> Case:
+def _case(name: str, group: str, keys: dict[str, Any], scene: Callable[[Any], AnyScene], default: str) -> Case:
     limits = {key: keys.pop(key) for key in ("stops", "warns", "budget") if key in keys}
-    expected = _expected(keys, bool(limits.get("stops")))
-    return Case(name, _scene(keys), group, expected, **limits)
+    expected = _expected(keys, bool(limits.get("stops")), default)
+    return Case(name, scene(keys), group, expected, **limits)
 
 
-def _expected(keys: dict[str, Any], stops: bool) -> tuple[Expected, ...]:
+def _expected(keys: dict[str, Any], stops: bool, default: str) -> tuple[Expected, ...]:
     """What a case must give, by the ``keys`` that say so, which are taken out."""
-    quantities, like, value, fine = (keys.pop(key, None) for key in ("of", "like", "value", "fine"))
+    of, like, value, fine = (keys.pop(key, None) for key in ("of", "like", "value", "fine"))
     if "persson" in keys and not (like or fine):
         eps, peak = theory(keys["persson"])
         known = Expected("eps", eps, 0.02, "Ciavarella and Decuzzi 2001")
         return Expected("p0/P", peak, 0.01, "Persson 1964"), known
-    if stops and not (like or fine):
+    if (stops or not default) and not (like or value or fine):
         return ()
     said = like or value or (FINE, fine or _WITHIN, "fine mesh")
-    return tuple(Expected(quantity, *said) for quantity in quantities or ["P/(E* R)"])
+    return tuple(Expected(quantity, *said) for quantity in of or [default or "pull force"])
 
 
 def _scene(keys: dict[str, Any]) -> Scene:
@@ -69,7 +78,7 @@ def _scene(keys: dict[str, Any]) -> Scene:
     return paper_joint(size, steps, strength, **keys)
 
 
-def fine_scene(scene: Scene) -> Scene:
+def fine_scene(scene: Any) -> Scene:
     """The joint of ``scene`` with equal elements of 2.5 %R (0.25 %R for tiny contacts) or half as large, the default
     gamma factor and, if it can yield, at least 20 and at least twice as many steps."""
     given = scene.joint

@@ -8,19 +8,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import h5py
 import numpy as np
 from mpi4py import MPI
 
-from archord.benchmarks.case import Case, Expected, matches, quantities, side_by_side
+from archord.benchmarks.case import Case, Expected, driven, matches, quantities, side_by_side
 from archord.benchmarks.stability.cases import FINE, Values, cases, read_fine
 from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.run import Outcome
 from archord.output.step_file import all_arrays
-from archord.presets.measures import Measures
 from archord.scene.errors import InputError
+from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
 from archord.solver.stepping import Step, StepFailure
 
@@ -150,7 +151,7 @@ def solve_case(case: Case, folder: Path) -> Result:
     return result
 
 
-def _look(result: Result, scene: Scene, outcome: Outcome) -> None:
+def _look(result: Result, scene: AnyScene, outcome: Outcome) -> None:
     """Fill in what the run's files and steps tell."""
     report = json.loads((outcome.folder / "run.json").read_text(encoding="utf-8"))
     result.not_finite = not_finite(outcome.folder)
@@ -168,15 +169,16 @@ def _look(result: Result, scene: Scene, outcome: Outcome) -> None:
         result.quantities = quantities(scene, outcome.steps[-1])
 
 
-def _energy_limit(scene: Scene, steps: list[Measures]) -> float:
-    """How far the trapezoidal rule can be from the work, over the work, where P is monotonic between two steps: half
-    the sum of |dP d delta|. That of an interference fit counts from its first step on; a single step tells nothing."""
-    press_fit = scene.joint.dR < 0
-    if press_fit and len(steps) == 1:
+def _energy_limit(scene: AnyScene, steps: list[Any]) -> float:
+    """How far the trapezoidal rule can be from the work, over the work, where loads are monotonic between two steps:
+    half the sum of |dP d delta|. That of interferences counts from their first step on; a single step tells nothing."""
+    fits = scene.joint.dR < 0 if isinstance(scene, Scene) else scene.fits
+    if fits and len(steps) == 1:
         return math.inf
-    P, delta = np.array([[0.0, 0.0]] * (not press_fit) + [[m.P, m.delta] for m in steps]).T
     largest = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
-    return float(np.abs(np.diff(P) * np.diff(delta)).sum() / 2 / largest) if largest else 0.0
+    path = np.array([driven(scene, m) for m in steps])  # loads, forces and displacements
+    path = path if fits else np.concatenate([np.zeros_like(path[:1]), path])
+    return float(np.abs(np.prod(np.diff(path, axis=0), axis=2)).sum() / 2 / largest) if largest else 0.0
 
 
 def not_finite(folder: Path) -> list[str]:
