@@ -24,6 +24,7 @@ from archord.solver.timer import Timer
 _FEW_FACETS = 3
 _LARGE_STRAIN = 0.05  # PEEQ
 _SPURIOUS = 1e-4  # of the work or the energy, in the springs that hold floating bodies
+_ALONE = 0.1  # of the same, where the springs alone hold a body
 NEVER = "no surfaces ever touched: no load presses any of them together"
 
 
@@ -58,11 +59,13 @@ class GeneralAccount:
         self._warnings: list[str] = []
         with as_input_error(scene), timer("mesh"):
             if scene.mesh.shape is None:
-                from archord.presets.held import check  # with scipy, which solves of presets do without
+                from archord.presets.held import check, require_facing  # with scipy, which solves of presets do without
 
                 self._warnings = check(scene, problem)
         with as_input_error(scene):
             self.system = System(problem, timer=timer)
+            if scene.mesh.shape is None:
+                require_facing(self.system)
         self._supports = list(dict.fromkeys(s.name for s in problem.supports if s.name not in self.system.drive_names))
 
     def columns(self) -> list[tuple[str, Callable[[Record], float | int]]]:
@@ -166,7 +169,7 @@ class GeneralAccount:
                 said.append(f"only {touching} facets of {name!r} in contact; smaller elements would resolve it")
         if (largest := max((v for k, v in m.values.items() if k.endswith(" peeq_max")), default=0.0)) > _LARGE_STRAIN:
             said.append(f"PEEQ reaches {largest:.2g}, too much for small-strain theory")
-        if residual > 1e-8:
+        if residual > 1e-8 and m.force_balance:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
         if m.force_balance > 1e-8:
             said.append(f"the forces on the whole do not balance: {m.force_balance:.1e} of the largest is left")
@@ -176,7 +179,10 @@ class GeneralAccount:
         return said
 
     def ending(self, steps: Sequence[Record]) -> tuple[str, list[str]]:
-        """A warning where nothing ever touched."""
+        """A warning where nothing ever touched; that springs alone hold a body is no end."""
+        total = max((max(abs(m.work), m.elastic_energy + m.plastic_dissipation) for m in steps), default=0.0)
+        if self.system.stabilisation_energy > _ALONE * total:
+            return "nothing holds what the loads move: no contact carries them", []
         return "", [NEVER] if self.scene.interaction and not any(m.contact_area for m in steps) else []
 
     def energy_balance(self, steps: Sequence[Record]) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from mpi4py import MPI
 
 from archord.geometry.meshes.check import check_mesh, free_motions
 from archord.geometry.meshes.fenicsx import gathered
@@ -13,7 +14,9 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.material import Array
 from archord.scene.problem import ProblemScene
 from archord.solver.problem import Problem
+from archord.solver.system import System
 
+_FAR = 0.1  # of the size of a surface: drawn farther behind another one, it does not face that
 _ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
 
 
@@ -66,6 +69,23 @@ def _loose(
         free = [motion for motion in free if motion != "rotation" or body not in touched]
         if free:
             yield f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a [[support]]"
+
+
+def require_facing(system: System) -> None:
+    """Raise ValueError where surfaces of an interaction as drawn do not face each other, or a tie has nothing to tie.
+    Collective."""
+    for interface in system.contact.interfaces:
+        part = interface.interaction
+        for pair in interface.pairs:
+            gap = (pair.separation * pair.projection.normal).sum(axis=1)[pair.projection.found]
+            found = np.array([gap.min(initial=np.inf), np.abs(gap).min(initial=np.inf)])
+            system.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MIN)
+            (lowest, nearest), size = found, np.ptp(pair.surface.curve.X, axis=0).max()
+            allowed, said = part.overlap + _FAR * size, f"the surface {pair.surface.name!r} of {part.name!r}"
+            if lowest < -allowed:
+                raise ValueError(f"{said} lies up to {-lowest:g} behind the opposite one: they must face each other")
+            if nearest > allowed and not pair.law.slides:
+                raise ValueError(f"{said} is nowhere near the one that it is tied to")
 
 
 def _nodes(whole: PlaneMesh, name: str, of_cells: bool = False) -> np.ndarray:

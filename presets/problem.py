@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.refine import Circle
-from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.meshes.tagged_mesh import TaggedMesh, unknown
 from archord.geometry.shapes.bushing import bushing
 from archord.geometry.shapes.lug import lug
 from archord.materials.material import Array
@@ -75,6 +75,10 @@ class _Builder:
         """All of them together. Raises ValueError."""
         scene, analysis = self.scene, self.scene.analysis
         discs = {i.name for i in scene.interaction if i.rigid}
+        known = [*self._edges_and_points(), *self.mesh.cell_sets, *self.couplings, *discs]
+        for on in [*(s.on for s in scene.support), *(q.on for q in scene.load)]:
+            if on not in known:
+                raise ValueError(unknown("set or coupling", on, known))
         for support in scene.support:
             if support.on not in self.couplings:
                 self.supports += [Support(support.name, support.on, _AXES[freedom]) for freedom in support.fixed]
@@ -82,6 +86,10 @@ class _Builder:
             self._load(load, on_disc=load.on in discs)
         for coupling in scene.coupling:
             (self._rigid_point if coupling.kind == "rigid" else self._mean_point)(coupling)
+        given: dict[tuple[str, int], str] = {}
+        for s in self.supports:
+            if (other := given.setdefault((s.facets, s.axis), s.name)) != s.name:
+                raise ValueError(f"{other!r} and {s.name!r} both prescribe how {s.facets!r} moves in {'xy'[s.axis]}")
         lengths = [abs(v) for load in scene.load if load.kind == "displacement" for v in load.stages]
         by_force = any(load.kind != "displacement" for load in scene.load)
         travel = sum(lengths) + max((i.interference + i.overlap for i in scene.interaction), default=0.0)
@@ -124,8 +132,8 @@ class _Builder:
         elif on_set:
             self.supports.append(Support(load.name, load.on, _AXES[load.direction or "x"], 1.0, load.name))
 
-    def _edges_and_points(self) -> set[str]:
-        return {*self.mesh.facet_sets, *self.mesh.point_sets}
+    def _edges_and_points(self) -> list[str]:
+        return [*self.mesh.facet_sets, *self.mesh.point_sets]
 
     def _freedoms(self, coupling: parts.Coupling) -> Iterator[tuple[str, str | None]]:
         """The motions of a reference point that are not held, and the drive of each, None where nothing loads it."""

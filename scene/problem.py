@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from archord.scene.keys import key, require
 from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Path, ProblemAnalysis, Support
-from archord.scene.scene import Checked
+from archord.scene.scene import RANGE, SOFTEST, WEAKEST, Checked
 from archord.scene.sections import MOST_STEPS, ProblemOutput, Stepping, Units
 
 FORMAT = 2
@@ -61,6 +61,13 @@ class ProblemScene(Checked):
         many = [name for name, count in Counter(used).items() if count > 1]
         require(not many, "interaction", f"uses the facet sets {many} more than once")
         self._directions()
+        stiffest = max(body.E for body in self.body)
+        for body in self.body:
+            at = "body", body.name
+            require(RANGE[0] <= body.E <= RANGE[1], (*at, "E"), "must be between 1e-30 and 1e30; choose other units")
+            require(stiffest <= body.E / SOFTEST, (*at, "E"), f"must be at least {SOFTEST:g} of the largest E")
+            strong = body.yield_stress is None or body.yield_stress >= WEAKEST * body.E
+            require(strong, (*at, "yield_stress"), f"must be at least {WEAKEST:g} times E")
         for section, name in CHOSEN if self.analysis.accuracy is not None else ():
             free = name not in getattr(self, section).model_fields_set
             require(free, f"{section}.{name}", "must not be given together with analysis.accuracy, which chooses it")

@@ -19,10 +19,10 @@ from archord.scene.geometry import JointGeometry
 from archord.scene.keys import Section, key, require
 from archord.scene.sections import Analysis, Load, Output, Pin, Solid, Stepping, Units
 
-_RANGE = 1e-30, 1e30  # of lengths and moduli; powers of them must not leave the range of numbers
+RANGE = 1e-30, 1e30  # of lengths and moduli; powers of them must not leave the range of numbers
 FORMAT = 1  # version of the scene format: rises when a scene gets a meaning that an older archord would get wrong
-_SOFTEST = 1e-8  # ratio of the moduli
-_WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
+SOFTEST = 1e-8  # ratio of the moduli
+WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
 # what an accuracy chooses
 CHOSEN = ("joint.element_size", "joint.relative_element_size", "joint.growth", "stepping.initial", "stepping.maximum")
 
@@ -79,13 +79,13 @@ class Scene(Checked):
         require(not pin.rigid or self.analysis.integration != "pin", "analysis.integration", said)
         sizes = {"joint.radius": joint.radius} | {f"{name}.E": body.E for name, body in self.solids.items()}
         for name, size in sizes.items():
-            require(_RANGE[0] <= size <= _RANGE[1], name, "must be between 1e-30 and 1e30; choose other units")
+            require(RANGE[0] <= size <= RANGE[1], name, "must be between 1e-30 and 1e30; choose other units")
         for name, body in self.solids.items():
-            strong = body.yield_stress is None or body.yield_stress >= _WEAKEST * body.E
-            require(strong, f"{name}.yield_stress", f"must be at least {_WEAKEST:g} times {name}.E")
-            allowed = not isinstance(body.hardening, float) or body.hardening <= body.E / _WEAKEST
-            require(allowed, f"{name}.hardening", f"must not exceed {1 / _WEAKEST:g} times {name}.E")
-        alike = all(_SOFTEST <= body.E / self.block.E <= 1 / _SOFTEST for body in self.solids.values())
+            strong = body.yield_stress is None or body.yield_stress >= WEAKEST * body.E
+            require(strong, f"{name}.yield_stress", f"must be at least {WEAKEST:g} times {name}.E")
+            allowed = not isinstance(body.hardening, float) or body.hardening <= body.E / WEAKEST
+            require(allowed, f"{name}.hardening", f"must not exceed {1 / WEAKEST:g} times {name}.E")
+        alike = all(SOFTEST <= body.E / self.block.E <= 1 / SOFTEST for body in self.solids.values())
         require(alike, "pin.E", "must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
         if joint.is_ring:
             said = 'does not load a joint whose model is "ring"; give force or relative_force'

@@ -93,7 +93,9 @@ class Drives:
         largest = max(
             np.abs(self.rate[level]).max(initial=0.0), *(np.abs(d.rate[level]).max() for d in contact.rigid), 0
         )
-        return 1 / self.comm.allreduce(largest, op=MPI.MAX)
+        if (largest := self.comm.allreduce(largest, op=MPI.MAX)) == 0:
+            raise ValueError(f"the drive {self.names[level]!r} moves nothing: supports hold all that it would move")
+        return 1 / largest
 
     def values(self, factor: float) -> Array:
         """What the drives prescribe ``(d,)`` at the load ``factor``."""

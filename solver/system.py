@@ -26,6 +26,8 @@ from archord.solver.timer import Timer
 if TYPE_CHECKING:
     from archord.solver.coarse_start import CoarseStart
 
+_AT_REST = 10.0  # times the round-off: forces that are none
+
 
 class System:
     """``problem`` ready to be solved; forces and energies are those of the whole, its symmetric parts included.
@@ -152,12 +154,15 @@ class System:
         return max(self.comm.allgather(found))
 
     def force_balance(self) -> float:
-        """Largest resultant of all forces on a body, over the largest force of an interaction or a support."""
+        """Largest resultant of all forces on a body, over the largest force of an interaction or a support; 0 where all
+        are round-off."""
         left = [self.equilibrium.residual_on(self.nodes_of(body)) for body in self.problem.bodies]
         forces = [np.zeros(2), *(self.contact_force(interaction.name) for interaction in self.problem.interactions)]
         forces += [self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)]
         largest = np.linalg.norm(forces, axis=1).max()
-        return float(self.problem.symmetry * np.linalg.norm(left, axis=1).max() / largest) if largest else 0.0
+        if largest <= _AT_REST * self.problem.symmetry * self.equilibrium.noise:
+            return 0.0
+        return float(self.problem.symmetry * np.linalg.norm(left, axis=1).max() / largest)
 
     @property
     def factorisations(self) -> int:
