@@ -185,7 +185,7 @@ def solve_and_report(
         return scene, new
 
     scene, new = agreed(comm, claimed)
-    from archord.solver.timer import Timer
+    from archord.report.timer import Timer
     from archord.studies.accuracy import solve_as_asked  # with all of dolfinx: bad input is told before
 
     report = Progress(scene, silent or comm.rank != 0, start.checkpoint.step if start else 0)

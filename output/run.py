@@ -25,6 +25,7 @@ from archord.output.step_file import StepFile
 from archord.presets.account import Account, account_of
 from archord.presets.edge import PER_STEP, EdgeProfile
 from archord.presets.measures import Work
+from archord.report.timer import Timer
 from archord.scene.file import AnyScene, resolved
 from archord.solver.coarse_start import coarse_start
 from archord.solver.interrupt import Interrupt, Interrupted
@@ -32,7 +33,6 @@ from archord.solver.load_path import Position
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.stepping import Step, StepFailure, StepRules, march
 from archord.solver.system import System
-from archord.solver.timer import Timer
 
 
 @dataclass

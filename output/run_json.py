@@ -21,9 +21,9 @@ from petsc4py import PETSc
 from archord.output.disk import replace_file
 from archord.presets.account import Account
 from archord.presets.joint_report import APART
+from archord.report.timer import BEFORE_SOLVING
 from archord.report.version import VERSION
 from archord.solver.stepping import Step
-from archord.solver.timer import BEFORE_SOLVING
 
 _KILOBYTES = 1 if sys.platform == "darwin" else 1024  # unit of ru_maxrss in bytes
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")

@@ -13,11 +13,11 @@ from archord.presets.general import GeneralAccount, Record
 from archord.presets.joint import Joint
 from archord.presets.joint_report import JointAccount
 from archord.presets.measures import Measures
+from archord.report.timer import Timer
 from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
 from archord.solver.stepping import Step
 from archord.solver.system import System
-from archord.solver.timer import Timer
 
 Column = tuple[str, Callable[[Any], float | int]]  # heading, and its value of a step
 

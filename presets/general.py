@@ -16,10 +16,10 @@ from archord.materials.material import Array
 from archord.presets.edge import SurfaceProfile, surface_profiles
 from archord.presets.joint_report import sizes
 from archord.presets.problem import as_input_error, general_problem
+from archord.report.timer import Timer
 from archord.scene.problem import LIVE, ProblemScene
 from archord.solver.stepping import Step
 from archord.solver.system import System
-from archord.solver.timer import Timer
 
 _FEW_FACETS = 3
 _LARGE_STRAIN = 0.05  # PEEQ

@@ -19,11 +19,11 @@ from archord.geometry.shapes.half_ring import half_ring
 from archord.geometry.shapes.joint_mesh import refinements
 from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.presets.arc import SYMMETRY
+from archord.report.timer import Timer
 from archord.scene.geometry import JointGeometry
 from archord.scene.scene import Scene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Rigid, Support
 from archord.solver.system import System
-from archord.solver.timer import Timer
 
 _RATIO = 3.0  # element size over that of the next finer mesh
 _COARSEST = 0.2  # element size over R

@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from archord.geometry.basis import Array
 from archord.geometry.meshes.fenicsx import create_vector
 from archord.materials.material import Points
+from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.law import Frictionless
@@ -30,7 +31,6 @@ from archord.solver.linear.strategy import Facts
 from archord.solver.problem import Problem
 from archord.solver.stabilisation import Springs
 from archord.solver.tangent import TangentMatrix
-from archord.solver.timer import BEFORE_SOLVING, Timer
 
 
 class Equilibrium:

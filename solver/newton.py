@@ -11,9 +11,9 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
+from archord.report.timer import BEFORE_SOLVING
 from archord.solver.equilibrium import Equilibrium
 from archord.solver.linear.lagged import Lagged
-from archord.solver.timer import BEFORE_SOLVING
 
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 CIRCLING = 4  # the same where the active set stands still

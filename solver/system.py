@@ -11,6 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from archord.geometry.basis import Array, bulk_quadrature, cell_basis
+from archord.report.timer import Timer
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface, Rigid
@@ -21,7 +22,6 @@ from archord.solver.newton import NewtonSolver
 from archord.solver.problem import Body, Problem
 from archord.solver.recovery import Recovery
 from archord.solver.stepping import StepRules, march
-from archord.solver.timer import Timer
 
 if TYPE_CHECKING:
     from archord.solver.coarse_start import CoarseStart

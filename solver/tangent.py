@@ -8,12 +8,12 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.meshes.fenicsx import create_vector
+from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact.contact import Contact
 from archord.solver.drives import Drives
 from archord.solver.linear.condensed import Condensed, filled
 from archord.solver.stabilisation import Springs
-from archord.solver.timer import BEFORE_SOLVING, Timer
 
 
 class TangentMatrix:
