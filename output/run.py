@@ -23,7 +23,7 @@ from archord.output.run_json import Report, peak_memory
 from archord.output.stale_jit import without_stale_forms
 from archord.output.step_file import StepFile
 from archord.presets.account import Account, account_of
-from archord.presets.edge import PER_STEP, EdgeProfile
+from archord.presets.edge import EdgeProfile
 from archord.presets.measures import Work
 from archord.report.timer import Timer
 from archord.scene.file import AnyScene, resolved
@@ -191,7 +191,7 @@ class _Output:
                     self._fields.write(m.at, fields)
                 if not self._contact:
                     self._contact = StepFile(self.folder / "contact.h5", _arrays(profiles, account.fixed), after)
-                self._contact.write(m.at, _arrays(profiles, PER_STEP))
+                self._contact.write(m.at, _arrays(profiles, account.per_step))
                 write_history(self.folder / "history.csv", account.columns(), self.steps)
                 self._report.add(step, warnings)
 

@@ -15,7 +15,7 @@ from archord.presets.edge import PER_STEP, SurfaceProfile
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
-_FIXED = ("s", "weight", "X")
+_FIXED, _PER_STEP = ("s", "weight", "X"), (*PER_STEP, "slip")  # of general runs
 
 
 def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
@@ -24,16 +24,20 @@ def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
     Raises `InputError` if contact.h5 is missing, damaged or does not hold the step.
     """
     radius = {"pin": run.R, "hole": run.R + run.dR}
-    found = _read(run.folder, run.name, step, ("s", "weight"))
+    found = _read(run.folder, run.name, step, ("s", "weight"), PER_STEP)
     return {side: ArcProfile(**found[side], radius=radius[side]) for side in radius if side in found}
 
 
 def read_surfaces(folder: Path, step: int) -> dict[str, SurfaceProfile]:
     """The integrated surfaces of a general run at ``step``, by name. Raises `InputError` as `read_arcs`."""
-    return {name: SurfaceProfile(**found) for name, found in _read(folder, str(folder), step, _FIXED).items()}
+    return {
+        name: SurfaceProfile(**found) for name, found in _read(folder, str(folder), step, _FIXED, _PER_STEP).items()
+    }
 
 
-def _read(folder: Path | None, said: str, step: int, fixed: tuple[str, ...]) -> dict[str, dict[str, Array]]:
+def _read(
+    folder: Path | None, said: str, step: int, fixed: tuple[str, ...], per_step: tuple[str, ...]
+) -> dict[str, dict[str, Array]]:
     path = folder / "contact.h5" if folder else None
     if path is None or not path.is_file():
         raise InputError(f"{said}: is not a complete run folder: contact.h5 is missing.")
@@ -41,7 +45,7 @@ def _read(folder: Path | None, said: str, step: int, fixed: tuple[str, ...]) -> 
         with h5py.File(path) as file:
             if int(file["accepted"][()]) < step:
                 raise KeyError(step)
-            names = [*((name, name) for name in fixed), *((name, f"{name}/{step_name(step)}") for name in PER_STEP)]
+            names = [*((name, name) for name in fixed), *((name, f"{name}/{step_name(step)}") for name in per_step)]
             groups = {key: group for key, group in file.items() if isinstance(group, h5py.Group)}
             return {key: {name: group[at][()] for name, at in names} for key, group in groups.items()}
     except (OSError, KeyError, RuntimeError, TypeError, ValueError):

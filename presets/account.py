@@ -27,6 +27,7 @@ class Account(Protocol):
 
     record: ClassVar[type]
     fixed: ClassVar[tuple[str, ...]]  # arrays of a profile that no step changes
+    per_step: ClassVar[tuple[str, ...]]  # those that a step does
 
     @property
     def system(self) -> System:

@@ -48,9 +48,15 @@ class EdgeProfile:
 
 @dataclass(frozen=True)
 class SurfaceProfile(EdgeProfile):
-    """As `EdgeProfile`, with the undeformed points."""
+    """As `EdgeProfile`, with the undeformed points and how far they slid along the opposite surface (`Pair.slip`)."""
 
     X: Array  # (n, q, 2)
+    slip: Array  # (n, q)
+
+    @property
+    def largest_slip(self) -> float:
+        """Largest slip, whichever way, where there is pressure."""
+        return float(np.abs(self.slip[self.raw_pressure > 0]).max(initial=0.0))
 
     @property
     def contact_length(self) -> float:
@@ -81,14 +87,13 @@ def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
         if pair is None:  # it is not integrated
             continue
         displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
-        local = np.zeros((side.n_facets, side.weight.shape[1], 7))
-        at_points = (side.weight[..., None], displaced, side.point, pair.pressure[..., None], pair.distance[..., None])
-        local[side.facet] = np.concatenate(at_points, axis=-1)
+        local = np.zeros((side.n_facets, side.weight.shape[1], 8))
+        values = np.stack([side.weight, pair.pressure, pair.distance, pair.slip], axis=-1)
+        local[side.facet] = np.concatenate([values, displaced, side.point], axis=-1)
         whole = side.sum_over_ranks(local)
-        weight, coordinates, X = whole[..., 0], whole[..., 1:3], whole[..., 3:5]
+        (weight, raw, gap, slip), coordinates, X = np.moveaxis(whole[..., :4], -1, 0), whole[..., 4:6], whole[..., 6:]
         s = side.curve.arc_length(side.curve_xi)
-        pressure = project(whole[..., 5], s, weight)
-        found[name] = SurfaceProfile(s, weight, coordinates, pressure, whole[..., 5], whole[..., 6], X)
+        found[name] = SurfaceProfile(s, weight, coordinates, project(raw, s, weight), raw, gap, X, slip)
     return found
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.materials.material import Array
-from archord.presets.edge import SurfaceProfile, surface_profiles
+from archord.presets.edge import PER_STEP, SurfaceProfile, surface_profiles
 from archord.presets.joint_report import sizes
 from archord.presets.problem import as_input_error, general_problem
 from archord.report.timer import Timer
@@ -50,6 +50,7 @@ class GeneralAccount:
 
     record: ClassVar[type] = Record
     fixed: ClassVar[tuple[str, ...]] = ("s", "weight", "X")
+    per_step: ClassVar[tuple[str, ...]] = (*PER_STEP, "slip")
 
     def __init__(self, scene: ProblemScene, comm: MPI.Comm, *, timer: Timer | None = None, partitioner=None) -> None:
         timer = timer or Timer()
@@ -95,7 +96,7 @@ class GeneralAccount:
         for part in scene.interaction:
             found |= {f"{part.name} {axis}": force for axis in ("force x", "force y")}
             found |= {f"{part.name} largest pressure": units.stress}
-            found |= {f"{part.name} {at}": length for at in ("at x", "at y", "contact length")}
+            found |= {f"{part.name} {at}": length for at in ("at x", "at y", "contact length", "largest slip")}
             found |= {f"{part.name} arcs": ""}
         for body in scene.body:
             if body.yield_stress is not None:
@@ -126,7 +127,8 @@ class GeneralAccount:
             met = [profile for name, profile in profiles.items() if name in part.surfaces]
             pressure, at = max((p.largest for p in met), key=lambda found: found[0])
             lengths = [p.contact_length for p in met]
-            values += [*system.contact_force(part.name), pressure, *at, float(np.mean(lengths)), met[-1].n_arcs]
+            slip = max(p.largest_slip for p in met)
+            values += [*system.contact_force(part.name), pressure, *at, float(np.mean(lengths)), slip, met[-1].n_arcs]
             area += float(np.mean(lengths))
         for body in system.problem.bodies:
             if body.material.yields:

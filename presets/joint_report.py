@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.presets.arc import ArcProfile, arc_profiles
+from archord.presets.edge import PER_STEP
 from archord.presets.joint import Joint
 from archord.presets.measures import Measures, energy_balance, measure
 from archord.solver.stepping import Step
@@ -35,6 +36,7 @@ class JointAccount:
 
     record: ClassVar[type] = Measures
     fixed: ClassVar[tuple[str, ...]] = ("s", "angle", "weight")
+    per_step: ClassVar[tuple[str, ...]] = PER_STEP
 
     def __init__(self, system: Joint) -> None:
         self.system, self.scene = system, system.scene

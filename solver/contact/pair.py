@@ -54,6 +54,7 @@ class Pair:
         """Pairs, gaps, tractions and trial history at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``;
         raises `ProjectionError`."""
         displacement, stress, moduli = self.surface.deform(u)
+        self._moved = displacement, motion
         self.moduli = np.ascontiguousarray(moduli)
         if self.moves:
             self._pair(self.surface.point.reshape(-1, 2) + displacement, motion)
@@ -101,6 +102,14 @@ class Pair:
         """Distance ``(n, q)`` of the points of this rank's facets from their partners, positive when open."""
         closed = 0.0 if self.law.slides else (self.separation * self.projection.normal).sum(1)
         return (self.opening[:, 0] + closed).reshape(self.surface.weight.shape)
+
+    @property
+    def slip(self) -> Array:
+        """How far ``(n, q)`` the points have moved along the opposite surface, relative to its displacement there, in the
+        direction of the outward normal turned by a quarter anticlockwise."""
+        (own, motion), P = self._moved, self.projection
+        relative = own - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
+        return (self.frame[:, 1] * relative).sum(axis=1).reshape(self.surface.weight.shape)
 
     @property
     def pressure(self) -> Array:
