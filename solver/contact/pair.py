@@ -105,8 +105,8 @@ class Pair:
 
     @property
     def slip(self) -> Array:
-        """How far ``(n, q)`` the points have moved along the opposite surface, relative to its displacement there, in the
-        direction of the outward normal turned by a quarter anticlockwise."""
+        """Displacement ``(n, q)`` of the points relative to the opposite surface, along the outward normal turned by a
+        quarter anticlockwise."""
         (own, motion), P = self._moved, self.projection
         relative = own - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
         return (self.frame[:, 1] * relative).sum(axis=1).reshape(self.surface.weight.shape)
