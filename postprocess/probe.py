@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from archord.geometry.curve import Curve, in_pieces
 from archord.materials.material import Array
 from archord.postprocess.fields import Fields
 from archord.scene.errors import InputError
@@ -16,6 +15,7 @@ from archord.scene.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
+    from archord.geometry.curve import Curve
     from archord.postprocess.run import Run
 
 CONTACT = {"pressure": "pressure", "facet_pressure": "pressure", "gap": "gap"}
@@ -87,6 +87,8 @@ def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
         x = table[["x", "y"]].to_numpy()
         angle = None if circle is None else np.degrees(np.arctan2(*(x - circle[0]).T[::-1]))
         return Probe(*head, x, table["s"].to_numpy(), table[CONTACT[quantity]].to_numpy(), angle)
+    from archord.geometry.curve import Curve  # with bases, which most readers of runs do without
+
     fields = run.fields(step)
     edges = [name for name, facets in fields.edges.items() if len(facets)]
     if edge not in edges:
@@ -176,6 +178,8 @@ def _oriented(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
         height = (np.degrees(np.arctan2(*(x[rows[:, 0]] - centre).T[::-1])) + 1e-6) % 360 - 1e-6
     if len(np.unique(rows[:, 0])) < len(rows):
         raise InputError(f"edge {edge!r}: branches, or lies within a body, so that nothing can be said along it.")
+    from archord.geometry.curve import in_pieces
+
     order = in_pieces(rows[:, 0], rows[:, 2], height)
     return rows[order], height[order], radius
 

@@ -46,11 +46,11 @@ def sweep(*arguments: str | Path) -> int:
 
 def break_mesh(monkeypatch, message: str, below: float) -> None:
     """Let every case fail whose pin has less than this E."""
-    true_mesh = joint._mesh
+    true_problem = joint.joint_problem
 
     def broken(scene, *rest):
         if below > scene.pin.E:
             raise ValueError(message)
-        return true_mesh(scene, *rest)
+        return true_problem(scene, *rest)
 
-    monkeypatch.setattr(joint, "_mesh", broken)
+    monkeypatch.setattr(joint, "joint_problem", broken)
