@@ -101,6 +101,10 @@ class Bordered(Inverse):
         rho, u = self.levels(r), self._solve(r.array_r[: self._n])
         C, D = self._factorised
         along_B, along_u = self.comm.allreduce(C.T @ self._along_B), self.comm.allreduce(u @ C)
+        if not np.isfinite(along_B).all():  # the matrix could not be factorised: Newton's method sees the step fail
+            self.replace(self._A)
+            self.join(x, np.full_like(u, np.nan), np.full(len(rho), np.nan))
+            return
         left, resistance, right = np.linalg.svd(D - along_B)
         forced, resisted = left.T @ (rho - along_u), resistance >= _SINGULAR * self._stiffness
         s = right.T @ np.divide(forced, resistance, where=resisted, out=np.zeros_like(forced))
