@@ -9,7 +9,6 @@ from mpi4py import MPI
 
 from archord.materials.material import Array
 from archord.presets.edge import EdgeProfile
-from archord.presets.general import GeneralAccount, Record
 from archord.presets.joint import Joint
 from archord.presets.joint_report import JointAccount
 from archord.presets.measures import Measures
@@ -80,9 +79,15 @@ def account_of(scene: AnyScene, comm: MPI.Comm, timer: Timer | None = None, part
     """The problem of ``scene``, ready to be solved, and its account. Collective over ``comm``; raises `InputError`."""
     if isinstance(scene, Scene):
         return JointAccount(Joint(scene, comm, timer=timer, partitioner=partitioner))
+    from archord.presets.general import GeneralAccount  # which joints do without
+
     return GeneralAccount(scene, comm, timer=timer, partitioner=partitioner)
 
 
 def record_type(scene: AnyScene) -> type:
     """The class of the steps' records of ``scene``."""
-    return Measures if isinstance(scene, Scene) else Record
+    if isinstance(scene, Scene):
+        return Measures
+    from archord.presets.general import Record
+
+    return Record

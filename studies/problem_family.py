@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from archord.presets.general import Record
 from archord.scene.problem import ProblemScene
 from archord.scene.sections import Stepping
+
+if TYPE_CHECKING:
+    from archord.presets.general import Record
 
 _OF_SHAPES, _OF_FILES = 1.5, 2.0  # ratios of element sizes from one mesh to the next
 _COARSEST = 2.0  # first element size of a shape over that of its scene
