@@ -202,14 +202,14 @@ def resolved(scene: AnyScene) -> str:
     import tomli_w
 
     data = scene.model_dump(exclude_none=True)
+    if scene.analysis.accuracy is not None:
+        for section, key in (name.split(".") for name in CHOSEN):
+            data.get(section, {}).pop(key, None)
     if isinstance(scene, ProblemScene):
         return tomli_w.dumps(data)
     joint = data["joint"]
     joint["block_size"] = scene.joint.W
-    if scene.analysis.accuracy is not None:
-        for section, key in (name.split(".") for name in CHOSEN):
-            data[section].pop(key, None)
-    elif "element_size" not in joint:
+    if scene.analysis.accuracy is None and "element_size" not in joint:
         joint.setdefault("relative_element_size", 0.04)
     if scene.pin.rigid:
         data["pin"] = {"rigid": True}

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from archord.scene.geometry import JointGeometry
 from archord.scene.keys import Positive, Section, key, require
-from archord.scene.scene import Checked, Scene
+from archord.scene.scene import Checked, Scene, plain
 from archord.scene.sections import Modelling, Pin, ProblemOutput, Solid, Stepping, Steps, Targets, Units
 
 _THINNEST, _DEEPEST, _FARTHEST = 0.02 * (1 - 1e-9), 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
@@ -167,7 +167,7 @@ class Preset(Checked):
         outward, the first faces the second, the third the fourth, ..."""
         half, touching = (getattr(shape, name, True) for name in ("half", "touching"))
         rigid, gaps = self.pin.rigid, [outer - inner for inner, outer in zip(radii[::2], radii[1::2], strict=True)]
-        said = self.model_dump(exclude_none=True, include={"units", "analysis", "stepping", "output"})
+        said = _shared(self)
         bodies, material = solids if rigid else {"pin": self.pin, **solids}, {*Solid.model_fields}
         contacts: list[dict[str, Any]] = [
             {"name": f"{a} in {b}", "surfaces": [inner, outer], "overlap": max(-gap, 0.0)}
@@ -240,11 +240,16 @@ class BushingScene(Preset):
         return self._general(shape, solids | {"housing": self.housing}, "outer edge", surfaces, radii)
 
 
+def _shared(scene: Scene | Preset) -> dict[str, Any]:
+    """The sections that general scenes have, too: their keys that were given, as an accuracy chooses some others."""
+    return {name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")}
+
+
 def general_joint(scene: Scene) -> dict[str, Any]:
     """The general scene that the ``scene`` of a joint stands for; its pin is pressed along -y."""
     g, pin, load = scene.joint, scene.pin, scene.load
-    said = scene.model_dump(exclude_none=True, include={"units", "analysis", "stepping", "output"})
-    said["analysis"].pop("integration")
+    said = _shared(scene)
+    said["analysis"].pop("integration", None)
     material = {*Solid.model_fields}
     bodies = [{"name": n} | s.model_dump(exclude_none=True, include=material) for n, s in scene.solids.items()]
     contact: dict[str, Any] = {"name": "contact", "surfaces": ["pin", "hole"], "overlap": max(-g.dR, 0.0)}

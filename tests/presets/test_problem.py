@@ -119,8 +119,8 @@ def test_a_force_on_cells_is_spread_over_them():
     "changes",
     [
         {},
-        {"pin": {"rigid": True}},
-        {"load": {"displacement": None, "relative_force": [0.003, 0.001], "steps": 2}},
+        {"pin": {"rigid": True}, "analysis": {"thickness": 5.0}},
+        {"load": {"displacement": None, "relative_force": [0.003, 0.001], "steps": 2}, "analysis": {"thickness": 5.0}},
         {"joint": {"radius": 1.0, "clearance": -0.002, "block_size": 4.0, "model": "ring", "element_size": 0.2}}
         | {"load": {"displacement": None, "relative_force": 0.003, "steps": 2}},
     ],

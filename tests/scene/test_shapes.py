@@ -41,12 +41,17 @@ def changed(data: dict, place: str, value) -> dict:
     return data
 
 
-@pytest.mark.parametrize("data", [LUG, BUSHING], ids=["lug", "bushing"])
+OTHERS = {"units": {"length": "m", "stress": "Pa"}, "analysis": {"thickness": 5.0, "accuracy": 1e-3}}
+
+
+@pytest.mark.parametrize("data", [LUG, BUSHING, LUG | OTHERS, BUSHING | OTHERS])
 def test_a_preset_is_the_general_scene_that_it_prints(data):
     scene = parse_any(data)
     assert isinstance(scene, ProblemScene)
     assert parse_any(tomllib.loads(resolved(scene))) == scene
     assert scene.analysis.symmetry == 2
+    if "units" in data:
+        assert (scene.force_unit, scene.thickness, scene.analysis.accuracy) == ("N", 5.0, 1e-3)
 
 
 def test_ten_lines_of_a_lug_say_all_of_it():
