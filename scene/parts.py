@@ -57,6 +57,9 @@ class Mesh(Section):
     def _one_source(self) -> Mesh:
         require(self.file is not None or self.shape is not None, "file", "is missing")
         require(self.file is None or self.shape is None, "file", "must not be given together with mesh.shape")
+        for name in ("scale", "order", "refine", "circle") if self.shape is not None else ():
+            unsaid = getattr(self, name) == type(self).model_fields[name].get_default(call_default_factory=True)
+            require(unsaid, name, "is for a mesh file: mesh.shape has sizes of its own")
         return self
 
 

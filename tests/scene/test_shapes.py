@@ -126,6 +126,22 @@ def test_faults_are_said_in_one_sentence(data, place, value, said):
     assert len(str(error.value).splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("scale", 1000.0),
+        ("order", 2),
+        ("refine", 1),
+        ("circle", [{"facets": "hole", "centre": [0.0, 0.0], "radius": 10.0}]),
+    ],
+)
+def test_what_is_said_of_files_is_refused_of_shapes(key, value):
+    data = tomllib.loads(resolved(parse_any(LUG)))
+    with pytest.raises(InputError, match=rf"^scene: mesh\.{key} = .* is for a mesh file: mesh\.shape has sizes") as error:
+        parse_any(changed(data, f"mesh.{key}", value))
+    assert len(str(error.value).splitlines()) == 1
+
+
 @pytest.mark.parametrize(("width", "edge"), [(24.2, 20.0), (120.0, 60.0), (40.0, 12.0), (40.0, 60.0)])
 def test_lugs_from_slender_to_stout_are_allowed(width, edge):
     """W/D from 1.2 to 6, e/D from 0.6 to 3."""
