@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from itertools import product
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -16,6 +17,14 @@ from archord.scene.sections import MOST_STEPS, ProblemOutput, Stepping, Units
 
 FORMAT = 2
 CHOSEN = ("stepping", "initial"), ("stepping", "maximum")  # what an accuracy chooses, beside the mesh
+# parts whose names must differ, as results, reactions and drives are found by them
+_APART = {
+    "body": (),
+    "interaction": ("body", "coupling"),
+    "coupling": (),
+    "support": ("coupling", "load"),
+    "load": (),
+}
 LIVE: dict[str, Any] = {}  # meshes given from Python, by what stands in the place of their file
 
 
@@ -48,15 +57,11 @@ class ProblemScene(Checked):
 
     @model_validator(mode="after")
     def _consistent(self) -> ProblemScene:
-        for section in ("body", "interaction", "coupling", "support", "load"):
-            counted = Counter(part.name for part in getattr(self, section))
-            twice = [name for name, count in counted.items() if count > 1]
-            require(not twice, section, f"must have different names, but {twice} stand more than once")
-        taken = Counter([*(c.name for c in self.coupling), *(i.name for i in self.interaction if i.rigid)])
-        twice = [name for name, count in taken.items() if count > 1]
-        require(not twice, "coupling", f"must not share the names {twice} with rigid discs")
-        both = [load.name for load in self.load if load.name in {s.name for s in self.support}]
-        require(not both, "load", f"must not share the names {both} with supports")
+        for section, others in _APART.items():
+            for part, other in product(getattr(self, section), (section, *others)):
+                alike = [p for p in getattr(self, other) if p.name == part.name and p is not part]
+                said = f"must not be the name of {'another' if other == section else 'a'} {other}, too"
+                require(not alike, (section, part.name, "name"), said)
         used = [name for i in self.interaction for name in i.surfaces]
         many = [name for name, count in Counter(used).items() if count > 1]
         require(not many, "interaction", f"uses the facet sets {many} more than once")
