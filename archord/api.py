@@ -12,7 +12,7 @@ from archord.output.folder import is_sweep
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.scene.errors import InputError
-from archord.scene.file import AnyScene
+from archord.scene.file import AnyScene, find_mesh
 from archord.scene.file import load_scene as load_scene_file
 from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
@@ -57,9 +57,10 @@ def Problem(
     ``mesh`` is a mesh file, gmsh with a model (meshed or not), a dolfinx mesh with tags ``(mesh, cells, facets)``, or a
     `Mesh` or its table. Other ``sections`` are those of a scene: ``path``, ``analysis``, ... Raises `InputError`.
     """
-    if isinstance(mesh, (str, Path)):
-        mesh = {"file": str(mesh)}
-    elif not isinstance(mesh, (Mapping, Mesh)):
+    if isinstance(mesh, (str, Path, Mapping, Mesh)):
+        mesh = {"file": str(mesh)} if isinstance(mesh, (str, Path)) else plain(mesh)
+        find_mesh(mesh, Path())
+    else:
         name = f"mesh {len(LIVE) + 1} given from Python"
         LIVE[name], mesh = mesh, {"file": name}
     parts = {"body": bodies, "interaction": interactions, "coupling": couplings, "support": supports, "load": loads}

@@ -62,10 +62,14 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     _give_way(data, overrides)
     origin = {override_key(data, o): f"--set {o}" for o in sorted(overrides, key=set_later)}
     read_targets(data, Path(path))
-    mesh = data.get("mesh")
-    if isinstance(mesh, dict) and isinstance(mesh.get("file"), str):
-        mesh["file"] = str((Path(path).parent / mesh["file"]).absolute())
+    find_mesh(data.get("mesh"), Path(path).parent)
     return parse_any(data, str(path), origin)
+
+
+def find_mesh(mesh: Any, folder: Path) -> None:
+    """Let the file of the section ``mesh`` count from ``folder``, and the scene be read from anywhere."""
+    if isinstance(mesh, dict) and isinstance(mesh.get("file"), str):
+        mesh["file"] = str((folder / mesh["file"]).absolute())
 
 
 def set_later(key: str) -> bool:

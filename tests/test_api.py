@@ -10,6 +10,7 @@ import pytest
 
 import archord
 from archord.progress import Progress
+from archord.scene.parts import Mesh
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")
 COARSE = {"joint.relative_element_size": 0.2, "load.steps": 2}
@@ -65,6 +66,14 @@ def test_faults_are_the_sentences_of_scene_files(change, said):
         archord.Scene(**(SECTIONS | change))
     assert str(caught.value).startswith(said)
     assert "\n" not in str(caught.value)
+
+
+def test_a_mesh_file_is_found_from_anywhere(tmp_path, monkeypatch):
+    """Whatever names it, and whatever the working directory is later."""
+    monkeypatch.chdir(tmp_path)
+    parts = {"bodies": [{"name": "lug", "E": 1.0, "nu": 0.3}], "loads": [{"name": "oil", "on": "hole", "pressure": 1.0}]}
+    for mesh in ("meshes/lug.msh", Path("meshes/lug.msh"), {"file": "meshes/lug.msh"}, Mesh(file="meshes/lug.msh")):
+        assert archord.Problem(mesh, **parts).mesh.file == str(tmp_path / "meshes" / "lug.msh")
 
 
 @pytest.mark.mpi
