@@ -213,9 +213,6 @@ class Modelling(Section):
         le=0.1,
     )
     degree: Literal[2, 3] = key("polynomial degree of displacements and of the curved geometry", default=2)
-    coarse_start: bool = key(
-        "on a fine mesh, take the guess for every step from a coarser one; false is for comparison", default=True
-    )
     thickness: Positive | None = key(
         "thickness, for forces and energies of the whole; they are per unit thickness if absent",
         "length",
@@ -229,6 +226,9 @@ class Modelling(Section):
 class Analysis(Modelling):
     """How the joint is modelled and solved."""
 
+    coarse_start: bool = key(
+        "on a fine mesh, take the guess for every step from a coarser one; false is for comparison", default=True
+    )
     integration: Literal["both", "pin", "block"] = key(
         "whose contact edge carries the integral: both halves (unbiased), or one side's alone", default="both"
     )

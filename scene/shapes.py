@@ -249,7 +249,8 @@ def general_joint(scene: Scene) -> dict[str, Any]:
     """The general scene that the ``scene`` of a joint stands for; its pin is pressed along -y."""
     g, pin, load = scene.joint, scene.pin, scene.load
     said = _shared(scene)
-    said["analysis"].pop("integration", None)
+    for name in ("integration", "coarse_start"):
+        said["analysis"].pop(name, None)
     material = {*Solid.model_fields}
     bodies = [{"name": n} | s.model_dump(exclude_none=True, include=material) for n, s in scene.solids.items()]
     contact: dict[str, Any] = {"name": "contact", "surfaces": ["pin", "hole"], "overlap": max(-g.dR, 0.0)}

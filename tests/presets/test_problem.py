@@ -119,7 +119,7 @@ def test_a_force_on_cells_is_spread_over_them():
     "changes",
     [
         {},
-        {"pin": {"rigid": True}, "analysis": {"thickness": 5.0}},
+        {"pin": {"rigid": True}, "analysis": {"thickness": 5.0, "coarse_start": False}},
         {"load": {"displacement": None, "relative_force": [0.003, 0.001], "steps": 2}, "analysis": {"thickness": 5.0}},
         {"joint": {"radius": 1.0, "clearance": -0.002, "block_size": 4.0, "model": "ring", "element_size": 0.2}}
         | {"load": {"displacement": None, "relative_force": 0.003, "steps": 2}},

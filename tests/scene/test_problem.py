@@ -123,6 +123,7 @@ def test_an_interference_has_a_stage_of_its_own():
         ("mesh.circle.0.radius", -1.0, "mesh.circle.radius must be greater than 0"),
         ("path.steps", [1, 2, 3], "path.steps = .* must have one number for each of the 2 stages"),
         ("analysis", {"plane": "space"}, "analysis.plane = .* must be 'strain' or 'stress'"),
+        ("analysis", {"coarse_start": False}, "analysis.coarse_start = false is not a known key"),
         ("format", 3, "format = 3 is for a newer archord"),
     ],
 )
