@@ -131,7 +131,7 @@ class Support(Section):
     """What is held."""
 
     name: str = name_of("support", "clamp")
-    on: str = set_of("facet, point or cell set, or coupling", example="clamp")
+    on: str = set_of("coupling, or facet, point or cell set: the first that has the name", example="clamp")
     fixed: Annotated[list[Freedom], Field(min_length=1)] = key(
         "directions held; rotation is of couplings alone", example=["x", "y"]
     )
@@ -141,7 +141,10 @@ class Load(Section):
     """What moves or presses: one value, or a list of values at the ends of the path's stages."""
 
     name: str = name_of("load", "press")
-    on: str = set_of("facet, point or cell set, coupling, or interaction with a rigid disc", example="flat")
+    on: str = set_of(
+        "interaction with a rigid disc, coupling, or facet, point or cell set: the first that has the name",
+        example="flat",
+    )
     direction: Freedom | None = key(
         "of displacement and force; rotation is of couplings alone", default=None, example="x"
     )
