@@ -71,7 +71,7 @@ def test_faults_are_the_sentences_of_scene_files(change, said):
 def test_a_mesh_file_is_found_from_anywhere(tmp_path, monkeypatch):
     """Whatever names it, and whatever the working directory is later."""
     monkeypatch.chdir(tmp_path)
-    parts = {"bodies": [{"name": "lug", "E": 1.0, "nu": 0.3}], "loads": [{"name": "oil", "on": "hole", "pressure": 1.0}]}
+    parts = {"bodies": [{"name": "lug", "E": 1.0, "nu": 0.3}], "loads": [{"name": "oil", "on": "edge", "pressure": 1}]}
     for mesh in ("meshes/lug.msh", Path("meshes/lug.msh"), {"file": "meshes/lug.msh"}, Mesh(file="meshes/lug.msh")):
         assert archord.Problem(mesh, **parts).mesh.file == str(tmp_path / "meshes" / "lug.msh")
 

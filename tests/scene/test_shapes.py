@@ -137,9 +137,8 @@ def test_faults_are_said_in_one_sentence(data, place, value, said):
 )
 def test_what_is_said_of_files_is_refused_of_shapes(key, value):
     data = tomllib.loads(resolved(parse_any(LUG)))
-    with pytest.raises(InputError, match=rf"^scene: mesh\.{key} = .* is for a mesh file: mesh\.shape has sizes") as error:
+    with pytest.raises(InputError, match=rf"^scene: mesh\.{key} = [^\n]* is for a mesh file: mesh\.shape[^\n]*$"):
         parse_any(changed(data, f"mesh.{key}", value))
-    assert len(str(error.value).splitlines()) == 1
 
 
 @pytest.mark.parametrize(("width", "edge"), [(24.2, 20.0), (120.0, 60.0), (40.0, 12.0), (40.0, 60.0)])
