@@ -1,8 +1,11 @@
 """Metals by name: the tables are those of the formulas, the formulas those of their sources."""
 
+import re
+
 import numpy as np
 import pytest
 
+from archord.benchmarks.case import paper_joint
 from archord.materials.hardening import TabularHardening
 from archord.materials.named import metal, metals
 
@@ -81,3 +84,36 @@ def test_stresses_are_in_the_unit_asked_for(unit, scale):
 def test_unknown_names_and_units_are_refused(name, unit, said):
     with pytest.raises(ValueError, match=said):
         metal(name, unit)
+
+
+NOMINAL = {  # yield and tensile strength [MPa], and elongation, of the standards: see docs/materials.md
+    "S235": (235, 360, None),
+    "S275": (275, 410, None),
+    "S355": (355, 470, None),
+    "S420": (420, 520, None),
+    "S460": (460, 540, None),
+    "6082-T6": (260, 310, 0.10),
+    "5083-H116": (215, 305, 0.10),
+    "CuSn12-C": (150, 300, 0.06),
+    "Ti-6Al-4V": (827, 896, 0.10),  # 120 and 130 ksi
+}
+
+
+@pytest.mark.parametrize("name", metals())
+def test_every_metal_has_the_numbers_of_its_standard_and_tells_its_sources(name):
+    """The thickness too, on which they depend, but of what is cast; of E and nu, which they do not ask for, whose."""
+    m = metals()[name]
+    assert (m["yield"], m["tensile"], m.get("elongation")) == NOMINAL[name]
+    assert m["E"] > 0
+    assert 0.3 <= m["nu"] <= 0.34
+    assert "thick" in m["title"] or "cast" in m["title"]
+    assert re.fullmatch("strengths: least of (EN|AMS) .*; E, nu: (EN|typical).*; curve: .*", m["source"])
+
+
+def test_a_scene_resolves_a_name_to_these_numbers():
+    """E, nu, yield stress and points of S355 in a body, and a material that yields there first."""
+    block = paper_joint(block={"material": "S355", "E": None, "nu": None}).block
+    assert (block.E, block.nu, block.yield_stress) == (210000.0, 0.3, 355.0)
+    law = block.constitutive("strain").hardening
+    assert law.points == tuple(map(tuple, metals()["S355"]["hardening"]))
+    assert law.stress(np.array([0.0, 1.0])) == pytest.approx([355.0, 539.0])
