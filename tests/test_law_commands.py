@@ -103,6 +103,15 @@ def test_hardening_is_told_by_the_laws_that_yield(capsys, sets):
     assert all("is a law of perfect plasticity" in said and "too low beyond yield" in said for _, said in told)
 
 
+def test_a_whole_pin_is_told_by_the_laws_that_give_a_displacement(capsys):
+    """Their numbers are those of half a pin. The thickness is the length of the laws that need one."""
+    words = ["law", "paper", "persson", "esdu-78035", "lankarani-nikravesh", "--scene", SCENE, "--points", "3"]
+    assert run([*words, "--set", "pin.whole=true", "--set", "analysis.thickness=40"]) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "half a pin" in line]
+    assert [line.split(":")[2] for line in told] == [" paper", " esdu-78035", " lankarani-nikravesh"]
+    assert all("of a whole one P is higher" in line for line in told)
+
+
 def test_a_law_is_not_drawn_over_its_scene(tmp_path, capsys):
     """Whatever its name; over another picture it is."""
     scene, picture = (tmp_path / name for name in ("scene.svg", "old.png"))

@@ -83,6 +83,8 @@ def check_compatible(runs: list[RunCurve]) -> None:
             fault = f"analysis.plane = {run.plane!r} does not fit: {first.name} is in plane {first.plane}"
         elif not np.allclose(ours, theirs, rtol=1e-6, atol=1e-9):
             fault = f"the Poisson's ratios or the ratio of the moduli are not those of {first.name}"
+        elif own.whole != wanted.whole:
+            fault = f"pin.whole = {str(own.whole).lower()} does not fit: {first.name} has the other"
         elif softer > _LIKE:
             sizes = [f"{each.scene.joint.W / each.R:.4g} R" for each in (run, first)]
             fault = (f"joint.block_size is {sizes[0]} and that of {first.name} {sizes[1]}, by which their P differs by "

@@ -61,6 +61,8 @@ def notes(calibration: Calibration) -> list[str]:
         )
     if joint.c is None and any(scene.run.sigY for scene in scenes):
         said.append("c: too few steps past yield in the range; elastic law.")
+    if scenes[0].run.scene.pin.whole:
+        said.append("pin.whole: k and c are those of a whole pin; archord law and the paper have them of half a pin.")
     law = calibration.law()
     threshold = "" if law.c is None else f", c = {law.c:.5f}"
     low, high = law.fitted_range

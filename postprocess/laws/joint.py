@@ -29,8 +29,8 @@ class LawJoint:
     for like bodies. Only the calibrated law asks for the rest: ``plane`` ("strain" or "stress"), ``nu`` of the block,
     ``pin_nu`` of the pin (None: the block's, or rigid), and which bodies have the yield stress, ``yielding``: "both",
     "block", "pin", or "unlike" where each has its own. Laws of P(delta) are for a pin in a wide block, and say so of a
-    ``ring``, or where ``block_size`` (None: wide) is small; those with yielding say so where a body
-    ``hardens``. Raises ValueError for values that make no joint.
+    ``ring``, or where ``block_size`` (None: wide) is small, or the pin is ``whole``, not cut at the pressed diameter;
+    those with yielding say so where a body ``hardens``. Raises ValueError for values that make no joint.
     """
 
     radius: float
@@ -49,6 +49,7 @@ class LawJoint:
     ring: bool = False
     block_size: float | None = None
     hardens: bool = False
+    whole: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -79,6 +80,7 @@ class LawJoint:
             scene.joint.radius,
             scene.joint.dR,
             scene.E_star,
+            length=scene.analysis.thickness,
             yield_stress=min((stress for stress in yields if stress is not None), default=None),
             dundurs_alpha=alpha,
             # in the compliances 1/E1' = (1 - alpha)/(2 E*), 1/E2' = (1 + alpha)/(2 E*)
@@ -90,6 +92,7 @@ class LawJoint:
             ring=not scene.joint.is_block,
             block_size=scene.joint.W,
             hardens=not all(solid.perfectly_plastic for solid in scene.solids.values()),
+            whole=scene.pin.whole,
         )
 
     @property

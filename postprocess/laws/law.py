@@ -38,8 +38,8 @@ class Law:
     Displacements are positive in compression and measured from first touch, forces are per unit length of the joint,
     angles are semi-angles in radians. Methods take arrays of any shape and return arrays of that shape. Points outside
     the range give nan, or with ``extrapolate`` the formula, which is nan where it has ended itself, and a
-    `LawRangeWarning`. Of a joint in a small block laws with displacements warn. All raise ValueError if the law needs a
-    parameter that the joint lacks, or gives displacements and the joint is a ring.
+    `LawRangeWarning`. Of a small block or a whole pin laws with displacements warn. All raise ValueError if the law
+    needs a parameter that the joint lacks, or gives displacements and the joint is a ring.
     """
 
     name: str
@@ -112,7 +112,7 @@ class Law:
 
     def _check(self, joint: LawJoint) -> None:
         """Refuse a joint that lacks what the law needs; of laws with displacements also a ring, whose P(delta) is
-        another one, and warn of a small block, which is softer than the law's; of plastic laws warn of hardening."""
+        another one, and warn where it is softer or stiffer than the law's; of plastic laws warn of hardening."""
         for name in self.needs:
             if getattr(joint, name) is None:
                 raise ValueError(f"{self.name}: this law needs {name}.")
@@ -121,17 +121,19 @@ class Law:
                 f'{self.name}: is a law for a pin in a block; of joint.model = "ring" its P would be about twice too '
                 "high. Of a ring only hertz and persson hold, which give no displacement."
             )
-        about, most = joint.softer
+        said, (about, most) = [], joint.softer
         if joint.block_size and about > _FELT and self.gives_displacement:
-            said = (
-                f"{self.name}: is a law for a block of {LARGE:g} R; in this one of "
-                f"{joint.block_size / joint.radius:.4g} R the joint is softer, and its P about {about:.1%} smaller "
-                f"than the law's (up to {most:.1%} with a rigid pin, or beyond yield)"
+            said.append(
+                f"for a block of {LARGE:g} R; in this one of {joint.block_size / joint.radius:.4g} R the joint is "
+                f"softer, and its P about {about:.1%} smaller than the law's (up to {most:.1%} with a rigid pin, or "
+                "beyond yield)"
             )
-            warnings.warn(LawRangeWarning(said), stacklevel=4)
+        if joint.whole and self.gives_displacement:
+            said.append("for half a pin, cut where it is pressed; of a whole one P is higher: 2 %, beyond yield 10 %")
         if joint.hardens and self.plastic:
-            said = f"{self.name}: is a law of perfect plasticity; of bodies that harden its P is too low beyond yield"
-            warnings.warn(LawRangeWarning(said), stacklevel=4)
+            said.append("of perfect plasticity; of bodies that harden its P is too low beyond yield")
+        for kind in said:
+            warnings.warn(LawRangeWarning(f"{self.name}: is a law {kind}"), stacklevel=4)
 
 
 def rising_root(f: Callable[[Array], Array], target: Array, start: float) -> Array:

@@ -58,6 +58,8 @@ def fit_case(refined: Refined, load_range: tuple[float, float], name: str) -> di
     Raises `InputError` where the range or the steps do not allow a fit.
     """
     run = refined.run
+    if run.scene.pin.whole:
+        raise InputError(f"{run.name}: pin.whole = true does not fit: k and c of a sweep are those of half a pin.")
     force = fit_curve([refined], load_range)
     pin, block = run.scene.pin, run.scene.block
     case = {

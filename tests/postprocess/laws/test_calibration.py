@@ -8,8 +8,11 @@ import pytest
 from archord.postprocess.convergence import group
 from archord.postprocess.laws.calibration import calibrate
 from archord.postprocess.laws.curve_fit import fit_curve
+from archord.postprocess.laws.fit_report import notes
+from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
+from tests.output.run_files import solved
 from tests.postprocess.synthetic import LOADS, curve
 from tests.solver.solving import scene
 
@@ -169,6 +172,19 @@ def test_solved_runs(runs):
     assert plastic.c.value == pytest.approx(1.03, rel=0.15)
 
 
+def test_a_thickness_leaves_the_law_and_a_whole_pin_has_one_of_its_own(runs, tmp_path):
+    """P in history.csv is that of the thickness, P of a law never; k of a whole pin is told to be so."""
+    sections = {"analysis": {"thickness": 7.0}, "pin": {"whole": True}}
+    thick = Run(solved({"thick": scene(0.1, 6, **sections)}, tmp_path)["thick"])
+    half = Run(runs["elastic"]).curve
+    np.testing.assert_allclose(np.array(thick.columns["P"]), 7 * thick.curve.P, rtol=1e-12)
+    whole = calibrate([thick.curve])
+    assert whole.joint.k.value == pytest.approx(1.01 * calibrate([half]).joint.k.value, rel=0.01)
+    assert any("k and c are those of a whole pin" in said for said in notes(whole))
+    assert not any("whole" in said for said in notes(calibrate([half])))
+    assert LawJoint.from_scene(thick.scene).length == 7
+
+
 def joint_with(name, **sections):
     """A run of the synthetic joint, with other keys in its scene."""
     return replace(curve(0.83), name=name, scene=scene(0.05, **sections))
@@ -184,6 +200,10 @@ def joint_with(name, **sections):
             "the Poisson's ratios or the ratio of the moduli are not ",
         ),
         (joint_with("other", block={"yield_stress": 0.002, "hardening": 0.1}), "block.hardening = 0.1 does not fit"),
+        (
+            joint_with("other", pin={"whole": True}),
+            "pin.whole = true does not fit: run has the other; one law is for one",
+        ),
         (joint_with("other", joint={"block_size": 5.0}), r"joint.block_size is 5 R and that of run 100 R, .* 5\.6%"),
     ],
 )

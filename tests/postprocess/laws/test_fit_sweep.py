@@ -62,15 +62,19 @@ def test_a_small_sweep_gets_its_table(solved, capsys):
     assert float(judged) < 1.0
 
 
-def test_small_blocks_are_named(solved, tmp_path, capsys):
+def test_small_blocks_are_named_and_whole_pins_left_out(solved, tmp_path, capsys):
     """k of a case is that of its own block; table and print say that there are such, of wide blocks they do not."""
     assert "small blocks" not in read_cases(solved / "fit.csv")[1]
-    listed = "list = [{ joint.block_size = 5.0 }, { joint.block_size = 100.0 }]\n[base]"
+    listed = "list = [{ joint.block_size = 5.0 }, { joint.block_size = 100.0 }, { pin.whole = true }]\n[base]"
     (tmp_path / "blocks.sweep.toml").write_text(listed + SWEEP.partition("[base]")[2])
     assert run(["sweep", str(tmp_path / "blocks.sweep.toml"), "-o", str(tmp_path / "out"), "-q"]) == 0
     assert run(["fit", str(tmp_path / "out")]) == 0
     said = "small blocks: P up to about 5.6% smaller than in a wide block, and k, which a model does not know"
-    assert said in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert said in printed
+    assert re.search(
+        r"left out: .*: pin.whole = true does not fit: k and c of a sweep are those of half a pin", printed
+    )
     small, wide = read_cases(tmp_path / "out" / "fit.csv")[0].k
     assert small < 0.96 * wide
 
