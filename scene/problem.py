@@ -147,7 +147,8 @@ class ProblemScene(Checked):
     @property
     def accurate(self) -> str:
         """Name of what an accuracy is asked of."""
-        return f"{self.load[-1].name} {'displacement' if self.load[-1].kind == 'force' else 'force'}"
+        load = self.load[-1]  # that of its two columns which it does not prescribe
+        return f"{load.name} {'force' if load.kind == 'displacement' else 'displacement'}"
 
     @property
     def loading(self) -> str:

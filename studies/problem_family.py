@@ -22,8 +22,6 @@ class ProblemFamily:
     def __init__(self, scene: ProblemScene) -> None:
         self.scene, self.shape = scene, scene.mesh.shape
         self.ratio = _OF_FILES if self.shape is None else _OF_SHAPES
-        load = scene.load[-1]
-        self.column = f"{load.name} {'displacement' if load.kind == 'force' else 'force'}"
         self.dofs = 0  # of the last mesh that was solved
 
     def scene_of(self, level: int, substeps: int) -> ProblemScene | None:
@@ -50,8 +48,8 @@ class ProblemFamily:
         return (0.5**scene.mesh.refine, 0.0) if shape is None else (shape.h, shape.growth)
 
     def curve(self, steps: Sequence[Record]) -> list[float]:
-        """The force of the last load at every step, or its displacement where it is a force."""
-        return [m.values[self.column] for m in steps]
+        """The force of the last load at every step, or its displacement where it is a force or a pressure."""
+        return [m.values[self.scene.accurate] for m in steps]
 
     def resolved(self, scene: Any, steps: Sequence[Record]) -> bool:
         """Whether something is in contact at the end, if anything is to be."""

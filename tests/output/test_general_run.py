@@ -124,6 +124,18 @@ def test_an_accuracy_is_reached_by_finer_meshes(tmp_path):
     assert outcome.steps[-1].values["press force"] == pytest.approx(3829.4, rel=0.03)
 
 
+def test_an_accuracy_under_a_pressure_is_that_of_the_displacement(tmp_path):
+    """What the pressure works on, the area that it displaces: the pressure itself is given."""
+    oil = [{"name": "oil", "on": "hole", "pressure": 10.0}]
+    shape = scene().mesh.shape.model_dump() | {"pin": "none", "element_size": 3.0}
+    body = [{"name": "lug"} | STEEL]
+    asked = scene(mesh={"shape": shape}, body=body, interaction=[], load=oil, path={"steps": 1})
+    asked = asked.model_copy(update={"analysis": asked.analysis.model_copy(update={"accuracy": 1e-2})})
+    found = solve_to_accuracy(asked, tmp_path, MPI.COMM_SELF)
+    assert 0 < found.accuracy.estimated < 1e-2
+    assert found.accuracy.levels[-1].last == found.steps[-1].values["oil displacement"]
+
+
 def test_another_load_is_refused(run):
     other = scene(load=[{"name": "pull", "on": "flat", "direction": "x", "displacement": 0.1}], path={"steps": 3})
     with pytest.raises(InputError, match=r'was loaded by load "press"; load "pull" cannot continue it'):
