@@ -79,11 +79,11 @@ class MeshFamily:
 
 def expected_angle(scene: Scene) -> float:
     """About the largest semi-angle [rad] of the contact, rather too large: where circles that go through each other
-    unchanged by the largest ``delta`` meet, ``cos(angle) = dR/(dR + delta)``. Under a force ``delta`` is ``P/E*``."""
+    unchanged by the largest ``delta`` meet, ``cos(angle) = dR/(dR + delta)``; a force P stands for ``P/(E* t)``."""
     dR = scene.joint.dR
     if dR <= 0:
         return math.pi
-    delta = max([0.0, *scene.targets]) / (scene.E_star if scene.force_controlled else 1.0)
+    delta = max([0.0, *scene.targets]) / (scene.E_star * scene.thickness if scene.force_controlled else 1.0)
     return math.atan2(math.sqrt(delta * (2 * dR + delta)), dR) if delta else _WIDE
 
 

@@ -205,6 +205,16 @@ def test_units_do_not_matter():
     assert joints[0].growth == joints[1].growth
 
 
+def test_thickness_does_not_matter():
+    """Under a force that is as many times as large: the same meshes."""
+    sizes = []
+    for t in (1.0, 10.0):
+        load = {"displacement": None, "force": 1e-4 * t}
+        scene = open_scene(1e-3, analysis={"thickness": t}, load=load)
+        sizes.append(MeshFamily(scene, 1e-3).scene_of(1, 1).joint.relative_element_size)
+    assert sizes[0] == sizes[1]
+
+
 def test_meshes_are_bounded_by_the_keys():
     """Unlike elements on both arcs and a shrinking edge stay within what a scene allows; beyond it there is no mesh."""
     for keys in ({"size_ratio": 0.01}, {"size_ratio": 10.0}, {"edge_angle": 1.0, "edge_ratio": 0.01}):
