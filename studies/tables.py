@@ -131,7 +131,8 @@ def heading(key: str, scene: Scene) -> str:
     section, _, name = key.partition(".")
     extra = type(getattr(scene, section)).model_fields[name].json_schema_extra
     kind = extra.get("unit") if isinstance(extra, dict) else None
-    return f"{key} [{getattr(scene.units, str(kind))}]" if kind else key
+    unit = scene.units.force_of(scene.analysis.thickness) if kind == "force" else getattr(scene.units, str(kind))
+    return f"{key} [{unit}]" if kind else key
 
 
 def shown(value: Any) -> str:

@@ -16,6 +16,7 @@ from archord.scene.file import load_scene, resolved
 from archord.studies.cases import combinations, factors, read_sweep, run_name, samples
 from archord.studies.sweep import expected_seconds, part_of
 from archord.studies.sweep_file import LatinHypercube, SweepFile
+from archord.studies.tables import heading
 
 SCENES = Path(__file__).parents[2] / "scenes"
 DOCS = SCENES.parent / "docs"
@@ -68,6 +69,14 @@ def test_every_stratum_of_a_range_holds_one_sample(number, seed, low, factor):
         # rounded to nine digits, a sample may lie on the edge of its stratum
         assert (np.abs(np.sort(share * number) - np.arange(number) - 0.5) <= 0.5 + 1e-5).all()
     assert rows == drawn(seed) != drawn(seed + 1)
+
+
+def test_a_heading_has_the_unit_of_its_key():
+    """Forces are per unit thickness unless the scene has one."""
+    scene = load_scene(ELASTIC)
+    assert heading("load.force", scene) == "load.force [E* R]"
+    thick = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"thickness": 10.0})})
+    assert heading("load.force", thick) == "load.force [E* R2]"
 
 
 def test_overrides_mean_what_set_means(tmp_path):
