@@ -15,7 +15,7 @@ from mpi4py import MPI
 from archord.materials.material import Array
 from archord.presets.edge import PER_STEP, SurfaceProfile, surface_profiles
 from archord.presets.joint_report import sizes
-from archord.presets.problem import as_input_error, general_problem
+from archord.presets.problem import as_input_error, general_problem, require_mirrored
 from archord.report.timer import Timer
 from archord.scene.problem import LIVE, ProblemScene
 from archord.solver.stepping import Step
@@ -65,6 +65,7 @@ class GeneralAccount:
                 self._warnings = check(scene, problem)
         with as_input_error(scene):
             self.system = System(problem, timer=timer)
+            require_mirrored(scene, self.system)
             if scene.mesh.shape is None:
                 require_facing(self.system)
         self._supports = list(dict.fromkeys(s.name for s in problem.supports if s.name not in self.system.drive_names))

@@ -20,6 +20,7 @@ from archord.scene import parts
 from archord.scene.errors import InputError
 from archord.scene.problem import LIVE, ProblemScene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
+from archord.solver.system import System
 
 _SHAPES: dict[str, Callable[..., TaggedMesh]] = {"lug": lug, "bushing": bushing, "joint": joint_mesh}
 _AXES = {"x": 0, "y": 1, "rotation": 2}
@@ -56,6 +57,26 @@ def scene_mesh(scene: ProblemScene, comm: MPI.Comm, partitioner=None) -> TaggedM
     circles = [Circle(circle.facets, (circle.centre[0], circle.centre[1]), circle.radius) for circle in mesh.circle]
     options = {"scale": mesh.scale, "order": mesh.order, "refine": mesh.refine, "partitioner": partitioner}
     return read_mesh(tagged(*source) if isinstance(source, tuple) else source, comm, circles=circles, **options)
+
+
+def require_mirrored(scene: ProblemScene, system: System) -> None:
+    """Raise ValueError where a rigid coupling of a part with mirror images shares nodes with an edge that is held in
+    one direction, as a mirror line is, and could leave that line or turn. Collective."""
+    of, couplings = system.problem.mesh, [c for c in scene.coupling if c.kind == "rigid"]
+    fixed: dict[str, set[str]] = {}
+    for support in scene.support:
+        fixed.setdefault(support.on, set()).update(support.fixed)
+    edges = {on: min(axes) for on, axes in fixed.items() if len(axes) == 1 and on not in {c.name for c in couplings}}
+    for coupling in couplings if scene.analysis.symmetry > 1 else []:
+        nodes = of.dofs_in(system.V, coupling.facets)
+        for on, axis in edges.items():
+            shared = len(np.intersect1d(nodes, of.dofs_in(system.V, on)))
+            free = [freedom for freedom in (axis, "rotation") if freedom not in fixed.get(coupling.name, ())]
+            if free and system.comm.allreduce(shared):
+                raise ValueError(
+                    f"the rigid coupling {coupling.name!r} of a part with mirror images meets {on!r}, which is held in "
+                    f"{axis}: hold its {' and '.join(free)}, too, in a [[support]]"
+                )
 
 
 class _Builder:

@@ -6,6 +6,7 @@ from mpi4py import MPI
 
 from archord.benchmarks.case import paper_joint
 from archord.presets.general import GeneralAccount
+from archord.scene.errors import InputError
 from archord.scene.file import parse_any
 from archord.scene.shapes import general_joint
 from archord.solver.stepping import march
@@ -91,6 +92,23 @@ def test_a_held_reference_point_does_not_move():
     assert found["bore x"] == pytest.approx(-50, rel=1e-9)
     nodes = account.system.problem.mesh.dofs_in(account.system.V, "hole")
     assert np.abs(account.system.equilibrium.displacement()[nodes]).max() < 1e-12
+
+
+@pytest.mark.parametrize(("line", "axis"), [("axis", "y"), ("clamp", "x")])
+def test_a_rigid_coupling_keeps_to_the_line_of_symmetry_that_it_meets(line, axis):
+    """The loaded end meets the axis, the sides the clamp, as they would another line of symmetry."""
+    point = {"name": "end", "facets": "end" if axis == "y" else "sides", "point": [20.0, 0.0]}
+    lines = [SYMMETRY | {"on": line, "fixed": [axis]}, {"name": "hole", "on": "hole", "fixed": ["x", "y"]}]
+    pull = [load(on="end", direction="x" if axis == "y" else "y", force=100.0)]
+
+    def held(*freedoms):
+        return [*lines, {"name": "guide", "on": "end", "fixed": list(freedoms)}]
+
+    for freedoms, missing in (([axis], "rotation"), (["rotation"], axis)):
+        with pytest.raises(InputError, match=rf"meets '{line}', which is held in {axis}: hold its {missing}, too"):
+            solved(pull, pin="none", couplings=[point], supports=held(*freedoms))
+    found = solved(pull, pin="none", couplings=[point], supports=held(axis, "rotation"))[1]
+    assert found["hole x" if axis == "y" else "hole y"] == pytest.approx(-100, rel=1e-8)
 
 
 def test_a_pressure_acts_along_the_normal():
