@@ -91,7 +91,8 @@ class GeneralAccount:
             found[f"{load.name} displacement"] = "rad" if turns else length
             found[f"{load.name} force"] = moment if turns else force
             if load.pressure is not None:
-                found |= {f"{load.name} displacement": f"{length}2", f"{load.name} force": units.stress}
+                area = f"{length}{3 if scene.analysis.thickness else 2}"  # displaced, over the thickness a volume
+                found |= {f"{load.name} displacement": area, f"{load.name} force": units.stress}
         for name in self._supports:
             found |= {f"{name} x": force, f"{name} y": force, f"{name} moment": moment}
         for part in scene.interaction:

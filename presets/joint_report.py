@@ -52,7 +52,7 @@ class JointAccount:
             "p0": ("E*", E, scene.units.stress),
             "eps": ("", 1.0, "rad"),
             "contact_area": ("R", R, length),
-            "peeq_integral": ("R2", R * R * t, f"{length}2"),
+            "peeq_integral": ("R2", R * R * t, f"{length}{3 if scene.analysis.thickness else 2}"),
             **dict.fromkeys(("elastic_energy", "plastic_dissipation", "work"), ("(E* R2)", E * R * R * t, energy)),
             "seconds": ("", 1.0, "s"),
         }
