@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
     from archord.materials.j2 import J2Material
     from archord.materials.kinematic import KinematicMaterial
+    from archord.postprocess.pictures.pictures import draw_run
     from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Support
     from archord.scene.problem import ProblemScene
     from archord.scene.scene import Scene
@@ -32,9 +33,10 @@ if TYPE_CHECKING:
 __all__ = [
     "Body", "Coupling", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LinearHardening",
     "Load", "Mesh", "Problem", "ProblemScene", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System",
-    "TabularHardening", "VoceHardening", "gmsh_to_mesh", "load", "load_scene", "solve",
+    "TabularHardening", "VoceHardening", "draw_run", "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
+    "draw_run": "archord.postprocess.pictures.pictures",
     "gmsh_to_mesh": "archord.geometry.meshes.fenicsx",
     "Elastic": "archord.materials.elasticity",
     "J2Material": "archord.materials.j2",

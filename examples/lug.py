@@ -1,37 +1,29 @@
 """A lug that a pin pulls at, from gmsh calls to a picture: mm, MPa, N per mm of thickness."""
 
-from math import hypot
-
 import gmsh
 
 import archord
 
 gmsh.initialize()
-disc = lambda x, r: (2, gmsh.model.occ.addDisk(x, 0, 0, r, r))  # noqa: E731
-box = lambda x, w, h: (2, gmsh.model.occ.addRectangle(x, -h / 2, 0, w, h))  # noqa: E731
-plate, _ = gmsh.model.occ.fuse([box(-60, 60, 40)], [disc(0, 20)])
-bodies = {"lug": gmsh.model.occ.cut(plate, [disc(0, 10)])[0]}
-bodies["pin"] = gmsh.model.occ.intersect([disc(0.1, 9.9)], [box(0.1, 20, 20)])[0]
-gmsh.model.occ.synchronize()
-edges = {"clamp": [], "hole": [], "end": [], "flat": [], "pin": []}
-for body, faces in bodies.items():
-    gmsh.model.addPhysicalGroup(2, [face for _, face in faces], name=body)
-    for _, line in gmsh.model.getBoundary(faces, oriented=False):
-        x, y, _ = gmsh.model.occ.getCenterOfMass(1, line)
-        of_lug = "clamp" if x < -59 else "hole" if hypot(x, y) < 9 else "end"
-        edges[of_lug if body == "lug" else "flat" if x < 0.2 else "pin"].append(line)
-for name, lines in edges.items():
-    gmsh.model.addPhysicalGroup(1, lines, name=name)
+cad = gmsh.model.occ
+plate, _ = cad.fuse([(2, cad.addRectangle(-60, -20, 0, 60, 40))], [(2, cad.addDisk(0, 0, 0, 20, 20))])
+lug, _ = cad.cut(plate, [(2, cad.addDisk(0, 0, 0, 10, 10))])
+pin, _ = cad.intersect([(2, cad.addDisk(0.1, 0, 0, 9.9, 9.9))], [(2, cad.addRectangle(0.1, -10, 0, 20, 20))])
+cad.synchronize()
+within = lambda x0, x1: set(gmsh.model.getEntitiesInBoundingBox(x0, -20.1, -1, x1, 20.1, 1, 1))  # noqa: E731
+edges = {"clamp": within(-60.1, -59.9), "flat": within(0, 0.2), "hole": within(-10.1, 10.1) - within(0, 10.1)}
+edges["bolt"] = within(0, 10.1) - edges["flat"]
+for name, entities in ({"lug": lug, "pin": pin} | edges).items():
+    gmsh.model.addPhysicalGroup(1 if name in edges else 2, [tag for _, tag in entities], name=name)
 gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 130)  # elements around a circle
-
-steel = {"E": 210000.0, "nu": 0.3}
 problem = archord.Problem(
     gmsh,
-    bodies=[archord.Body(name=name, **steel) for name in bodies],
-    interactions=[archord.Interaction(name="contact", surfaces=["pin", "hole"])],
+    bodies=[archord.Body(name=name, E=210000.0, nu=0.3) for name in ("lug", "pin")],
+    interactions=[archord.Interaction(name="contact", surfaces=["bolt", "hole"])],
     supports=[archord.Support(name="clamp", on="clamp", fixed=["x", "y"])],
     loads=[archord.Load(name="pull", on="flat", direction="x", displacement=0.3)],
     path={"steps": 15},
 )
 run = archord.solve(problem, "runs/lug", force=True)
 print(run.history[["pull displacement", "pull force"]])
+archord.draw_run(run, run.folder / "picture.png")
