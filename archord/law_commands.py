@@ -84,7 +84,7 @@ def law(
         raise InputError(f"--to {to:g}: must be a positive number.")
     if not 1 <= points <= 100000:
         raise InputError(f"--points {points}: must be between 1 and 100000.")
-    joint, units = _joint(scene, overrides, given)
+    joint, units, thickness = _joint(scene, overrides, given)
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
     said: list[object]
     with warnings.catch_warnings(record=True) as caught:
@@ -93,15 +93,17 @@ def law(
             check_target(plot, files_read(scene, overrides) if scene else [], force=True)
             said = [draw_laws(chosen, joint, plot, by_load, to, extrapolate)]
         else:
-            said = [law_table(entry, joint, by_load, to, points, extrapolate, units) for entry in chosen]
+            said = [law_table(entry, joint, by_load, to, points, extrapolate, units, thickness) for entry in chosen]
     print(*said, sep="\n\n")
     for message in dict.fromkeys(str(w.message) for w in caught):
         print(f"archord: warning: {message}.", file=sys.stderr)
     return 0
 
 
-def _joint(scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any]) -> tuple[LawJoint, dict[str, str]]:
-    """The joint of the scene, or of the options, which come before it; and the names of the units."""
+def _joint(
+    scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any]
+) -> tuple[LawJoint, dict[str, str], float]:
+    """The joint of the scene, or of the options, which come before it; the names of the units; and the thickness."""
     from archord.postprocess.laws.joint import LawJoint
 
     values = {name: value for name, value in given.items() if value is not None}
@@ -111,14 +113,16 @@ def _joint(scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any]
         from archord.scene.file import load_joint
 
         loaded = load_joint(scene, overrides)
-        units = {"length": loaded.units.length, "stress": loaded.units.stress, "force": loaded.units.force}
-        return dataclasses.replace(LawJoint.from_scene(loaded), **values), units
+        units, thick = loaded.units.model_dump(), loaded.analysis.thickness
+        units["force"] = loaded.units.force_of(thick)
+        units["stiffness"] = units["stress"] if thick is None else f"{units['force']}/{units['length']}"
+        return dataclasses.replace(LawJoint.from_scene(loaded), **values), units, loaded.thickness
     if overrides:
         raise InputError("--set: changes a scene; give one with --scene.")
     missing = [f"--{name.replace('_', '-')}" for name in ("radius", "clearance", "E_star") if name not in values]
     if missing:
         raise InputError(f"{', '.join(missing)}: missing; give radius, clearance and E* of the joint, or a --scene.")
-    return LawJoint(**values), {}
+    return LawJoint(**values), {}, 1.0
 
 
 @click.command()

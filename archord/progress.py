@@ -29,7 +29,6 @@ class JointView:
     """What is shown of a joint."""
 
     heading = " delta/dR     P/(E* R)   eps/deg   p0/E*      PEEQ max"
-    cells = "curved triangles"
 
     def __init__(self, scene: Scene) -> None:
         self.dR, self.E_star = scene.joint.dR, scene.E_star
@@ -53,7 +52,7 @@ class JointView:
 class ProblemView:
     """What is shown of a general problem: displacement and force of each load."""
 
-    load, cells, last, unit = "load factor", "cells", "last value", 1.0
+    load, last, unit = "load factor", "last value", 1.0
 
     def __init__(self, scene: ProblemScene) -> None:
         kind = "elastic-plastic" if scene.plastic else "elastic"
@@ -121,7 +120,7 @@ class Progress:
         """Say what is going to be solved."""
         if not self.by_mesh:
             ranks = f"{joint.comm.size} rank{'s' if joint.comm.size > 1 else ''}"
-            self.print(f"{self.view.title}: {joint.n_cells} {self.view.cells}, {joint.n_dofs} dofs, {ranks}")
+            self.print(f"{self.view.title}: {joint.n_cells} cells, {joint.n_dofs} dofs, {ranks}")
             self._print_heading()
         elif self.shown:
             self._bar.reset(self._task, description=f"{joint.n_dofs} dofs")

@@ -119,13 +119,13 @@ def quantities(scene: AnyScene, last: Any) -> dict[str, float]:
     """What cases are compared by at the step ``last``: of a joint without units, of a general scene the columns."""
     if not isinstance(scene, Scene):
         return last.values
-    E_star, R = scene.E_star, scene.joint.radius
+    E_star, R, P = scene.E_star, scene.joint.radius, last.P / scene.thickness
     return {
-        "P/(E* R)": last.P / (E_star * R),
+        "P/(E* R)": P / (E_star * R),
         "p0/E*": last.p0 / E_star,
         "eps": last.eps,
         "delta/dR": last.delta / scene.joint.dR,
-        "p0/P": last.p0 * R / last.P if last.P else 0.0,
+        "p0/P": last.p0 * R / P if P else 0.0,
     }
 
 

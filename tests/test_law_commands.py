@@ -46,6 +46,17 @@ def test_law_of_a_scene_has_its_units_and_options_come_first(capsys):
     assert capsys.readouterr().out != first
 
 
+def test_forces_of_a_thick_joint_are_those_of_its_runs(capsys):
+    """In N and N/mm, times the thickness; what has no units is as it was."""
+    law = ["law", "paper", "--scene", SCENE, "--points", "2"]
+    assert run(law) == run([*law, "--set", "analysis.thickness=10"]) == 0
+    thin, thick = (text.split("\n") for text in capsys.readouterr().out.split("paper: ")[1:])
+    assert "P [N] " in thick[1]
+    assert "dP/ddelta [N/mm]" in thick[1]
+    ratios = np.array(thick[3].split(), float) / np.array(thin[3].split(), float)
+    assert ratios == pytest.approx([1, 1, 10, 1, 1, 10, 1, 1])
+
+
 def test_laws_without_displacement_are_tabulated_over_the_load(capsys):
     assert run(["law", "persson", "winkler", *JOINT, "--points", "2", "--to", "1"]) == 0
     persson, winkler = capsys.readouterr().out.split("\n\n")

@@ -30,19 +30,26 @@ def sample(law: Law, joint: LawJoint, by_load: bool, to: float, points: int, ext
 
 
 def law_table(
-    law: Law, joint: LawJoint, by_load: bool, to: float, points: int, extrapolate: bool, units: dict[str, str]
+    law: Law,
+    joint: LawJoint,
+    by_load: bool,
+    to: float,
+    points: int,
+    extrapolate: bool,
+    units: dict[str, str],
+    thickness: float = 1.0,
 ) -> str:
-    """The law's title and its `sample`, a row for each point, in ``units`` of length, force and stress where they are
-    known; without columns that the law says nothing of."""
+    """The law's title and its `sample`, a row for each point, in ``units`` of length, force, stiffness and stress where
+    they are known, forces of a joint of this ``thickness``; without columns that the law says nothing of."""
     state = sample(law, joint, by_load, to, points, extrapolate)
     moving, one = law.gives_displacement, joint.clearance
     columns = [
         ("delta", "length", state.delta, moving),
         ("delta/dR", "", state.delta / one, moving),
-        ("P", "force", state.load, True),
+        ("P", "force", state.load * thickness, True),
         ("P/(E* R)", "", state.load / (joint.E_star * joint.radius), True),
         ("P/(E* dR)", "", state.load / joint.unit, True),
-        ("dP/ddelta", "stress", state.stiffness, moving),
+        ("dP/ddelta", "stiffness", state.stiffness * thickness, moving),
         ("p0", "stress", state.peak_pressure, "pressure" in law.gives),
         ("eps/deg", "", np.degrees(state.angle), "contact angle" in law.gives),
     ]

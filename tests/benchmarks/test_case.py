@@ -1,8 +1,10 @@
 """What every benchmark is made of: cases, the joint that they vary, ranks that take turns."""
 
+from types import SimpleNamespace
+
 import pytest
 
-from archord.benchmarks.case import Case, matches, paper_joint, side_by_side, slug, varied
+from archord.benchmarks.case import Case, matches, paper_joint, quantities, side_by_side, slug, varied
 from archord.scene.file import resolved
 
 
@@ -14,6 +16,13 @@ def test_a_variation_changes_what_it_names_and_nothing_else():
     assert other.pin.rigid
     assert other.targets == pytest.approx([0.001 * other.E_star, 0.002 * other.E_star, 0.003 * other.E_star])
     assert (other.joint, other.block, other.analysis) == (scene.joint, scene.block, scene.analysis)
+
+
+def test_joints_are_compared_per_thickness():
+    """What has no units is the same of a joint ten times as thick, whose force is ten times as large."""
+    thin, thick = (SimpleNamespace(P=P, p0=0.5, eps=1.0, delta=0.01) for P in (2.0, 20.0))
+    scene = paper_joint()
+    assert quantities(varied(scene, analysis={"thickness": 10.0}), thick) == quantities(scene, thin)
 
 
 def test_names_become_folders_and_are_found(tmp_path):
