@@ -131,11 +131,11 @@ def _calculix(scene: Scene, elements: Any, folder: Path) -> Process:
     def read() -> dict[str, Any]:
         opinion = process.read()
         # neither contact angle nor profile: pressures at the nodes near the edge scatter too much
-        found = {"P": opinion.P, "p0": opinion.p0, "dofs": opinion.dofs, "iterations": opinion.iterations}
+        found = {"P": opinion.P, "p0": opinion.p0, "dofs": 2 * len(opinion.mesh.x), "iterations": opinion.iterations}
         if scene.pin.yield_stress:
             # perfect plasticity: every point that flows dissipates the yield stress times its PEEQ
             found["dissipation"] = scene.pin.yield_stress * opinion.peeq_integral
-        return {name: value for name, value in found.items() if math.isfinite(value)}
+        return {name: value for name, value in found.items() if value is not None and math.isfinite(value)}
 
     return replace(process, read=read)
 

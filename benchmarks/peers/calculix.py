@@ -1,7 +1,7 @@
 """A second opinion: CalculiX on the deck of a scene, and what its result files say.
 
 As a program, ``python3 -m archord.benchmarks.peers.calculix SCENE``, it solves a scene by archord and by CalculiX on
-the same mesh, whole processes with one thread each, and prints their last forces and times.
+the same mesh, whole processes with one thread each, and prints their last forces, their stresses at nodes and times.
 """
 
 from __future__ import annotations
@@ -13,9 +13,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import KDTree
 
+from archord.benchmarks.peers.joint_script import axis_pressure
 from archord.benchmarks.timing import Failure, Process, run_once
 from archord.geometry.basis import Array
+from archord.materials.elasticity import von_mises
 from archord.postprocess.decks.deck import deck, moved_sets, system_of, thickness
 from archord.postprocess.decks.mesh import DeckMesh, Elements, deck_mesh, label, surface_name
 from archord.postprocess.run import Run
@@ -26,7 +29,6 @@ from archord.solver.system import System
 
 _HEADER = re.compile(r"^ *(\S.*?) *\([^)]*\) *for set (\S+) and time +(\S+)$")
 _EXPONENT = re.compile(r"(?<=\d)(?=[+-]\d{3}$)")  # Fortran leaves out the E before three digits
-_NEAR_THE_AXIS = 0.2  # radians
 _LONG = 3600.0  # seconds
 
 Printed = list[tuple[str, str, float, Array]]  # tables of a ``.dat`` file: quantity, set, time, rows ``(n, columns)``
@@ -34,14 +36,16 @@ Printed = list[tuple[str, str, float, Array]]  # tables of a ``.dat`` file: quan
 
 @dataclass(frozen=True)
 class SecondOpinion:
-    """CalculiX's results: the ``forces`` ``(steps,)`` on drives by name; at the last step the pressure on the axis of a
-    joint and the integral of PEEQ over the whole; iterations of all steps."""
+    """CalculiX's results on ``mesh``: the ``forces`` ``(steps,)`` on drives by name; at the last step the ``stress``
+    ``(n, 4)`` at the nodes (xx, yy, zz, xy), the pressure on the axis of a joint and the integral of PEEQ over the
+    whole; iterations of all steps."""
 
+    mesh: DeckMesh
     forces: dict[str, Array]
-    p0: float
+    stress: Array
+    p0: float | None
     peeq_integral: float
     iterations: int
-    dofs: int
 
     @property
     def P(self) -> float:
@@ -68,24 +72,29 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
         said = (folder / "stdout.txt").read_text(errors="replace").splitlines()
         errors = [line.strip() for line in said if "*ERROR" in line]
         raise Failure("; ".join([f"CalculiX ended after step {reached} of {len(scene.targets)}", *errors]))
-    p0 = math.nan
+    text, p0 = (folder / "deck.frd").read_text(), None
     if isinstance(scene, Scene):
         arc = np.unique(mesh.surfaces[surface_name(system.problem.interactions[0], 0)].nodes)
-        angle = np.arctan2(mesh.x[arc, 0], -mesh.x[arc, 1] - scene.joint.dR)
-        p0 = axis_pressure(angle, read_contact_pressure((folder / "deck.frd").read_text(), len(mesh.x))[arc])
+        angle, pressure = (
+            np.arctan2(mesh.x[:, 0], -mesh.x[:, 1] - scene.joint.dR),
+            read_nodal(text, "CONTACT", mesh)[:, 3],
+        )
+        pressed = arc[pressure[arc] > 0]
+        p0 = axis_pressure(angle[pressed], pressure[pressed])
     increments = [line.split() for line in (folder / "deck.sta").read_text().splitlines()]
     return SecondOpinion(
+        mesh,
         forces,
+        read_nodal(text, "STRESS", mesh)[:, :4],
         p0,
         peeq_integral(printed, mesh) * system.problem.symmetry,
         sum(int(row[3]) for row in increments if len(row) >= 6 and row[0].isdigit() and row[3].isdigit()),
-        2 * len(mesh.x),
     )
 
 
 def drive_forces(system: System, mesh: DeckMesh, printed: Printed) -> dict[str, Array]:
-    """Force ``(steps,)`` of the whole on every drive of supports and discs at the end of each step, per unit thickness;
-    nan where the nodes of a set do not move alike."""
+    """Force ``(steps,)`` of the whole on every drive of supports and discs at the end of each step; nan where the
+    nodes of a set do not move alike."""
     share = system.problem.symmetry / thickness(system.problem, mesh)
     forces: dict[str, Array] = {}
     for m in moved_sets(system, mesh):
@@ -93,13 +102,6 @@ def drive_forces(system: System, mesh: DeckMesh, printed: Printed) -> dict[str, 
             factor = share * rate[0] if m.whole and np.ptp(rate) == 0 else math.nan
             forces[drive] = factor * step_forces(printed, label(m.node_set))[:, m.axis] + forces.get(drive, 0.0)
     return forces
-
-
-def axis_pressure(angle: Array, pressure: Array) -> float:
-    """Pressure on the contact axis: an even parabola through the nodal values ``(n,)`` within 0.2 rad of it; nan if
-    fewer than three of them are pressed."""
-    near = (pressure > 0) & (angle <= _NEAR_THE_AXIS)
-    return float(np.polyfit(angle[near] ** 2, pressure[near], 1)[-1]) if near.sum() >= 3 else math.nan
 
 
 def read_printed(text: str) -> Printed:
@@ -156,28 +158,43 @@ def areas(x: Array) -> Array:
     return corners + 4 / 3 * (polygons(around) - corners)  # Archimedes: a segment has 4/3 of its triangle
 
 
-def read_contact_pressure(text: str, n_nodes: int) -> Array:
-    """Contact pressure ``(n_nodes,)`` at the nodes, from the last CONTACT block of the ``.frd`` file ``text``.
+def read_nodal(text: str, block: str, mesh: DeckMesh) -> Array:
+    """Values ``(n, 6)`` at the nodes of ``mesh``, from the last ``block`` of the ``.frd`` file ``text``: "CONTACT" (the
+    fourth is the pressure), "STRESS" (xx, yy, zz, xy, yz, zx); zero elsewhere.
 
-    Columns 4 to 13 of a record are the node, from 14 on twelve to a component (COPEN, CSLIP1, CSLIP2, CPRESS, ...).
+    Columns 4 to 13 of a record are the node, from 14 on twelve to a component.
     """
-    pressure = np.zeros(n_nodes)
-    for line in text.rpartition(" -4  CONTACT")[2].partition("\n -3")[0].splitlines():
+    values = np.zeros((len(mesh.x), 6))
+    for line in text.rpartition(f" -4  {block}")[2].partition("\n -3")[0].splitlines():
         if line.startswith(" -1"):
-            pressure[int(line[3:13]) - 1] = float(line[49:61])
-    return pressure
+            values[int(line[3:13]) - 1] = [float(line[k : k + 12]) for k in range(13, 85, 12)]
+    return values
 
 
 def compare(scene: Path, folder: Path) -> Table:
-    """archord and CalculiX on ``scene``, in ``folder``. Raises `InputError` and `Failure`."""
+    """archord and CalculiX on ``scene``, in ``folder``: forces, the largest von Mises stress at a node of every body,
+    the difference of its stresses (root of the mean square over nodes, over that of archord's), and seconds. Raises
+    `InputError` and `Failure`."""
     command = (sys.executable, "-m", "archord", "solve", str(scene.resolve()), "-o", "run", "--force", "--quiet")
-    ours = run_once(Process(command, folder, lambda: Run(folder / "run").columns))
+    ours = run_once(Process(command, folder, lambda: Run(folder / "run")))
     theirs = run_once(replace(process(load_scene(scene), "quadratic", folder / "calculix"), limit=_LONG))
-    table = Table("load", "force: archord", "CalculiX", "difference", "seconds: archord", "CalculiX", "times", left=1)
-    for load, forces in theirs.result.forces.items():
-        P, other = ours.result[f"{load} force" if load else "P"][-1], forces[-1]
-        cells = f"{P:.6g}", f"{other:.6g}", f"{other / P - 1:+.2%}", f"{ours.seconds:.1f}", f"{theirs.seconds:.1f}"
-        table.add(load, *cells, f"{theirs.seconds / ours.seconds:.1f}")
+    table, run, opinion = Table("", "archord", "CalculiX", "difference", left=1), ours.result, theirs.result
+
+    def add(what: str, one: float, other: float) -> None:
+        table.add(what, f"{one:.6g}", f"{other:.6g}", f"{other / one - 1:+.2%}")
+
+    for load, forces in opinion.forces.items():
+        add(f"{load} force".strip(), run.columns[f"{load} force" if load else "P"][-1], forces[-1])
+    fields = run.fields()
+    for body, tag in run.bodies.items():
+        own, nodes = np.flatnonzero(fields.body_of_node == tag), np.unique(opinion.mesh.elements[body])
+        own = own[KDTree(fields.coordinates[own]).query(opinion.mesh.x[nodes])[1]]
+        one, other = fields.stress[own], opinion.stress[nodes]
+        add(f"{body}: largest von Mises stress", von_mises(one).max(), von_mises(other).max())
+        table.add(f"{body}: stresses", "", "", f"{np.linalg.norm(other - one) / np.linalg.norm(one):.2%}")
+    table.add(
+        "seconds", *(f"{run.seconds:.1f}" for run in (ours, theirs)), f"times {theirs.seconds / ours.seconds:.1f}"
+    )
     return table
 
 
