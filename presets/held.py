@@ -89,9 +89,9 @@ def require_facing(system: System) -> None:
 
 
 def _nodes(whole: PlaneMesh, name: str, of_cells: bool = False) -> np.ndarray:
-    """Nodes of a facet, point or cell set, or of the cell set alone; none of another name."""
-    if name in whole.facet_sets and not of_cells:
-        return np.unique(whole.edges[np.isin(whole.tags, whole.facet_sets[name])])
-    if name in whole.point_sets and not of_cells:
-        return whole.point_sets[name]
+    """Nodes of a facet and point set, of a cell set where it is neither, or of the cell set alone; none of another
+    name."""
+    if not of_cells and (name in whole.facet_sets or name in whole.point_sets):
+        edges = whole.edges[np.isin(whole.tags, whole.facet_sets.get(name, ()))]
+        return np.union1d(edges, whole.point_sets.get(name, ())).astype(np.int64)
     return np.unique(whole.cells[np.isin(whole.bodies, whole.cell_sets.get(name, ()))])

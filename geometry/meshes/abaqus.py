@@ -1,7 +1,7 @@
 """Meshes of Abaqus and CalculiX: nodes, plane elements, sets and surfaces of an .inp file; all else of it is skipped.
 
 meshio's reader of such files knows neither surfaces nor plane elements of second order, and forgets all but the last
-block of nodes. Lines (trusses and beams) only name edges, as gmsh writes them.
+block of nodes. Lines (trusses) only name edges, as gmsh writes them.
 """
 
 from __future__ import annotations
@@ -15,104 +15,110 @@ from typing import NamedTuple
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
-from archord.geometry.basis import Array
 from archord.geometry.meshes.plane_mesh import PlaneMesh, distinct_edges, in_basix_order, one_kind, sides_of
 
-_PLANE, _LINE = re.compile(r"CP[ES]([3468])[A-Z]*"), re.compile(r"(T[23]D[23]|R2D2|B[23][12])[A-Z]*")
+_KINDS = re.compile(r"(CP[ES][3468]|T[23]D[23])[A-Z]*")  # with the number of nodes
+_UNREAD = {"PART", "INSTANCE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY"}  # they move or make nodes
 _DEEPEST = 5  # files included in each other
 
 
 class _Block(NamedTuple):
     keyword: str
     options: dict[str, str]
-    lines: list[str]
+    rows: list[list[str]]
 
     def values(self) -> list[str]:
-        return [value for line in self.lines for part in line.split(",") if (value := part.strip().upper())]
+        return [value.upper() for row in self.rows for value in row if value]
 
 
 def _lines(path: Path, depth: int = 0) -> Iterator[str]:
-    """The lines of a file and of those that it includes."""
+    """The lines of a file, those of keywords whole, and those of the files that it includes."""
     if depth > _DEEPEST:
         raise ValueError(f"{path.name} includes itself")
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        if line.strip().upper().startswith("*INCLUDE"):
-            yield from _lines(path.parent / line.partition("=")[2].strip(' "'), depth + 1)
-        elif line.strip() and not line.startswith("**"):
-            yield line.strip()
+    text = path.read_text(encoding="utf-8", errors="replace")
+    for line in map(str.strip, re.sub(r",[ \t]*\n(?=[^*\n]*=)", ",", text).splitlines()):
+        if line and not line.startswith("**"):
+            if not line.upper().startswith("*INCLUDE"):
+                yield line
+            if file := re.match(r"\*.*,\s*INPUT\s*=([^,]*)", line, re.IGNORECASE):
+                yield from _lines(path.parent / file[1].strip(' "'), depth + 1)
 
 
-def _blocks(path: Path) -> Iterator[_Block]:
-    lines = list(_lines(path))
-    starts = [k for k, line in enumerate(lines) if line.startswith("*")]
-    for start, end in zip(starts, [*starts[1:], len(lines)], strict=True):
-        keyword, *pairs = lines[start][1:].split(",")
-        options = {key.strip().upper(): value.strip(' "') for key, _, value in (pair.partition("=") for pair in pairs)}
-        yield _Block(keyword.strip().upper(), options, lines[start + 1 : end])
+def _blocks(path: Path) -> list[_Block]:
+    blocks = [_Block("", {}, [])]
+    for line in _lines(path):
+        first, *others = (part.strip(' "') for part in line.strip(", ").split(","))
+        if line.startswith("*"):
+            options = {key.strip().upper(): value.strip(' "') for key, _, value in (o.partition("=") for o in others)}
+            blocks.append(_Block(first[1:].upper(), options, []))
+        else:
+            blocks[-1].rows.append([first, *others])
+    return blocks
 
 
 class _Model:
-    """Nodes, elements by their number of nodes (of lines: negative), sets by kind and name in capitals, and surfaces as
-    elements and a label."""
+    """Nodes, plane elements by their number of nodes, lines by their ends, sets by kind and name in capitals, and
+    surfaces as elements and a face."""
 
     def __init__(self, path: Path) -> None:
         self.nodes: np.ndarray = np.zeros(0, dtype=np.int64)
-        self.x: Array = np.zeros((0, 3))
+        self.x: np.ndarray = np.zeros((0, 3))
         self.elements: dict[int, np.ndarray] = {}
+        self.lines: np.ndarray = np.zeros((0, 3), dtype=np.int64)
         self.sets: dict[tuple[str, str], np.ndarray] = {}
         self.surfaces: dict[str, list[tuple[np.ndarray, str]]] = defaultdict(list)
         self.spelling: dict[str, str] = {}
+        take = {"NODE": self._node, "ELEMENT": self._element, "SURFACE": self._surface}
         for block in _blocks(path):
-            take = getattr(self, f"_{block.keyword.lower()}", None)
-            if take:
-                take(block)
-
-    def _part(self, block: _Block) -> None:
-        raise ValueError("parts and instances are not read; write the file without them (noPartsInputFile=ON)")
+            if block.keyword in _UNREAD or block.options.get("SYSTEM", "R").upper() != "R":
+                raise ValueError(
+                    f"*{block.keyword} is not read as it stands; write all nodes and elements out, in rectangular "
+                    "coordinates and without parts and instances (noPartsInputFile=ON)"
+                )
+            if block.keyword in take | {"NSET": None, "ELSET": None}:
+                take.get(block.keyword, self._set)(block)
 
     def _node(self, block: _Block) -> None:
-        rows = np.array([[*line.strip(", ").split(","), "0", "0"][:4] for line in block.lines], dtype=float)
+        rows = np.array([[*row, "0", "0"][:4] for row in block.rows], dtype=float).reshape(-1, 4)
         self.nodes = np.append(self.nodes, rows[:, 0].astype(np.int64))
         self.x = np.concatenate([self.x, rows[:, 1:]])
         self._add("NSET", block.options.get("NSET"), rows[:, 0])
 
     def _element(self, block: _Block) -> None:
-        kind = block.options.get("TYPE", "").upper()
-        if plane := _PLANE.fullmatch(kind):
-            n = int(plane[1])
-        elif line := _LINE.fullmatch(kind):
-            n = -3 if line[1] in ("T2D3", "T3D3", "B22", "B32") else -2
-        else:
+        kind, values = block.options.get("TYPE", "").upper(), block.values()
+        if not _KINDS.fullmatch(kind):
             raise ValueError(f"elements of type {kind} are not read, only CPS and CPE of 3, 4, 6 or 8 nodes")
-        values = block.values()
-        if len(values) % (1 + abs(n)):
-            raise ValueError(f"elements of type {kind} have {len(values)} numbers, no multiple of {1 + abs(n)}")
-        rows = np.array(values, dtype=np.int64).reshape(-1, 1 + abs(n))
-        self.elements[n] = np.concatenate([self.elements.get(n, rows[:0]), rows])
+        n = int(kind[3])
+        if len(values) % (1 + n):
+            raise ValueError(f"elements of type {kind} have {len(values)} numbers, no multiple of {1 + n}")
+        rows = np.array(values, dtype=np.int64).reshape(-1, 1 + n)
+        if kind.startswith("T"):
+            self.lines = np.concatenate([self.lines, rows[:, [0, 1, -1]]])
+        else:
+            self.elements[n] = np.concatenate([self.elements.get(n, rows[:0]), rows])
         self._add("ELSET", block.options.get("ELSET"), rows[:, 0])
 
-    def _nset(self, block: _Block) -> None:
+    def _set(self, block: _Block) -> None:
         kind, options = block.keyword, block.options
         if "GENERATE" in options:
-            there = self.nodes if kind == "NSET" else np.concatenate([rows[:, 0] for rows in self.elements.values()])
-            ranges = [(*map(int, line.strip(" ,").split(",")), 1)[:3] for line in block.lines]
+            elements = [rows[:, 0] for rows in (self.lines, *self.elements.values())]
+            there = self.nodes if kind == "NSET" else np.concatenate(elements)
+            ranges = [(*map(int, row), 1)[:3] for row in block.rows]
             chosen = [there[(there >= a) & (there <= b) & ((there - a) % step == 0)] for a, b, step in ranges]
         elif kind == "NSET" and "ELSET" in options:
-            elements = self._chosen("ELSET", [options["ELSET"].upper()])
-            chosen = [np.unique(r[np.isin(r[:, 0], elements), 1:]) for r in self.elements.values()]
+            named = self._chosen("ELSET", [options["ELSET"].upper()])
+            chosen = [np.unique(rows[np.isin(rows[:, 0], named), 1:]) for rows in self.elements.values()]
         else:
             chosen = [self._chosen(kind, block.values())]
         self._add(kind, options.get(kind), np.concatenate(chosen))
 
-    _elset = _nset
-
     def _surface(self, block: _Block) -> None:
-        name, by_node = block.options.get("NAME", ""), block.options.get("TYPE", "").upper() == "NODE"
-        if by_node:
+        name = block.options.get("NAME", "")
+        if block.options.get("TYPE", "").upper() == "NODE":
             self._add("NSET", name, self._chosen("NSET", block.values()))
         else:
-            for item, _, label in (line.upper().partition(",") for line in block.lines):
-                self.surfaces[name].append((self._chosen("ELSET", [item.strip()]), label.strip(" ,")))
+            for item, *face in block.rows:
+                self.surfaces[name].append((self._chosen("ELSET", [item.upper()]), "".join(face).upper()))
 
     def _add(self, kind: str, name: str | None, numbers: np.ndarray) -> None:
         if name:
@@ -133,11 +139,12 @@ def read_abaqus(path: Path) -> PlaneMesh:
     """The mesh of an .inp file: its element sets, and as facet sets its surfaces, its sets of lines and what its node
     sets have of the boundary; other nodes of these are point sets. Raises ValueError."""
     model = _Model(path)
-    rows = model.elements.get(one_kind({n for n in model.elements if n > 0}), np.zeros((0, 1), dtype=np.int64))
+    rows, lines = model.elements[one_kind(set(model.elements))], model.lines
+    for what, there in (("node", model.nodes), ("element", np.append(rows[:, 0], lines[:, 0]))):
+        number, count = np.unique(there, return_counts=True)
+        if (count > 1).any():
+            raise ValueError(f"the {what} {number[count > 1][0]} is there twice")
     corners = _places(model.nodes, rows[:, 1:], "node")
-    lines = np.concatenate(
-        [np.zeros((0, 3), dtype=np.int64), *(r[:, [0, 1, -1]] for n, r in model.elements.items() if n < 0)]
-    )
     cell_sets, facet_sets, point_sets = {}, defaultdict[str, list[np.ndarray]](list), {}
     for (kind, key), numbers in model.sets.items():
         name, named = model.spelling[key], np.isin(lines[:, 0], numbers)
@@ -148,24 +155,26 @@ def read_abaqus(path: Path) -> PlaneMesh:
             if named.any():
                 facet_sets[name].append(_places(model.nodes, lines[named, 1:], "node"))
     sides = 3 if corners.shape[1] in (3, 6) else 4
+    faces = {f"S{k}": [k - 1, k % sides] for k in range(1, sides + 1)}
     for name, parts in model.surfaces.items():
-        for elements, label in parts:
-            if label not in [f"S{k}" for k in range(1, sides + 1)]:
-                raise ValueError(f"the surface {name!r} has the face {label!r}, which is none of S1 to S{sides}")
-            ends = [int(label[1]) - 1, int(label[1]) % sides]
-            facet_sets[name].append(corners[_places(rows[:, 0], elements, f"element of the surface {name!r}")][:, ends])
+        for elements, face in parts:
+            if face not in faces:
+                raise ValueError(f"the surface {name!r} has the face {face!r}, which is none of S1 to S{sides}")
+            places = _places(rows[:, 0], elements, f"element of the surface {name!r}")
+            facet_sets[name].append(corners[places][:, faces[face]])
     x, cells = in_basix_order(model.x, corners, perm_gmsh)
     every = sides_of(cells)
     first, which = distinct_edges(every[:, :2])
     boundary = every[first[np.bincount(which) == 1]]
     for (kind, key), numbers in model.sets.items():
-        if kind == "NSET" and model.spelling[key] not in facet_sets:
-            nodes = _places(model.nodes, np.unique(numbers), f"node of the set {model.spelling[key]!r}")
+        name = model.spelling[key]
+        if kind == "NSET" and name not in facet_sets:
+            nodes = _places(model.nodes, np.unique(numbers), f"node of the set {name!r}")
             edges = boundary[np.isin(boundary, nodes).all(axis=1)]
             if len(edges):
-                facet_sets[model.spelling[key]].append(edges[:, :2])
+                facet_sets[name].append(edges[:, :2])
             if len(rest := np.setdiff1d(nodes, edges)):
-                point_sets[model.spelling[key]] = rest
+                point_sets[name] = rest
     return PlaneMesh.of_sets(
         x, cells, cell_sets, {name: np.concatenate(ends) for name, ends in facet_sets.items()}, point_sets
     )

@@ -157,12 +157,16 @@ def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
 
     mesh, topology = tagged.mesh, tagged.mesh.topology
     node, n = np.asarray(mesh.geometry.input_global_indices), topology.index_map(2).size_local
-    body = np.zeros(n + topology.index_map(2).num_ghosts, dtype=np.int32)
+    body = np.full(n + topology.index_map(2).num_ghosts, np.iinfo(np.int32).min, dtype=np.int32)  # without a tag
     body[tagged.cells.indices] = tagged.cells.values
     owned = tagged.facets.indices < topology.index_map(1).size_local
     facets, tags = tagged.facets.indices[owned], tagged.facets.values[owned]
     ends = entities_to_geometry(mesh, 1, facets)[:, :2] if len(facets) else np.zeros((0, 2), dtype=np.int32)
-    number, cells = np.asarray(topology.original_cell_index)[:n], node[mesh.geometry.dofmap[:n]]
+    try:
+        number = np.asarray(topology.original_cell_index)[:n]
+    except RuntimeError:  # of a submesh
+        number = topology.index_map(2).local_range[0] + np.arange(n)
+    cells = node[mesh.geometry.dofmap[:n]]
     parts = mesh.comm.gather((number, cells, body[:n], node[ends], tags, node, mesh.geometry.x[:, :2]))
     if parts is None:
         return None

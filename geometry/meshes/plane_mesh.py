@@ -82,7 +82,7 @@ class PlaneMesh:
         used, of_cells = np.unique(cells, return_inverse=True)
         new = np.full(len(x) + 1, -1)
         new[used] = np.arange(len(used))
-        x, cells, bodies = _flat(x[used]), of_cells.reshape(cells.shape), np.zeros(len(cells), dtype=np.int32)
+        x, cells, bodies = flat(x[used]), of_cells.reshape(cells.shape), np.zeros(len(cells), dtype=np.int32)
         cell_sets = cell_sets or {"all": np.arange(len(cells))}
         numbers = tags or [{name: k for k, name in enumerate(sets, 1)} for sets in (cell_sets, facet_sets)]
         cell, tag = _members(cell_sets, numbers[0], ())
@@ -186,7 +186,7 @@ def _members(
     return np.concatenate(members).astype(np.int64), repeated.astype(np.int32)
 
 
-def _flat(x: Array) -> Array:
+def flat(x: Array) -> Array:
     """The first two coordinates of ``x`` ``(n, 2 or 3)``. Raises ValueError where the third differs, and for nan."""
     if not np.isfinite(x).all() or not np.abs(x).max(initial=0) < _FAR:
         raise ValueError("some nodes have coordinates that are not finite or beyond 1e30")

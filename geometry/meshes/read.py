@@ -18,7 +18,7 @@ from mpi4py import MPI
 from archord.geometry.meshes.abaqus import read_abaqus
 from archord.geometry.meshes.check import faults
 from archord.geometry.meshes.fenicsx import distribute, gathered, own_gmsh, strips
-from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.plane_mesh import PlaneMesh, flat
 from archord.geometry.meshes.refine import Circle, refined
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.meshes.xdmf import read_xdmf
@@ -71,7 +71,10 @@ def tagged(
     facet_sets: Mapping[str, int] | None = None,
 ) -> TaggedMesh:
     """A dolfinx ``mesh`` with its tags, named by ``cell_sets`` and ``facet_sets`` or else by their numbers; without
-    tags, all cells are "all". Collective."""
+    tags, all cells are "all". Collective; raises ValueError on all ranks for what is not plane."""
+    if mesh.topology.dim != 2 or (cells and cells.dim != 2) or (facets and facets.dim != 1):
+        raise ValueError("the mesh and the tags of its cells must be of dimension 2, the tags of facets of dimension 1")
+    flat(np.concatenate(mesh.comm.allgather(mesh.geometry.x)))
     mesh.topology.create_connectivity(1, 2)
     index_map, none = mesh.topology.index_map(2), np.zeros(0, dtype=np.int32)
     if cells is None:

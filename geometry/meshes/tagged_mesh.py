@@ -46,12 +46,15 @@ class TaggedMesh:
         return self.facets.indices[np.isin(self.facets.values, tags_of("facet", self.facet_sets, name))]
 
     def dofs_in(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
-        """Block dofs ``(n,)`` of ``V`` on this rank, ghosts included, in the facet, point or cell set ``name``: the
-        first of these that there is. Collective; raises ValueError."""
+        """Block dofs ``(n,)`` of ``V`` on this rank, ghosts included, in the facet and point set ``name``, or in the
+        cell set where it is neither. Collective; raises ValueError."""
+        found = []
         if name in self.facet_sets:
-            return fem.locate_dofs_topological(V, 1, self.facets_in(name))
-        if name in self.point_sets:
-            return self._nodes_at(V, name)
+            found.append(fem.locate_dofs_topological(V, 1, self.facets_in(name)))
+        if name in self.point_sets and (len(self.point_sets[name]) or not found):
+            found.append(self._nodes_at(V, name))
+        if found:
+            return np.unique(np.concatenate(found))
         if name in self.cell_sets:
             self.mesh.topology.create_connectivity(2, 2)
             return fem.locate_dofs_topological(V, 2, self.cells_in(name))
@@ -59,15 +62,19 @@ class TaggedMesh:
         raise ValueError(unknown("facet, point or cell set", name, known))
 
     def _nodes_at(self, V: fem.FunctionSpace, name: str) -> np.ndarray:
+        from scipy.spatial import cKDTree  # a solve without point sets does not pay for it
+
         points, x = self.point_sets[name], V.tabulate_dof_coordinates()[:, :2]
+        if not len(points):
+            raise ValueError(f"the point set {name!r} is empty: no cell has a node of it")
         comm, n_owned = self.mesh.comm, V.dofmap.index_map.size_local
-        size = comm.allreduce(np.abs(self.mesh.geometry.x).max(initial=0.0), op=MPI.MAX)
-        here = np.abs(x[:, None] - points).max(axis=2) < _SAME_PLACE * size
-        alike = (np.abs(points[:, None] - points).max(axis=2) < _SAME_PLACE * size).sum(axis=0)
-        found = comm.allreduce(here[:n_owned].sum(axis=0))
-        for x, y in points[found != alike]:
-            raise ValueError(f"the point set {name!r} does not tell which node at ({x:g}, {y:g}) it means")
-        return np.flatnonzero(here.any(axis=1)).astype(np.int32)
+        near = _SAME_PLACE * comm.allreduce(np.abs(self.mesh.geometry.x).max(initial=0.0), op=MPI.MAX)
+        alike = cKDTree(points).query_ball_point(points, near, return_length=True)
+        here = cKDTree(x).query_ball_point(points, near)
+        found = comm.allreduce(np.array([sum(dof < n_owned for dof in dofs) for dofs in here]))
+        for at in points[found != alike]:
+            raise ValueError(f"the point set {name!r} does not tell which node at ({at[0]:g}, {at[1]:g}) it means")
+        return np.concatenate([np.array(dofs, dtype=np.int32) for dofs in here])
 
     def tags_behind(self, name: str) -> set[int]:
         """Tags of the cells at the facets of the set ``name``, over all ranks. Collective."""

@@ -1,11 +1,20 @@
 """Meshes from files: one disc in a plate in every format, with the same areas, lengths and sets."""
 
+import basix.ufl
 import gmsh
 import numpy as np
 import pytest
 import ufl
 from dolfinx import fem, io
-from dolfinx.mesh import meshtags
+from dolfinx.mesh import (
+    create_mesh,
+    create_submesh,
+    create_unit_cube,
+    create_unit_square,
+    exterior_facet_indices,
+    locate_entities,
+    meshtags,
+)
 from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import gathered
@@ -196,6 +205,21 @@ def test_an_input_deck_of_sets_and_surfaces(comm, deck):
 
 
 @pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (" 3, 2., 0.", "  ** half of them\n 3, 2., 0."),
+        ("*ELEMENT, TYPE=CPE8R, ELSET=Left", "*ELEMENT, TYPE=CPE8R,\n ELSET=Left"),
+        ("*NSET, NSET=floor\n 1, 2, 3,", '*NSET, NSET="some of it"\n 1, 2\n*NSET, NSET=floor\n "some of it", 3,'),
+        ("*INCLUDE, INPUT=more.inp\n", "*NODE, NSET=Nall, INPUT=more.inp\n"),
+    ],
+)
+def test_what_an_input_deck_may_look_like(comm, deck, old, new):
+    """Comments, keywords on two lines and names between quotes, and data in other files lose nothing."""
+    expected, found = content(read_mesh(deck(), comm))[2], content(read_mesh(deck((old, new)), comm))[2]
+    assert {key: found[key] for key in expected} == like(expected)
+
+
+@pytest.mark.parametrize(
     ("old", "new", "said"),
     [
         ("cpe8r", "C3D20R", "elements of type C3D20R are not read"),
@@ -204,7 +228,11 @@ def test_an_input_deck_of_sets_and_surfaces(comm, deck):
         (" Both, S3", " Both, S5", "surface 'Top' has the face 'S5', which is none of S1 to S4"),
         (" 8, 2, 3,", " 8, 2, 99,", "no node with the number 99"),
         ("*ELSET, ELSET=right\n 8,", "*ELSET, ELSET=right\n 9,", "no element of the set 'right' with the number 9"),
-        ("*HEADING", "*PART, NAME=P", "parts and instances are not read"),
+        ("*HEADING", "*PART, NAME=P", "PART is not read .* without parts and instances"),
+        ("*ELSET, ELSET=right", "*ELGEN, ELSET=right\n 7, 2, 1, 1\n*ELSET, ELSET=right", "ELGEN is not read"),
+        ("*NODE, NSET=Nall", "*NODE, NSET=Nall, SYSTEM=C", "in rectangular coordinates"),
+        (" 12, 1., 1.", " 12, 1., 1.\n 12, 1., 2.", "the node 12 is there twice"),
+        (" 8, 2, 3,", " 7, 2, 3,", "the element 7 is there twice"),
         ("more.inp", "deck.inp", "deck.inp includes itself"),
         ("more.inp", "mroe.inp", "No such file"),
         (" 12, 1., 1.", " 12, 1., 1., 0.5", "not plane: z differs"),
@@ -279,8 +307,6 @@ def test_wrong_circles_and_orders_are_refused(comm, deck):
 
 
 def test_a_dolfinx_mesh_keeps_its_tags_under_names(comm):
-    from dolfinx.mesh import create_unit_square, exterior_facet_indices
-
     square = create_unit_square(comm, 3, 3)
     whole = tagged(square)
     assert content(read_mesh(whole, comm, order=2))[2]["cells", "all"] == (18, pytest.approx(1.0))
@@ -292,3 +318,52 @@ def test_a_dolfinx_mesh_keeps_its_tags_under_names(comm):
     assert content(read_mesh(named, comm, scale=2.0))[2]["facets", "rim"] == (12, pytest.approx(8.0))
     with pytest.raises(ValueError, match="'none' is empty"):
         tagged(square, facets=tags, facet_sets={"none": 8}).facets_in("none")
+
+
+def test_cells_without_a_tag_are_of_no_set(comm):
+    """Whatever the tags are that others have."""
+    square = create_unit_square(comm, 4, 4)
+    left = locate_entities(square, 2, lambda x: x[0] < 0.5 + 1e-9)
+    zero = tagged(square, meshtags(square, 2, left, np.zeros(len(left), dtype=np.int32)))
+    assert content(read_mesh(zero, comm))[2]["cells", "0"] == (16, pytest.approx(0.5))
+    part = create_submesh(square, 2, left)[0]
+    assert content(read_mesh(tagged(part), comm))[2]["cells", "all"] == (16, pytest.approx(0.5))
+
+
+@pytest.mark.mpi
+def test_dolfinx_meshes_that_are_not_plane_and_tags_in_the_wrong_place_are_refused(comm):
+    square = create_unit_square(comm, 2, 2)
+    square.topology.create_connectivity(1, 2)
+    facets = exterior_facet_indices(square.topology)
+    tags = meshtags(square, 1, facets, np.ones(len(facets), dtype=np.int32))
+    for wrong in (lambda: tagged(square, tags), lambda: tagged(create_unit_cube(comm, 2, 2, 2))):
+        with pytest.raises(ValueError, match="must be of dimension 2"):
+            wrong()
+    element = basix.ufl.element("P", "triangle", 1, shape=(3,))
+    with pytest.raises(ValueError, match="not plane: z differs by 1"):
+        tagged(create_mesh(MPI.COMM_SELF, cells=np.array([[0, 1, 2]]), e=element, x=np.eye(3)))
+
+
+def write_tags(path, *values):
+    """A square of 32 triangles of which each array of ``values`` is a tag, and its first vertex with the tag 5."""
+    square = create_unit_square(MPI.COMM_SELF, 4, 4)
+    square.topology.create_connectivity(0, 2)
+    corner = meshtags(square, 0, np.zeros(1, dtype=np.int32), np.full(1, 5, dtype=np.int32))
+    with io.XDMFFile(MPI.COMM_SELF, path, "w") as file:
+        file.write_mesh(square)
+        for k, found in enumerate(values):
+            tags = meshtags(square, 2, np.arange(len(found), dtype=np.int32), found.astype(np.int32))
+            tags.name = f"tags {k}"
+            file.write_meshtags(tags, square.geometry)
+        file.write_meshtags(corner, square.geometry)
+
+
+def test_no_tag_of_an_xdmf_file_is_lost(comm, tmp_path):
+    """Large values are told apart, a value that two tags have is refused, and vertices are points."""
+    write_tags(tmp_path / "large.xdmf", np.repeat([1000001, 1000002], 16))
+    mesh = read_mesh(tmp_path / "large.xdmf", comm)
+    assert {key: n for key, (n, _) in content(mesh)[2].items()} == {("cells", f"100000{k}"): 16 for k in (1, 2)}
+    assert mesh.point_sets["5"].shape == (1, 2)
+    write_tags(tmp_path / "twice.xdmf", np.repeat([1, 2], 16), np.ones(3))
+    with pytest.raises(ValueError, match="two tags have the value 1"):
+        read_mesh(tmp_path / "twice.xdmf", comm)

@@ -54,15 +54,21 @@ def test_sets_that_overlap_have_all_their_cells_and_facets(mesh):
 @pytest.mark.mpi
 def test_dofs_are_those_of_facets_points_or_cells(mesh, comm):
     V = fem.functionspace(mesh.mesh, ("Lagrange", 2, (2,)))
+    both = mesh.facet_sets | {"both": mesh.facet_sets["bottom"]}
+    points = mesh.point_sets | {"both": mesh.point_sets["corner"], "void": np.zeros((0, 2))}
+    mesh = replace(mesh, facet_sets=both, point_sets=points)
     x = V.tabulate_dof_coordinates()[:, :2]
     for name, inside in {
         "bottom": np.abs(x[:, 1]) < 1e-9,
         "corner": np.abs(x - [2, 1]).max(axis=1) < 1e-9,
         "left": x[:, 0] < 1 + 1e-9,
+        "both": (np.abs(x[:, 1]) < 1e-9) | (np.abs(x - [2, 1]).max(axis=1) < 1e-9),
     }.items():
         np.testing.assert_array_equal(np.sort(mesh.dofs_in(V, name)), np.flatnonzero(inside))
     with pytest.raises(ValueError, match=r"'nowhere' does not tell which node at \(3, 1\)"):
         mesh.dofs_in(V, "nowhere")
+    with pytest.raises(ValueError, match="'void' is empty: no cell has a node of it"):
+        mesh.dofs_in(V, "void")
 
 
 def test_a_name_that_is_none_gets_the_list(mesh):
