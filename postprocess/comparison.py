@@ -77,6 +77,8 @@ def _of_problems(runs: list[Run]) -> Comparison:
 
     for run in runs:
         run.number(None)
+        if (run.scene.units, run.force_unit) != (runs[0].scene.units, runs[0].force_unit):
+            raise InputError(f"{run.folder}: has other units, or another unit of force, than {runs[0].folder}.")
     paths = [np.array(run.path) for run in runs]
     low, high = (ends(path[end] for path in paths) for ends, end in ((max, 0), (min, -1)))
     at = paths[0][(paths[0] >= low - _SAME) & (paths[0] <= high + _SAME)]

@@ -128,6 +128,11 @@ class Run:
         return self.is_joint or bool(self.scene.interaction)
 
     @property
+    def force_unit(self) -> str:
+        """Unit of the forces in `columns`, which are per unit thickness where the scene has none."""
+        return self.scene.units.force_of(self.scene.analysis.thickness)
+
+    @property
     def path(self) -> list[float]:
         """How far the load was at every step: delta of a joint, else the load factor."""
         return self.columns["delta" if self.is_joint else "load_factor"]

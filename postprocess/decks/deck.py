@@ -135,7 +135,8 @@ class _Writer:
         """Nodes, elements, sets and surfaces."""
         problem, mesh = self.problem, self.mesh
         yield "*HEADING"
-        yield f"archord: {heading}; thickness {number(self.thick)}, 1/{number(problem.symmetry)} of the whole"
+        whole = number(problem.symmetry / self.thick)
+        yield f"archord: {heading}; thickness {number(self.thick)}, forces times {whole} are those of the whole"
         yield "*NODE, NSET=ALL_NODES"
         x = self._drawn()
         yield from (f"{i}, {number(a)}, {number(b)}" for i, (a, b) in enumerate(zip(*x.T, strict=True), 1))

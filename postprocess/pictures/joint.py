@@ -34,13 +34,14 @@ def force_panel(axes: Any, run: Run) -> None:
         first = int(np.flatnonzero(history["peeq_max"])[0]) + 1
         axes.plot(delta[first], P[first], "o", ms=8, mfc="none", color="tab:red", label="first plastic strain")
         axes.legend(frameon=False, loc="upper left")
-    axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{scene.units.force}]", title="force of the joint")
+    axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{run.force_unit}]", title="force of the joint")
     axes.set(xlim=(min(delta), None), ylim=(min(P), None))
     axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)
     gap = gap_name(scene.joint.dR, "ΔR")
     axes.secondary_xaxis("top", **_over(abs(scene.joint.dR))).set_xlabel(f"δ / {gap}")
-    axes.secondary_yaxis("right", **_over(scene.E_star * scene.joint.radius)).set_ylabel("P / (E* R)")
+    unit = scene.E_star * scene.joint.radius * scene.thickness
+    axes.secondary_yaxis("right", **_over(unit)).set_ylabel("P / (E* R)")
 
 
 def arc_panel(axes: Any, run: Run) -> None:
@@ -75,7 +76,7 @@ def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
         values, label, cmap = 100 * fields.peeq, "equivalent plastic strain [%]", "inferno_r"
     gap = max(0.0, factor * scene.joint.dR)
     right, low = min(1.6 * R + gap, scene.joint.W), -min(1.9 * R + gap, scene.joint.W)
-    high = right if ring else 0.06 * R
+    high = right if ring or scene.pin.whole else 0.06 * R
     corners = x[fields.cells[:, :3]]
     near = (corners.max(axis=1) > [0, low]).all(axis=1) & (corners.min(axis=1) < [right, high]).all(axis=1)
     # in a ring the core on which the load acts does not count for the range of colours
