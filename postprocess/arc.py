@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -13,7 +14,6 @@ from archord.postprocess.curve import RunCurve
 from archord.presets.arc import ArcProfile
 from archord.presets.edge import PER_STEP, SurfaceProfile
 from archord.scene.errors import InputError
-from archord.scene.scene import Scene
 
 _FIXED, _PER_STEP = ("s", "weight", "X"), (*PER_STEP, "slip")  # of general runs
 
@@ -52,11 +52,12 @@ def _read(
         raise InputError(f"{path}: cannot be read as the contact of a run.") from None
 
 
-def undeformed(arc: ArcProfile, side: str, scene: Scene) -> Array:
-    """Points ``(n, q, 2)`` of the ``side`` of ``scene`` before it is loaded: on its circle, in the mesh's frame.
+def undeformed(profile: ArcProfile | SurfaceProfile, side: str, scene: Any) -> Array:
+    """Points ``(n, q, 2)`` of a surface before it is loaded; of a joint's ``side`` on its circle, in the mesh's frame.
 
     The hole's centre is the origin. So is the pin's in a ring; in a block it touches the hole, ``(0, -dR)``.
     """
-    g = scene.joint
-    centre = -g.pin_depth if side == "pin" else 0.0
-    return np.stack([arc.radius * np.sin(arc.angle), centre - arc.radius * np.cos(arc.angle)], axis=-1)
+    if isinstance(profile, SurfaceProfile):
+        return profile.X
+    centre, angle = -scene.joint.pin_depth if side == "pin" else 0.0, profile.angle
+    return np.stack([profile.radius * np.sin(angle), centre - profile.radius * np.cos(angle)], axis=-1)

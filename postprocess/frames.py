@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from archord.postprocess.arc import undeformed
-from archord.presets.edge import SurfaceProfile
 
 _TEXT = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
 
@@ -53,7 +52,7 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
     units |= {"angle": "rad"} | dict.fromkeys(("pressure", "raw_pressure"), scene.units.stress)
     parts = []
     for side, arc in arcs.items():
-        X = arc.X if isinstance(arc, SurfaceProfile) else undeformed(arc, side, scene)
+        X = undeformed(arc, side, scene)
         (x, y), moved = np.moveaxis(X, -1, 0), arc.coordinates - X
         facet = np.broadcast_to(np.arange(1, len(x) + 1)[:, None], x.shape)
         columns = {"facet": facet} | {

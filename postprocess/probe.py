@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from archord.materials.material import Array
+from archord.postprocess.arc import undeformed
 from archord.postprocess.fields import Fields
 from archord.scene.errors import InputError
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 CONTACT = {"pressure": "pressure", "facet_pressure": "pressure", "gap": "gap"}
 _ROUND = 1e-3  # of the radius, by which nodes may miss the circle of an arc
 _SMOOTH = 0.9  # cosine of the angle between facets without a corner
+_NOTHING = 1e-9  # of the largest force of a run: round-off
 _SAMPLES = 201  # on a line
 
 
@@ -38,7 +40,7 @@ class Probe:
     force: float
     by: str
     x: Array  # (n, 2) undeformed
-    s: Array  # (n,) along each piece of the edge
+    s: Array  # (n,) along each piece of the edge, the body on its left; of arcs the radius times the angle
     values: Array  # (n,)
     angle: Array | None = None  # (n,) of arcs: degrees about their centre, counterclockwise from the x axis
 
@@ -79,14 +81,7 @@ def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
     facet, which scatters less where bodies yield. Raises `InputError`."""
     head = (edge, quantity, _unit(run, quantity), step, *_driving(run, step))
     if quantity in CONTACT:
-        table = run.pressure(step, edge)
-        circle, weight, facet = _circle(table[["x", "y"]].to_numpy()), table["weight"], table["facet"]
-        if quantity == "facet_pressure":
-            weighted = table[["x", "y", "s", "pressure"]].mul(weight, axis=0).groupby(facet).sum()
-            table = weighted.div(weight.groupby(facet).sum(), axis=0)
-        x = table[["x", "y"]].to_numpy()
-        angle = None if circle is None else np.degrees(np.arctan2(*(x - circle[0]).T[::-1]))
-        return Probe(*head, x, table["s"].to_numpy(), table[CONTACT[quantity]].to_numpy(), angle)
+        return Probe(*head, *_contact(run, edge, quantity, step))
     from archord.geometry.curve import Curve  # with bases, which most readers of runs do without
 
     fields = run.fields(step)
@@ -99,6 +94,7 @@ def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
     s = curve.arc_length(np.array([0.0, 0.5, 1.0]))
     first = np.maximum.accumulate(np.where(s[:, 0] == 0, np.arange(len(rows)), 0))  # facet of each piece
     angle = begins[first, None] + np.degrees(s / radius)
+    s = s if radius == np.inf else np.radians(angle) * radius
     tangent, joined = _tangents(curve)
     values = {name: whole[rows] for name, whole in at_nodes(fields).items()}
     if fields.stress is not None:
@@ -110,6 +106,25 @@ def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
     shown[:, 2] = ~joined
     at = (fields.coordinates[rows], s, _one(values, quantity, run), *([angle] if radius < np.inf else []))
     return Probe(*head, *(array[shown] for array in at))
+
+
+def _contact(run: Run, edge: str, quantity: str, step: int) -> tuple[Array, Array, Array, Array | None]:
+    """Places, arc lengths, values and angles of the points of a surface, or of the means of its facets."""
+    arc = run.arc(step, edge)
+    x, s, values, share = undeformed(arc, edge, run.scene), arc.s, getattr(arc, CONTACT[quantity]), arc.weight
+    circle = _circle(x.reshape(-1, 2))
+    if quantity == "facet_pressure":
+        share = share / arc.width[:, None]
+        x, s, values = (np.einsum("fq,fq...->f...", share, array) for array in (x, s, values))
+    x, s, values = x.reshape(-1, 2), s.ravel(), values.ravel()
+    if circle is None:
+        return x, s, values, None
+    angle = np.degrees(np.arctan2(*(x - circle[0]).T[::-1])) % 360
+    if arc.width.sum() < 2 * np.pi * circle[1] * (1 - _ROUND):  # not all around: from its free end on
+        rising = np.sort(angle)
+        angle[angle < rising[np.argmax(np.diff(rising, prepend=rising[-1] - 360))]] += 360
+    order = np.argsort(angle)
+    return x[order], np.radians(angle[order]) * circle[1], values[order], angle[order]
 
 
 def probe_line(run: Run, line: Sequence[float], quantity: str, step: int) -> Probe:
@@ -154,12 +169,15 @@ def _unit(run: Run, quantity: str) -> str:
 
 def _driving(run: Run, step: int) -> tuple[float, str]:
     """The largest force of the loads at ``step``, per unit thickness, and the name of its load."""
-    if run.is_joint:
-        return run.columns["P"][step - 1] / run.scene.thickness, "P"
-    names = [load.name for load in run.scene.load if load.pressure is None and load.direction != "rotation"]
-    forces = {name: run.columns[f"{name} force"][step - 1] for name in names}
-    by = max(forces, key=lambda name: abs(forces[name]), default="")
-    return forces.get(by, 0.0) / run.scene.thickness, by
+    names = {"P": "P"}
+    if not run.is_joint:
+        pulls = [load.name for load in run.scene.load if load.pressure is None and load.direction != "rotation"]
+        names = {name: f"{name} force" for name in pulls}
+    forces = {by: np.array(run.columns[name]) for by, name in names.items()}
+    by = max(forces, key=lambda name: abs(forces[name][step - 1]), default="")
+    if not by or abs(forces[by][step - 1]) < _NOTHING * np.abs(forces[by]).max():
+        return 0.0, by
+    return float(forces[by][step - 1]) / run.scene.thickness, by
 
 
 def _oriented(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:

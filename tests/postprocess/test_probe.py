@@ -15,7 +15,7 @@ from archord.postprocess.export import export_csv, export_vtk
 REFERENCE = {0.1: (3.424, 3.78), 0.3: (3.072, 3.190)}
 
 
-def solved(folder, size, displacement, **shape):
+def solved(folder, size, displacement, analysis=None, **shape):
     """An elastic lug with a hole of radius 10, its half or whole, in as many steps as there are displacements."""
     lug = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
     lug |= {"element_size": size, "growth": 0.3, **shape}
@@ -31,7 +31,7 @@ def solved(folder, size, displacement, **shape):
         ],
         loads=[{"name": "pull", "on": "flat", "direction": "x", "displacement": displacement}],
         path={"steps": 1},
-        analysis={"symmetry": 2 if half else 1},
+        analysis={"symmetry": 2 if half else 1} | (analysis or {}),
         output={"points": True},
     )
     return archord.solve(scene, folder)
@@ -71,6 +71,32 @@ def test_the_stress_normal_to_an_edge_is_its_traction(lug):
     assert lug.probe("hole", "stress_xx").at(90) == pytest.approx(hoop.at(90), rel=1e-3)
     assert set(lug.points()) == {"coordinates", "stress"}
     assert "peeq" not in tensor
+
+
+def test_arc_length_on_a_circle_is_the_radius_times_the_angle(lug, runs):
+    """Counterclockwise, of stresses and of the contact, of a lug and of a joint, from the body's free end."""
+    for quantity in ("hoop", "pressure", "facet_pressure", "gap"):
+        for edge, radius in (("hole", 10.0), ("pin", 9.9)):
+            probe = lug.probe(edge, quantity)
+            np.testing.assert_allclose(probe.s, radius * np.radians(probe.angle), rtol=1e-4)
+            assert (np.diff(probe.s) > -1e-12).all()
+            x = probe.x - [0.1 * (edge == "pin"), 0.0]
+            np.testing.assert_allclose(np.degrees(np.arctan2(*x.T[::-1])), probe.angle, atol=1e-6)
+    angle = archord.load(runs["coarse"]).probe("hole", "pressure").angle
+    assert 270 < angle[0] < angle[-1] < 360
+
+
+def test_before_the_first_touch_there_is_nothing_to_see_and_nothing_breaks(tmp_path, capsys, refused):
+    """No pressure, no stress, and no factor over a force that is round-off; afterwards all of it."""
+    run = solved(tmp_path / "run", 2.0, [-0.02, 0.1])
+    for quantity in ("hoop", "pressure", "facet_pressure"):
+        asked = ["probe", str(run.folder), "--edge", "hole", "--quantity", quantity, "--step", "1"]
+        assert command([*asked, "-o", str(tmp_path / f"{quantity}.png")]) == 0
+        assert not run.probe("hole", quantity, step=1).values.any()
+    assert "pull = 0 per unit thickness" in capsys.readouterr().out
+    assert "has no factor over a section of 20 under a force of 0" in refused([*asked, "--over", "20"])
+    assert command(["compare", *2 * [str(run.folder)], "-o", str(tmp_path / "compare.png")]) == 0
+    assert command(["show", str(run.folder), "-o", str(tmp_path / "show.png")]) == 0
 
 
 def test_a_line_crosses_bodies_and_leaves_gaps_out(lug):
@@ -137,6 +163,8 @@ def test_general_runs_are_shown_compared_and_exported(lug, tmp_path, capsys):
     out = capsys.readouterr().out
     assert "pull force [N/mm]" in out
     assert "largest difference" in out
+    assert "compared step by step: all runs went through the same load factors." in out
+    assert " curved triangles of degree 2, " in out
     assert "plastic strain first" not in out
     assert len(export_csv(lug, tmp_path / "csv")) == 2
     import meshio
