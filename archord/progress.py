@@ -120,7 +120,7 @@ class Progress:
         """Say what is going to be solved."""
         if not self.by_mesh:
             ranks = f"{joint.comm.size} rank{'s' if joint.comm.size > 1 else ''}"
-            self.print(f"{self.view.title}: {joint.n_cells} cells, {joint.n_dofs} dofs, {ranks}")
+            self.print(f"{self.view.title}: {joint.n_cells} {joint.cell_kind}, {joint.n_dofs} dofs, {ranks}")
             self._print_heading()
         elif self.shown:
             self._bar.reset(self._task, description=f"{joint.n_dofs} dofs")

@@ -110,7 +110,7 @@ def _joint(run: Run) -> Iterable[tuple[str, str]]:
     yield "", f"plane {a.plane}, contact {a.kinematics}, E* = {scene.E_star:g} {stress}"
     for name, body in (("pin", scene.pin), ("block", scene.block)):
         yield name, ", ".join(f"{key} = {value}" for key, value in body.model_dump(exclude_none=True).items())
-    counts = f"{mesh.get('cells', '?')} curved triangles of degree {a.degree}, {mesh.get('dofs', '?')} dofs"
+    counts = f"{mesh.get('cells', '?')} {mesh.get('kind', 'cells')} of degree {a.degree}, {mesh.get('dofs', '?')} dofs"
     yield "mesh", f"{counts}; ranks: {run.summary.get('ranks', '?')}"
 
 
@@ -121,7 +121,8 @@ def _problem(run: Run) -> Iterable[tuple[str, str]]:
         for part in getattr(scene, kind):
             said = part.model_dump(exclude_none=True, exclude={"name"}).items()
             yield f"{kind} {part.name}", shortened(", ".join(f"{key} = {value}" for key, value in said if value))
-    counts = f"{mesh.get('cells', '?')} cells of degree {scene.analysis.degree}, {mesh.get('dofs', '?')} dofs"
+    degree, kind = scene.analysis.degree, mesh.get("kind", "cells")
+    counts = f"{mesh.get('cells', '?')} {kind} of degree {degree}, {mesh.get('dofs', '?')} dofs"
     yield "mesh", f"{counts}; ranks: {run.summary.get('ranks', '?')}"
 
 
@@ -138,8 +139,8 @@ def _loads(run: Run) -> Table:
 def _history(run: Run) -> Table:
     """The steps: load, force, pressure, angle, plastic strain, cost."""
     unit, h = run.scene.units, run.columns
-    table = Table("step", f"delta [{unit.length}]", "delta/dR", f"P [{unit.force}]", "P/(E* R)", f"p0 [{unit.stress}]",
-                  "p0/E*", "eps [°]", "PEEQ max", "iterations", "cutbacks", "seconds")  # fmt: skip
+    table = Table("step", f"delta [{unit.length}]", "delta/dR", f"P [{run.force_unit}]", "P/(E* R)",
+                  f"p0 [{unit.stress}]", "p0/E*", "eps [°]", "PEEQ max", "iterations", "cutbacks", "seconds")  # fmt: skip
     for k in range(run.steps):
         table.add(
             f"{h['step'][k]:g}",
@@ -155,7 +156,7 @@ def _history(run: Run) -> Table:
 def _peaks(run: Run) -> str:
     """Largest values over the run, and where it first yielded."""
     h, said = run.columns, []
-    shown = {"P": run.scene.units.force, "p0": run.scene.units.stress, "eps": "rad", "peeq_max": ""}
+    shown = {"P": run.force_unit, "p0": run.scene.units.stress, "eps": "rad", "peeq_max": ""}
     if not run.is_joint:
         units, ends = run.history.attrs["units"], (" force", " largest pressure", " peeq_max")
         shown = {name: units.get(name, "") for name in h if name.endswith(ends)}
@@ -203,9 +204,11 @@ def _percent(relative: float) -> str:
 
 def _note(comparison: Comparison) -> str:
     """How the runs were compared."""
+    joints = comparison.runs[0].is_joint
+    loads = "displacements" if joints else "load factors"
     if comparison.step_by_step:
-        return "compared step by step: all runs went through the same displacements."
-    note = "compared over the first loading of all runs, at displacements of the first"
+        return f"compared step by step: all runs went through the same {loads}."
+    note = f"compared over {'the first loading' if joints else 'the common path'} of all runs, at {loads} of the first"
     return f"{note}; ~: between steps, by a monotone cubic." if comparison.interpolated.any() else f"{note}."
 
 

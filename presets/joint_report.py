@@ -112,6 +112,7 @@ def sizes(system: System) -> dict[str, Any]:
     lengths = {name: side.facet_lengths() for name, side in system.sides.items()}
     return {
         "cells": system.n_cells,
+        "kind": system.cell_kind,
         "dofs": system.n_dofs,
         "contact_facets": {name: len(length) for name, length in lengths.items()},
         "element_size_on_arc": {name: [float(length.min()), float(length.max())] for name, length in lengths.items()},

@@ -175,6 +175,12 @@ class System:
         return 2 * self.V.dofmap.index_map.size_global
 
     @property
+    def cell_kind(self) -> str:
+        """What its cells are, in words."""
+        mesh = self.V.mesh
+        return f"{'curved' if mesh.geometry.cmap.degree > 1 else 'straight'} {mesh.basix_cell().name}s"
+
+    @property
     def n_cells(self) -> int:
         """Number of cells."""
         return self.problem.mesh.mesh.topology.index_map(2).size_global
