@@ -140,7 +140,7 @@ def _history(run: Run) -> Table:
     """The steps: load, force, pressure, angle, plastic strain, cost."""
     unit, h = run.scene.units, run.columns
     table = Table("step", f"delta [{unit.length}]", "delta/dR", f"P [{run.force_unit}]", "P/(E* R)",
-                  f"p0 [{unit.stress}]", "p0/E*", "eps [°]", "PEEQ max", "iterations", "cutbacks", "seconds")  # fmt: skip
+                  f"p0 [{unit.stress}]", "p0/E*", "eps [°]", "PEEQ max", *_WHOLE)  # fmt: skip
     for k in range(run.steps):
         table.add(
             f"{h['step'][k]:g}",
