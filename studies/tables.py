@@ -131,8 +131,10 @@ def heading(key: str, scene: Scene) -> str:
     section, _, name = key.partition(".")
     extra = type(getattr(scene, section)).model_fields[name].json_schema_extra
     kind = extra.get("unit") if isinstance(extra, dict) else None
+    if not kind:
+        return key
     unit = scene.units.force_of(scene.analysis.thickness) if kind == "force" else getattr(scene.units, str(kind))
-    return f"{key} [{unit}]" if kind else key
+    return f"{key} [{unit}]"
 
 
 def shown(value: Any) -> str:
