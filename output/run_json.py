@@ -20,7 +20,7 @@ from petsc4py import PETSc
 
 from archord.output.disk import replace_file
 from archord.presets.account import Account
-from archord.presets.joint_report import APART
+from archord.presets.joint_account import APART
 from archord.report.timer import BEFORE_SOLVING
 from archord.report.version import VERSION
 from archord.solver.stepping import Step

@@ -1,4 +1,4 @@
-"""The joint of a scene as a problem to solve, and what is measured of it.
+"""The joint of a scene as a problem to solve.
 
 Half of the joint is modelled, cut at its symmetry axis. "block" is the paper's quarter joint, pressed at the pin's
 horizontal diameter; "ring" is half a whole pin in a ring, loaded by a force at the pin's core (Persson's joint).

@@ -34,7 +34,7 @@ class MeshFamily:
 
     Whoever solves them notes their ``dofs``."""
 
-    ratio, dofs = RATIO, 0
+    ratio, order, dofs = RATIO, 2.0, 0
 
     def __init__(self, scene: Scene, accuracy: float) -> None:
         self.scene = scene

@@ -4,7 +4,7 @@ import gmsh
 import pytest
 from mpi4py import MPI
 
-from archord.presets.general import GeneralAccount
+from archord.presets.general_account import GeneralAccount
 from archord.scene.errors import InputError
 from archord.scene.file import parse_any
 

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.case import paper_joint
-from archord.presets.general import GeneralAccount
+from archord.presets.general_account import GeneralAccount
 from archord.scene.errors import InputError
 from archord.scene.file import parse_any
 from archord.scene.shapes import general_joint

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from mpi4py import MPI
 
 from archord.benchmarks.case import E, paper_joint
-from archord.presets.arc import ArcProfile, arc_profiles
+from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
-from archord.presets.measures import Measures, Work, measure
+from archord.presets.joint_account import JointAccount
+from archord.presets.measures import Measures, Work
 from archord.scene.scene import Scene
 from archord.solver.coarse_start import coarse_start
 from archord.solver.stepping import march
@@ -31,18 +32,18 @@ class Solution:
 def solve(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, partitioner=None) -> Solution:
     """Solve without writing anything."""
     joint = Joint(scene, comm, partitioner=partitioner)
-    solution, work = Solution(joint, [], []), Work()
+    account, solution, work = JointAccount(joint), Solution(joint, [], []), Work()
 
     def target_done(step, position):
-        profiles = arc_profiles(joint)
+        profiles = account.profiles()
         solution.profiles.append(profiles)
-        solution.steps.append(measure(joint, solution.steps, step, profiles.values(), work.total, 0.0))
+        solution.steps.append(account.step(solution.steps, step, profiles, work.total, 0.0))
 
     march(
         joint.load_path(coarse=coarse_start(joint)),
         scene.targets,
         rules=scene.stepping,
-        substep_done=lambda load: work.add(joint.delta(), joint.forces()["pin"]),
+        substep_done=lambda load: work.add(*account.driven()),
         target_done=target_done,
     )
     return solution

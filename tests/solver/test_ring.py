@@ -8,7 +8,7 @@ from archord.benchmarks.persson import DR, UNLIKE, persson_joint, theory, unlike
 from archord.output.run import solve_scene
 from archord.postprocess.laws.elastic_laws import persson_pressure
 from archord.postprocess.laws.joint import LawJoint
-from archord.presets.joint_report import core_peeq
+from archord.presets.joint_account import core_peeq
 from archord.presets.measures import energy_balance
 from archord.scene.sections import Load
 from tests.solver.solving import solve
@@ -140,7 +140,7 @@ def test_the_work_of_an_interference_fit_counts_from_its_first_step_on():
     balances = []
     for steps in (8, 16):
         done = solve(persson_joint(-0.2, 0.08, steps)).steps
-        balances.append(energy_balance(done, press_fit=True))
+        balances.append(energy_balance(done, 1))
         assert energy_balance(done) > 0.2
     assert balances[1] < 0.6 * balances[0] < 0.05
-    assert energy_balance(done[:1], press_fit=True) is None
+    assert energy_balance(done[:1], 1) is None

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
 from hashlib import sha256
+from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,7 +13,8 @@ from mpi4py import MPI
 
 from archord.materials.material import Array
 from archord.presets.edge import PER_STEP, SurfaceProfile, surface_profiles
-from archord.presets.joint_report import sizes
+from archord.presets.joint_account import sizes
+from archord.presets.measures import Record, energy_balance
 from archord.presets.problem import as_input_error, general_problem, require_mirrored
 from archord.report.timer import Timer
 from archord.scene.problem import LIVE, ProblemScene
@@ -28,25 +28,8 @@ _ALONE = 0.1  # of the same, where the springs alone hold a body
 NEVER = "no surfaces ever touched: no load presses any of them together"
 
 
-@dataclass(frozen=True)
-class Record:
-    """One accepted output step of the whole, at the load factor ``at``; ``values`` by the names of columns."""
-
-    step: int
-    at: float
-    values: dict[str, float]
-    contact_area: float
-    elastic_energy: float
-    plastic_dissipation: float
-    work: float
-    force_balance: float
-    iterations: int
-    cutbacks: int
-    seconds: float
-
-
 class GeneralAccount:
-    """The account of the problem that ``scene`` states (see `Account`). Collective; raises `InputError`."""
+    """As `JointAccount`, of the problem that ``scene`` states. Collective; raises `InputError`."""
 
     record: ClassVar[type] = Record
     fixed: ClassVar[tuple[str, ...]] = ("s", "weight", "X")
@@ -70,16 +53,18 @@ class GeneralAccount:
                 require_facing(self.system)
         self._supports = list(dict.fromkeys(s.name for s in problem.supports if s.name not in self.system.drive_names))
 
-    def columns(self) -> list[tuple[str, Callable[[Record], float | int]]]:
-        """Loads, supports, interactions, bodies, then energies and what the step cost."""
-        units, thickness = self.scene.units, self.scene.analysis.thickness
-        energy = units.energy_of(thickness)
-        first = [("step", _attribute("step")), ("load_factor", _attribute("at"))]
-        named = [(f"{name} [{unit}]" if unit else name, partial(_value, name)) for name, unit in self._units().items()]
-        energies = ("elastic_energy", "plastic_dissipation", "work")
-        last = [(f"{name} [{energy}]", _attribute(name)) for name in energies]
-        last += [(name, _attribute(name)) for name in ("force_balance", "iterations", "cutbacks")]
-        return [*first, *named, *last, ("seconds [s]", _attribute("seconds"))]
+    def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
+        """Headings of history.csv and their values: loads, supports, interactions, bodies, energies, what the step
+        cost."""
+        energy = self.scene.units.energy_of(self.scene.analysis.thickness)
+        columns: list[tuple[str, Callable[[Any], float | int]]]
+        columns = [("step", attrgetter("step")), ("load_factor", attrgetter("at"))]
+        for name, unit in self._units().items():
+            columns.append((f"{name} [{unit}]" if unit else name, itemgetter(name)))
+        for name in ("elastic_energy", "plastic_dissipation", "work"):
+            columns.append((f"{name} [{energy}]", attrgetter(name)))
+        columns += [(name, attrgetter(name)) for name in ("force_balance", "iterations", "cutbacks")]
+        return [*columns, ("seconds [s]", attrgetter("seconds"))]
 
     def _units(self) -> dict[str, str]:
         """Units of all values, by name and in order."""
@@ -116,7 +101,7 @@ class GeneralAccount:
         return surface_profiles(self.system)
 
     def step(
-        self, before: Sequence[Record], step: Step, profiles: Mapping[str, SurfaceProfile], work: float, seconds: float
+        self, before: Sequence[Record], step: Step, profiles: Mapping[str, Any], work: float, seconds: float
     ) -> Record:
         """The record of the last accepted state. Collective."""
         system, values = self.system, list[float]()
@@ -164,7 +149,7 @@ class GeneralAccount:
         """What to warn of before the first step."""
         return self._warnings
 
-    def step_warnings(self, m: Record, profiles: Mapping[str, SurfaceProfile], residual: float) -> list[str]:
+    def step_warnings(self, m: Record, profiles: Mapping[str, Any], residual: float) -> list[str]:
         """What to warn of after the step ``m``. Collective."""
         said = []
         for name, profile in profiles.items():
@@ -190,19 +175,6 @@ class GeneralAccount:
         return "", [NEVER] if self.scene.interaction and not any(m.contact_area for m in steps) else []
 
     def energy_balance(self, steps: Sequence[Record]) -> float | None:
-        """How far work and stored and dissipated energy of the last of the ``steps`` are apart, over the largest work;
-        where interferences arise first, from the end of their stage on."""
+        """See `energy_balance`; where interferences arise first, from the end of their stage on."""
         fit = self.scene.path.fit_steps if self.scene.fits else 0
-        if len(steps) <= fit:
-            return None
-        missing = [m.work - m.elastic_energy - m.plastic_dissipation for m in (steps[fit - 1], steps[-1])]
-        work = max(abs(m.work) for m in steps)
-        return abs(missing[1] - (missing[0] if fit else 0.0)) / work if work else 0.0
-
-
-def _attribute(name: str) -> Callable[[Record], float | int]:
-    return lambda record: getattr(record, name)
-
-
-def _value(name: str, record: Record) -> float:
-    return record.values[name]
+        return energy_balance(steps, fit, contact=bool(self.scene.interaction))

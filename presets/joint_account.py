@@ -1,0 +1,185 @@
+"""The account of a joint: its steps, what run.json says of its mesh and model, and what its user is warned of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from functools import partial
+from operator import attrgetter
+from typing import Any, ClassVar
+
+import numpy as np
+from mpi4py import MPI
+
+from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.presets.arc import SYMMETRY, ArcProfile, arc_profiles, peak_pressure, semi_angle
+from archord.presets.edge import PER_STEP
+from archord.presets.joint import Joint
+from archord.presets.measures import Measures, energy_balance
+from archord.solver.stepping import Step
+from archord.solver.system import System
+
+_FEW_FACETS = 5
+_ROUGH = 0.01  # of the clearance
+APART = (
+    "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; give a "
+    "displacement or a force above 0 if it should"
+)
+UNSEEN = (
+    "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
+    "reduce joint.element_size or increase the load"
+)
+
+
+class JointAccount:
+    """The account of a ``system`` that is a joint: records of its steps, and of contact.h5 the arrays that are
+    ``fixed`` and those that change ``per_step``."""
+
+    record: ClassVar[type] = Measures
+    fixed: ClassVar[tuple[str, ...]] = ("s", "angle", "weight")
+    per_step: ClassVar[tuple[str, ...]] = PER_STEP
+
+    def __init__(self, system: Joint) -> None:
+        self.system, self.scene = system, system.scene
+
+    def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
+        """Headings of history.csv and their values: every measure in the scene's units, and dimensionless beside it."""
+        scene, R, dR, E = self.scene, self.scene.joint.radius, self.scene.joint.dR, self.scene.E_star
+        length, t, thickness = scene.units.length, scene.thickness, scene.analysis.thickness
+        force, energy = scene.units.force_of(thickness), scene.units.energy_of(thickness)
+        scales = {
+            "delta": ("dR", dR, length),
+            "P": ("(E* R)", E * R * t, force),
+            "p0": ("E*", E, scene.units.stress),
+            "eps": ("", 1.0, "rad"),
+            "contact_area": ("R", R, length),
+            "peeq_integral": ("R2", R * R * t, f"{length}{3 if thickness else 2}"),
+            **dict.fromkeys(("elastic_energy", "plastic_dissipation", "work"), ("(E* R2)", E * R * R * t, energy)),
+            "seconds": ("", 1.0, "s"),
+        }
+        columns: list[tuple[str, Callable[[Any], float | int]]] = []
+        for name in [field.name for field in fields(Measures)]:
+            scale, divisor, unit = scales.get(name, ("", 1.0, ""))
+            columns.append((f"{name} [{unit}]" if unit else name, attrgetter(name)))
+            if scale:
+                columns.append((f"{name}/{scale}", partial(_over, name, divisor)))
+        return columns
+
+    def driven(self) -> tuple[float, float]:
+        """Displacement and force whose work is that of the load: delta and P. Collective."""
+        return self.system.delta(), self.system.drive_force("")
+
+    def profiles(self) -> dict[str, ArcProfile]:
+        """The contact along the arcs at the last evaluation, by side. Collective."""
+        return arc_profiles(self.system)
+
+    def step(
+        self, before: Sequence[Measures], step: Step, profiles: Mapping[str, Any], work: float, seconds: float
+    ) -> Measures:
+        """The measures of the last accepted state, which follows the steps ``before``. Collective."""
+        joint, arcs = self.system, list(profiles.values())
+        peeq, peeq_integral = joint.peeq()
+        stored, dissipated = joint.energies()
+        forces, delta = joint.forces(), joint.delta()
+        P = forces["pin"]
+        area = SYMMETRY * float(np.mean([(p.in_contact * p.width).sum() for p in arcs]))
+        at_rest = 0.0 if area else self.scene.E_star * self.scene.thickness * abs(delta)
+        scale = max(abs(P), *(abs(m.P) for m in before), at_rest)
+        eps = float(np.mean([semi_angle(p) for p in arcs]))
+        return Measures(
+            step=len(before) + 1,
+            delta=delta,
+            P=P,
+            p0=peak_pressure(arcs, eps),
+            eps=eps,
+            contact_area=area,
+            peeq_max=peeq,
+            peeq_integral=peeq_integral,
+            elastic_energy=stored,
+            plastic_dissipation=dissipated,
+            work=work,
+            force_balance=max(abs(f - P) for f in forces.values()) / scale if scale else 0.0,
+            iterations=step.iterations,
+            cutbacks=step.cutbacks,
+            seconds=seconds,
+        )
+
+    def facts(self) -> dict[str, dict[str, Any]]:
+        """Sizes of the mesh and what was made of the scene, for run.json."""
+        shares = [pair.share for pair in self.system.contact.pairs]
+        return {"mesh": sizes(self.system), "model": {"E_star": self.scene.E_star, "contact_shares": shares}}
+
+    def warnings(self) -> list[str]:
+        """A warning if the parabolic facets depart too much from their circles for the clearance.
+
+        A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``. Equal facets
+        that face each other are off alike, which leaves the gap as it is.
+        """
+        g = self.scene.joint
+        if g.size_ratio == 1 and not self.scene.pin.rigid:
+            return []
+        longest = max(side.facet_lengths().max() for side in self.system.sides.values())
+        off = (1 - np.cos(longest / g.radius / 2)) ** 2 / 8 * g.radius / abs(g.dR)
+        said = f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"
+        return [said] if off > _ROUGH else []
+
+    def step_warnings(self, m: Measures, profiles: Mapping[str, Any], residual: float) -> list[str]:
+        """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
+        said, squashed = [], core_peeq(self.system)
+        if self.scene.joint.arc_end < np.pi and any(p.in_contact[-1] > 0 for p in profiles.values()):
+            said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
+        touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
+        if m.contact_area and touching < _FEW_FACETS:
+            facets = "facet" if touching == 1 else "facets"
+            said.append(f"only {touching} {facets} in contact; a smaller element_size would resolve it")
+        if squashed > 0:
+            said.append(
+                f"the pin yields where the force is applied, with PEEQ up to {squashed:.1e} in its core, and delta, "
+                "the mean displacement of the core, contains by how much it is squashed there; a larger "
+                "load.core_radius would spread the force"
+            )
+        if abs(m.delta) > 0.1 * self.scene.joint.radius:
+            said.append("delta exceeds 0.1 R, too much for small-strain theory")
+        if residual > 1e-8 and m.contact_area:
+            said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
+        if m.force_balance > 1e-8:
+            said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")
+        return said
+
+    def ending(self, steps: Sequence[Measures]) -> tuple[str, list[str]]:
+        """Why a run that came to its end does not count as done, as no contact point noticed that the bodies are
+        pressed together, or nothing; and a warning where they never were."""
+        if any(m.contact_area for m in steps):
+            return "", []
+        return (UNSEEN, []) if any(m.delta > 0 for m in steps) else ("", [APART])
+
+    def energy_balance(self, steps: Sequence[Measures]) -> float | None:
+        """See `energy_balance`; a pin too large for its hole is pressed in by the first step."""
+        return energy_balance(steps, fit=int(self.scene.joint.dR < 0))
+
+
+def _over(name: str, divisor: float, m: Measures) -> float:
+    return getattr(m, name) / divisor
+
+
+def sizes(system: System) -> dict[str, Any]:
+    """Sizes of the mesh for run.json."""
+    lengths = {name: side.facet_lengths() for name, side in system.sides.items()}
+    return {
+        "cells": system.n_cells,
+        "kind": system.cell_kind,
+        "dofs": system.n_dofs,
+        "contact_facets": {name: len(length) for name, length in lengths.items()},
+        "element_size_on_arc": {name: [float(length.min()), float(length.max())] for name, length in lengths.items()},
+    }
+
+
+def core_peeq(joint: Joint) -> float:
+    """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a block. Collective."""
+    if not joint.problem.loads or joint.scene.pin.yield_stress is None:
+        return 0.0
+    cells, points = joint.bulk.histories()[min(joint.problem.mesh.cell_tags("pin"))]
+    X, _ = bulk_quadrature(joint.V.mesh.basix_cell(), joint.bulk.degree)
+    x = cell_basis(joint.V.mesh, joint.bulk.degree, cells, X).point
+    core = np.linalg.norm(x, axis=-1).ravel() < joint.scene.load.core_radius * joint.scene.joint.radius
+    return joint.comm.allreduce(float(np.asarray(points.peeq)[core].max(initial=0.0)), op=MPI.MAX)
