@@ -131,21 +131,22 @@ def difference(one: Curve, other: Curve, largest: float) -> float:
     return apart / largest if largest else float(apart > 0)
 
 
-def mesh_error(curves: Sequence[Curve], ratio: float) -> float | None:
+def mesh_error(curves: Sequence[Curve], ratio: float, highest: float = _HIGHEST) -> float | None:
     """Relative error of the last of ``curves``, from coarse to fine, the element size falling by ``ratio`` each time.
 
     A curve is one number for each output step: the forces on a pin that is displaced, its displacements under forces.
-    The order is 3 in the mean, but differences scatter by a factor of two or three, as the contact ends anywhere in an
-    element. So `richardson` takes that of the last two differences within 1.5 and 2, 2 if there is one; and where the
-    last difference is small by luck, the one before, at order 3, says what the error is at least. None with one curve.
+    The order of joints is 3 in the mean, but differences scatter by a factor of two or three, as the contact ends
+    anywhere in an element. So `richardson` takes that of the last two differences within 1.5 and ``highest``, which it
+    is if there is one; and where the last difference is small by luck, the one before, at order 3, says what the error
+    is at least. None with one curve.
     """
     if len(curves) < 2:
         return None
     largest = float(np.abs(curves[-1]).max())
     d = [difference(a, b, largest) for a, b in pairwise(curves)]
-    p = _HIGHEST
+    p = highest
     if len(d) > 1 and d[-2] and d[-1]:
-        p = min(_HIGHEST, max(_SLOWEST, observed_order((1, ratio, ratio**2), d[-1], d[-2])))
+        p = min(highest, max(_SLOWEST, observed_order((1, ratio, ratio**2), d[-1], d[-2])))
     last = richardson(d[-1], ratio, p)
     return max([last, *(richardson(b / ratio**_USUAL, ratio, _HIGHEST) for b in d[-2:-1])])
 

@@ -145,7 +145,7 @@ class _Search:
             if self.step_error is None:
                 curve, level = self._choose_steps(mesh, curve, level)
             curves.append(curve)
-            self.mesh_error = mesh_error(curves, self.family.ratio)
+            self.mesh_error = mesh_error(curves, self.family.ratio, self.family.order)
             self._tell(replace(level, mesh_error=self.mesh_error))
             left = max(self.asked - (self.step_error or 0.0), self.asked / 2)
             if self.mesh_error is not None and self.mesh_error <= left:

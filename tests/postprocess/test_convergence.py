@@ -27,6 +27,15 @@ def test_estimates_of_a_known_order_are_cautious(order):
     assert mesh_error(curves[:1], 1.5) is None
 
 
+@pytest.mark.parametrize("ratio", [1.5, 2.0])
+def test_a_singular_corner_is_estimated_at_its_order(ratio):
+    """A clamped corner has order 1.42: two meshes and three know the error within a tenth."""
+    curves = [[1 + 0.1 * ratio ** (-1.42 * k)] for k in range(3)]
+    for n in (2, 3):
+        error = (curves[n - 1][0] - 1) / curves[n - 1][0]
+        assert 0.9 * error <= mesh_error(curves[:n], ratio, 1.5) <= 1.1 * error
+
+
 def test_errors_of_two_curves():
     """Two meshes that happen to agree say no more than the two before. Steps are of first order: the error of the finer
     curve is their difference, over the largest value."""
