@@ -1,4 +1,4 @@
-"""A solve and its progress on rank 0: a bar on a terminal, plain lines otherwise."""
+"""A solve and its progress on rank 0, line by line."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
-from archord.ranks import on_terminal
 from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
-from archord.scene.problem import ProblemScene
 from archord.scene.scene import Scene
 
 _LOADS_SHOWN = 3
@@ -24,139 +22,93 @@ if TYPE_CHECKING:
     from archord.output.run import Outcome
     from archord.studies.accuracy import Level
 
-
-class JointView:
-    """What is shown of a joint."""
-
-    heading = " delta/dR     P/(E* R)   eps/deg   p0/E*      PEEQ max"
-
-    def __init__(self, scene: Scene) -> None:
-        self.dR, self.E_star = scene.joint.dR, scene.E_star
-        self.force_unit = scene.E_star * scene.joint.radius * scene.thickness
-        kind = "elastic-plastic" if scene.plastic else "elastic"
-        self.title = f"{kind} joint, plane {scene.analysis.plane}, dR/R = {self.dR / scene.joint.radius:g}"
-        self.load = "P" if scene.force_controlled else "delta"
-        self.last, self.unit = ("delta/dR", self.dR) if scene.force_controlled else ("P/(E* R)", self.force_unit)
-
-    def short(self, m: Any) -> str:
-        """A step in few words."""
-        return f"delta/dR {m.delta / self.dR:.4g}, P/(E* R) {m.P / self.force_unit:.6g}"
-
-    def row(self, m: Any) -> str:
-        """A step as a row."""
-        P = round(m.P / self.force_unit, 7) + 0.0  # no minus before a zero
-        angle, p0 = math.degrees(m.eps), m.p0 / self.E_star
-        return f"{m.delta / self.dR:9.5g}  {P:11.7f}  {angle:8.3f}  {p0:9.6f}  {m.peeq_max:9.2e}"
+Column = tuple[str, str, Callable[[Any], float]]  # heading, format, and value of a step
 
 
-class ProblemView:
-    """What is shown of a general problem: displacement and force of each load."""
+def _shown(scene: AnyScene) -> tuple[str, list[Column]]:
+    """What is solved in words, and the columns of its steps: of a general scene displacement and force of each load."""
+    kind, plane = "elastic-plastic" if scene.plastic else "elastic", f"plane {scene.analysis.plane}"
+    if isinstance(scene, Scene):
+        dR, R, E_star = scene.joint.dR, scene.joint.radius, scene.E_star
+        unit = E_star * R * scene.thickness
+        return f"{kind} joint, {plane}, dR/R = {dR / R:g}", [
+            ("delta/dR", "9.5g", lambda m: m.delta / dR),
+            ("P/(E* R)", "11.7f", lambda m: round(m.P / unit, 7) + 0.0),  # no minus before a zero
+            ("eps/deg", "8.3f", lambda m: math.degrees(m.eps)),
+            ("p0/E*", "9.6f", lambda m: m.p0 / E_star),
+            ("PEEQ max", "9.2e", lambda m: m.peeq_max),
+        ]
 
-    load, last, unit = "load factor", "last value", 1.0
+    def value(name: str) -> Column:
+        return name, f"{max(14, len(name))}.6g", lambda m: m.values[name]
 
-    def __init__(self, scene: ProblemScene) -> None:
-        kind = "elastic-plastic" if scene.plastic else "elastic"
-        bodies = "1 body" if len(scene.body) == 1 else f"{len(scene.body)} bodies"
-        self.title = f"{bodies}, {kind}, plane {scene.analysis.plane}"
-        loads = [load.name for load in scene.load][:_LOADS_SHOWN]
-        self.columns = [f"{name} {what}" for name in loads for what in ("displacement", "force")]
-        self.heading = "  ".join(["load factor", *(f"{name:>14s}" for name in self.columns), " PEEQ max"])
+    def peeq(m: Any) -> float:
+        return max((value for name, value in m.values.items() if name.endswith("peeq_max")), default=0.0)
 
-    def short(self, m: Any) -> str:
-        """A step in few words."""
-        return f"load factor {m.at:.4g}, {self.columns[1]} {m.values[self.columns[1]]:.6g}"
-
-    def row(self, m: Any) -> str:
-        """A step as a row."""
-        largest = max((value for name, value in m.values.items() if name.endswith("peeq_max")), default=0.0)
-        shown = (f"{m.values[name]:{max(14, len(name))}.6g}" for name in self.columns)
-        return "  ".join([f"{m.at:11.5g}", *shown, f"{largest:9.2e}"])
+    loads = [value(f"{load.name} {what}") for load in scene.load[:_LOADS_SHOWN] for what in ("displacement", "force")]
+    bodies = "1 body" if len(scene.body) == 1 else f"{len(scene.body)} bodies"
+    columns: list[Column] = [("load factor", "11.5g", lambda m: m.at), *loads, ("PEEQ max", "9.2e", peeq)]
+    return f"{bodies}, {kind}, {plane}", columns
 
 
 class Progress:
-    """Reports steps as they are accepted; of a scene with an accuracy mesh after mesh, and off a terminal only the
-    steps of the last one, at the end. ``done`` steps are there already."""
+    """Reports steps as they are accepted; of a scene with an accuracy mesh after mesh, and only the steps of the last
+    one, at the end."""
 
-    def __init__(self, scene: AnyScene, silent: bool, done: int = 0) -> None:
-        self.view = JointView(scene) if isinstance(scene, Scene) else ProblemView(scene)
-        self.scene, self.by_mesh = scene, scene.analysis.accuracy is not None
-        self.silent, self.shown = silent, not silent and on_terminal()  # shown: as a bar
-        if self.shown:
-            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-            from rich.progress import Progress as Bar
-
-            columns = (MofNCompleteColumn(), BarColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-            self._bar = Bar(TextColumn("step"), *columns)
-            self._task = self._bar.add_task("meshing", total=len(scene.targets), completed=done)
+    def __init__(self, scene: AnyScene, silent: bool) -> None:
+        self.silent, self.by_mesh = silent, scene.analysis.accuracy is not None
+        self.title, self.columns = _shown(scene)
+        self.last, self.unit = "last value", 1.0
+        if isinstance(scene, Scene):
+            self.last, self.unit = "P/(E* R)", scene.E_star * scene.joint.radius * scene.thickness
+            if scene.force_controlled:
+                self.last, self.unit = "delta/dR", scene.joint.dR
         if self.by_mesh:
-            self.print(f"{self.view.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value")
-            costs = f"substeps     dofs  {self.view.last:>10s}  error of mesh  error of steps  seconds"
+            self.print(f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value")
+            costs = f"substeps     dofs  {self.last:>10s}  error of mesh  error of steps  seconds"
             self.print(f" mesh  elements/R  growth  {costs}")
 
-    def __enter__(self) -> Self:
-        """Show the bar."""
-        if self.shown:
-            self._bar.start()
-        return self
-
-    def __exit__(self, *what) -> None:
-        """Leave the bar as it is."""
-        if self.shown:
-            self._bar.stop()
-
-    def update(self, text: str, advance: int = 0) -> None:
-        """Put ``text`` beside the bar."""
-        if self.shown:
-            self._bar.update(self._task, advance=advance, description=text)
-
     def print(self, text: str) -> None:
-        """Print a line, above the bar."""
-        if self.shown:
-            self._bar.console.print(text, highlight=False)
-        elif not self.silent:
+        """Print a line."""
+        if not self.silent:
             print(text, flush=True)
 
-    def start(self, joint) -> None:
+    def start(self, system: Any) -> None:
         """Say what is going to be solved."""
         if not self.by_mesh:
-            ranks = f"{joint.comm.size} rank{'s' if joint.comm.size > 1 else ''}"
-            self.print(f"{self.view.title}: {joint.n_cells} {joint.cell_kind}, {joint.n_dofs} dofs, {ranks}")
-            self._print_heading()
-        elif self.shown:
-            self._bar.reset(self._task, description=f"{joint.n_dofs} dofs")
+            ranks = f"{system.comm.size} rank{'s' if system.comm.size > 1 else ''}"
+            self.print(f"{self.title}: {system.n_cells} {system.cell_kind}, {system.n_dofs} dofs, {ranks}")
+            self.print_headings()
 
-    def attempt(self, load: float, iterations: int) -> None:
-        """Show a solve that ended."""
-        self.update(f"{self.view.load} = {load:.6g}, {iterations} iterations")
-
-    def step(self, m) -> None:
+    def step(self, m: Any) -> None:
         """Show an accepted output step."""
-        self.update(f"{self.view.short(m)}, {m.iterations} iterations", advance=1)
         if not self.by_mesh:
-            self._print_step(m)
+            self.print_step(m)
 
     def level(self, level: Level) -> None:
         """Show a mesh that is solved."""
         mesh, steps = ("" if e is None else f"{e:.1e}" for e in (level.mesh_error, level.step_error))
         self.print(
             f"{level.mesh:5d}  {level.element_size:10.4g}  {level.growth:6.4g}  {level.substeps:8d}  {level.dofs:7d}  "
-            f"{level.last / self.view.unit:10.7f}  {mesh:>13s}  {steps:>14s}  {level.seconds:7.1f}"
+            f"{level.last / self.unit:10.7f}  {mesh:>13s}  {steps:>14s}  {level.seconds:7.1f}"
         )
 
     def finish(self, outcome: Outcome) -> None:
         """Show what is known only now."""
         if self.by_mesh:
-            self._print_heading()
+            self.print_headings()
             for m in outcome.steps:
-                self._print_step(m)
+                self.print_step(m)
 
-    def _print_heading(self) -> None:
-        if not self.shown:
-            self.print(f" step  {self.view.heading}  iterations  cutbacks")
+    def print_headings(self) -> None:
+        """Print the headings of steps."""
+        widths = ((name, int(form.partition(".")[0])) for name, form, _ in self.columns)
+        self.print("  ".join([" step", *(f"{name:>{width}s}" for name, width in widths), "iterations  cutbacks"]))
 
-    def _print_step(self, m) -> None:
-        if not self.shown:
-            self.print(f"{m.step:5d}  {self.view.row(m)}  {m.iterations:10d}  {m.cutbacks:8d}")
+    def print_step(self, m: Any) -> None:
+        """Print a step as a row."""
+        cells = (f"{value(m):{form}}" for _, form, value in self.columns)
+        self.print("  ".join([f"{m.step:5d}", *cells, f"{m.iterations:10d}  {m.cutbacks:8d}"]))
 
 
 def solve_and_report(
@@ -187,15 +139,14 @@ def solve_and_report(
     from archord.report.timer import Timer
     from archord.studies.accuracy import solve_as_asked  # with all of dolfinx: bad input is told before
 
-    report = Progress(scene, silent or comm.rank != 0, start.checkpoint.step if start else 0)
+    report = Progress(scene, silent or comm.rank != 0)
     if report.by_mesh:
         options["on_level"] = report.level
     elif begun is not None:
         options["timer"] = Timer({"start-up": perf_counter() - begun})
-    options |= {"on_start": report.start, "on_step": report.step, "on_attempt": report.attempt}
+    options |= {"on_start": report.start, "on_step": report.step}
     try:
-        with report:
-            outcome = solve_as_asked(scene, folder, comm, start=start, **options)
+        outcome = solve_as_asked(scene, folder, comm, start=start, **options)
     except InputError:  # found by the mesh: nothing is left of a scene that is refused
         if new and comm.rank == 0:
             with suppress(OSError):

@@ -59,9 +59,3 @@ def _leave_together(code: int) -> None:
 
     if not arrived_before(MPI.COMM_WORLD, _PATIENCE):
         MPI.COMM_WORLD.Abort(code)
-
-
-def on_terminal() -> bool:
-    """Whether somebody watches stdout. Under a launcher nobody can tell: Open MPI gives its ranks a terminal of their
-    own even where it writes to a file itself."""
-    return sys.stdout.isatty() and not any(name in os.environ for name in _RANK)
