@@ -33,13 +33,14 @@ class Failure(RuntimeError):
 
 @dataclass(frozen=True)
 class Process:
-    """A ``command`` to be timed in its ``folder``, for ``limit`` seconds at most.
+    """A ``command`` to be timed in its ``folder``, for ``limit`` seconds at most; ``name`` tells it from others.
 
     ``read`` gives the result of a process that ended with code 0, and raises `Failure` if there is none. The files
     and folders ``clear`` of an earlier run are removed before. The first process of a ``kind`` runs once before all,
     untimed, so that what is compiled on first use is there.
     """
 
+    name: str
     command: tuple[str, ...]
     folder: Path
     read: Callable[[], Any] = lambda: None
@@ -77,16 +78,14 @@ class Timing:
         return sorted(self.runs, key=lambda run: run.seconds)[(len(self.runs) - 1) // 2]
 
 
-Said = Callable[[Process, int, str], None]
+Said = Callable[[str], None]
 
 
-def time_all(
-    processes: Sequence[Process], repeats: int, said: Said = lambda process, repeat, text: None
-) -> list[Timing]:
+def time_all(processes: Sequence[Process], repeats: int, said: Said = lambda sentence: None) -> list[Timing]:
     """Run every process ``repeats`` times, in turn, so that noise hits all alike; one that fails is not tried again.
 
-    ``said(process, repeat, sentence)`` follows every run (0: untimed). After Ctrl-C what was timed is kept, and the
-    others have a failure; it is raised again before the first result.
+    ``said(sentence)`` follows every run. After Ctrl-C what was timed is kept, and the others have a failure; it is
+    raised again before the first result.
     """
     timings = [Timing(process) for process in processes]
     kinds: set[Hashable] = {None}
@@ -109,13 +108,11 @@ def time_all(
 def _add(timing: Timing, repeat: int, said: Said) -> None:
     try:
         run = run_once(timing.process)
+        timing.runs += [run] if repeat else []
+        text = f"{run.seconds:.2f} s, {f'run {repeat}' if repeat else 'not counted'}"
     except Failure as failure:
-        timing.failure = str(failure)
-        said(timing.process, repeat, timing.failure)
-        return
-    if repeat:
-        timing.runs.append(run)
-    said(timing.process, repeat, f"{run.seconds:.2f} s")
+        text = timing.failure = str(failure)
+    said(f"{timing.process.name}: {text}")
 
 
 def run_once(process: Process) -> Run:

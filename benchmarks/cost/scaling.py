@@ -69,12 +69,12 @@ class Setting:
         scene.write_text(resolved(refined(SIZES[self.dofs], steps, strength)), encoding="utf-8")
         command = (*launcher(self.ranks), sys.executable, "-m", "archord", "solve", str(scene), "-o", str(run))
         read = (run / "run.json").read_text
-        return Process((*command, "--force", "-q"), folder, lambda: json.loads(read()), _A_DAY, kind=self.material)
+        command = (*command, "--force", "-q")
+        return Process(self.name, command, folder, lambda: json.loads(read()), _A_DAY, kind=self.material)
 
 
 def refined(size: float, steps: int, yield_stress: float | None = None) -> Scene:
-    """The paper's joint with elements of ``size`` on its arcs that grow in proportion, so that all such meshes are
-    alike."""
+    """The paper's joint with elements of ``size`` on its arcs that grow in proportion: all such meshes are alike."""
     return paper_joint(size, steps, yield_stress, joint={"growth": 6.25 * size})
 
 
@@ -106,10 +106,7 @@ def run(
     on the number of ranks. Raises `InputError`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    processes = [setting.process(folder) for setting in chosen]
-    timings = time_all(
-        processes, repeats, lambda process, repeat, text: said(f"{chosen[processes.index(process)].name}: {text}")
-    )
+    timings = time_all([setting.process(folder) for setting in chosen], repeats, said)
     pairs = list(zip(chosen, timings, strict=True))
     costs = [cost_of(setting, timing) for setting, timing in pairs if not timing.failure]
     return costs, [f"{setting.name}: {timing.failure}" for setting, timing in pairs if timing.failure] + unlike(costs)
@@ -136,27 +133,24 @@ def cost_of(setting: Setting, timing: Timing) -> Cost:
 
 def unlike(costs: Sequence[Cost]) -> list[str]:
     """A sentence for every force that depends on the number of ranks."""
-    found = ((cost, abs(cost["P"] / one["P"] - 1)) for cost in costs if (one := _alone(cost, costs)))
-    differing = ((cost, difference) for cost, difference in found if not difference <= SAME_FORCE)
-    return [f"{cost['name']}: P differs by {difference:.1e} from that on 1 rank" for cost, difference in differing]
+    found = ((cost["name"], abs(cost["P"] / one["P"] - 1)) for cost in costs if (one := _alone(cost, costs)))
+    return [f"{name}: P differs by {off:.1e} from that on 1 rank" for name, off in found if not off <= SAME_FORCE]
 
 
 def _alone(cost: Cost, costs: Sequence[Cost]) -> Cost | None:
     """The same joint on one rank."""
-    alike = (c for c in costs if (c["material"], c["dofs"], c["ranks"]) == (cost["material"], cost["dofs"], 1))
-    return next(alike, None)
+    return next((c for c in series(costs, cost["material"], 1) if c["dofs"] == cost["dofs"]), None)
 
 
 def series(costs: Sequence[Cost], material: str, ranks: int) -> list[Cost]:
     """Runs of one material on ``ranks`` ranks by size."""
-    found = (c for c in costs if (c["material"], c["ranks"]) == (material, ranks))
-    return sorted(found, key=lambda cost: cost["dofs"])
+    return sorted((c for c in costs if (c["material"], c["ranks"]) == (material, ranks)), key=lambda c: c["dofs"])
 
 
 def exponent(dofs: Sequence[float], values: Sequence[float]) -> float:
     """The power of ``dofs``, at least two, with which ``values`` grow: slope of a least-squares line through their
     logarithms."""
-    return float(np.polynomial.Polynomial.fit(np.log(dofs), np.log(values), 1).convert().coef[1])
+    return float(np.polyfit(np.log(dofs), np.log(values), 1)[0])
 
 
 def row(cost: Cost, costs: Sequence[Cost]) -> dict[str, object]:
@@ -177,8 +171,7 @@ def write(costs: Sequence[Cost], folder: Path) -> tuple[str, list[Path]]:
     powers of N with which time and memory grow, and the files."""
     if not costs:
         return "", []
-    ordered = sorted(costs, key=lambda cost: (cost["material"], cost["dofs"], cost["ranks"]))
-    rows = [row(cost, costs) for cost in ordered]
+    rows = [row(c, costs) for c in sorted(costs, key=lambda c: (c["material"], c["dofs"], c["ranks"]))]
     text = Table.of(rows).markdown()
     for material in ("elastic", "plastic"):
         if len(same := series(costs, material, 1)) > 1:

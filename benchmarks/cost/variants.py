@@ -83,7 +83,8 @@ class Variant:
             arguments = ["solve", f"{place.name}.toml", "-q", "-o", place.name]
         command = (*launcher(self.ranks), sys.executable, "-c", _PROBE, note.name, WITHOUT[self.without], *arguments)
         # what is there already would not be solved again; what is compiled on first use is counted in no run
-        return Process(command, folder, lambda: json.loads(note.read_text()), _A_DAY, (place.name,), kind=place.name)
+        read, name = (lambda: json.loads(note.read_text())), f"{self.case}, {self.name}"
+        return Process(name, command, folder, read, _A_DAY, (place.name,), kind=place.name)
 
     def folder(self, parent: Path) -> Path:
         """Its output folder below ``parent``."""
@@ -116,17 +117,12 @@ def run(
     Returns a row of entries for each, whose ratios are to the first of its set, run by run, the median; and a sentence
     for every failure and for everything loaded that is not used. Raises `InputError`.
     """
-
-    def told(process: Process, repeat: int, sentence: str) -> None:
-        variant = chosen[processes.index(process)]
-        said(f"{variant.case}, {variant.name}: {sentence}{'' if repeat else ' (not counted)'}")
-
     folder.mkdir(parents=True, exist_ok=True)
     processes = [variant.process(folder.resolve()) for variant in chosen]
     rows: list[dict[str, object]] = []
     faults: list[str] = []
     firsts: dict[str, Timing] = {}
-    for variant, timing in zip(chosen, time_all(processes, repeats, told), strict=True):
+    for variant, timing in zip(chosen, time_all(processes, repeats, said), strict=True):
         first = firsts.setdefault(variant.case, timing)
         if failure := timing.failure or first.failure:
             faults.append(f"{variant.case}, {variant.name}: {failure}")

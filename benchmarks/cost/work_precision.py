@@ -53,13 +53,8 @@ def run(
     """Time the points that fit ``only``, each ``repeats`` times and for ``limit`` seconds at most, in turn, below
     ``folder``; ``said`` follows each run. Raises `InputError`."""
     chosen = points(only)
-    processes = [point.process(folder, limit) for point in chosen]
-    names = {process.folder: point.name for process, point in zip(processes, chosen, strict=True)}
-
-    def told(process, repeat: int, sentence: str) -> None:
-        said(f"{names[process.folder]}: {sentence} ({f'{repeat} of {repeats}' if repeat else 'not counted'})")
-
-    return [Line(*pair) for pair in zip(chosen, time_all(processes, repeats, told), strict=True)]
+    timings = time_all([point.process(folder, limit) for point in chosen], repeats, said)
+    return [Line(*pair) for pair in zip(chosen, timings, strict=True)]
 
 
 def profile_error(pressure: Array, reference: Array) -> float:

@@ -66,8 +66,8 @@ class Point:
         """The process, for ``limit`` seconds at most, in a folder of its own below ``folder``, which is made."""
         place = (folder / slug(self.name)).resolve()
         place.mkdir(parents=True, exist_ok=True)
-        process = self.prepare(place)
-        return replace(process, limit=min(process.limit, limit), kind=(self.case, self.code, self.series))
+        process, kind = self.prepare(place), (self.case, self.code, self.series)
+        return replace(process, name=self.name, limit=min(process.limit, limit), kind=kind)
 
 
 def points(patterns: Sequence[str] = ()) -> list[Point]:
@@ -122,7 +122,7 @@ def _archord(scene: Scene, folder: Path) -> Process:
         }
 
     command = (sys.executable, "-m", "archord", "solve", "input.toml", "-o", "run", "--force", "--quiet")
-    return Process(command, folder, read)
+    return Process(OURS, command, folder, read)
 
 
 def _calculix(scene: Scene, elements: Any, folder: Path) -> Process:
@@ -158,4 +158,4 @@ def _peer(peer: Peer, case: str, size: float, order: int, steps: int, folder: Pa
         return {name: value for name, value in found.items() if value is not None}
 
     command = tuple(peer.command(case, size, order, steps, output))
-    return Process(command, folder, read, limit=peer.time_limit, clear=(output.name,))
+    return Process(peer.label, command, folder, read, limit=peer.time_limit, clear=(output.name,))

@@ -60,7 +60,7 @@ def process(scene: AnyScene, elements: Elements, folder: Path) -> Process:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.inp").write_text(deck(system, mesh, scene.targets), encoding="utf-8")
     old = tuple(f"deck.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d"))
-    return Process(("ccx", "deck"), folder, lambda: read_opinion(scene, system, mesh, folder), clear=old)
+    return Process("CalculiX", ("ccx", "deck"), folder, lambda: read_opinion(scene, system, mesh, folder), clear=old)
 
 
 def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) -> SecondOpinion:
@@ -176,7 +176,7 @@ def compare(scene: Path, folder: Path) -> Table:
     the difference of its stresses (root of the mean square over nodes, over that of archord's), and seconds. Raises
     `InputError` and `Failure`."""
     command = (sys.executable, "-m", "archord", "solve", str(scene.resolve()), "-o", "run", "--force", "--quiet")
-    ours = run_once(Process(command, folder, lambda: Run(folder / "run")))
+    ours = run_once(Process("archord", command, folder, lambda: Run(folder / "run")))
     theirs = run_once(replace(process(load_scene(scene), "quadratic", folder / "calculix"), limit=_LONG))
     table, run, opinion = Table("", "archord", "CalculiX", "difference", left=1), ours.result, theirs.result
 

@@ -46,7 +46,7 @@ def test_the_cost_is_that_of_the_run_in_the_middle():
     report = {"seconds": {"mesh": 1.0, "contact": 0.5, "assemble contact": 0.5, "checkpoint": 0.25}, "peak_memory": [1]}
     report |= {"totals": {"newton_iterations": 1, "factorisations": 1}, "mesh": {"dofs": 5000}}
     report |= {"model": {"E_star": 2.0}, "steps": [{"P": 1.0, "coarse_iterations": 3}]}
-    found = cost_of(Setting(5000, 1), Timing(Process((), None), [Run(s, s, 0, report) for s in (9.0, 5.0, 7.0)]))
+    found = cost_of(Setting(5000, 1), Timing(Process("a", (), None), [Run(s, s, 0, report) for s in (9.0, 5.0, 7.0)]))
     assert (found["total"], found["P"], found["coarse iterations"]) == (7.0, 0.5, 3)
     assert (found["parts"]["contact"], found["parts"]["rest"]) == (1.0, 4.75)
     assert set(found["parts"]) == {*PARTS, "rest"}

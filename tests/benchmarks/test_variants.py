@@ -84,7 +84,7 @@ def test_a_sweep_is_solved_on_each_number_of_ranks(tmp_path, monkeypatch):
 
 
 def test_ratios_are_those_of_the_pair_in_the_middle():
-    process = Process((), Path())
+    process = Process("a", (), Path())
     one = Timing(process, [Run(s, 8 * s, 0, None) for s in (2.0, 4.0, 20.0)])
     other = Timing(process, [Run(s, 2 * s, 0, None) for s in (1.0, 3.0, 2.0)])
     assert (ratio(one, other, "seconds"), ratio(one, other, "cpu")) == (2.0, 8.0)

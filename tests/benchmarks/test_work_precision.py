@@ -29,7 +29,7 @@ from archord.cli import run
 
 def line(code, size, seconds, P, failure="", **found):
     """A point that was run once and found this P, or failed."""
-    process = Process((), Path())
+    process = Process("a", (), Path())
     point = Point("elastic", code, "1.0", "s", size, 2, lambda folder: process)
     return Line(point, Timing(process, [Run(seconds, seconds, 10**8, {"P": P, "dofs": 100} | found)], failure))
 
