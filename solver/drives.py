@@ -28,7 +28,7 @@ from archord.solver.contact.surface import RigidSurface
 from archord.solver.problem import Body, Load, Mean, Problem, Rigid
 
 _LOAD_DEGREE = 6  # of the quadrature of distributed forces
-_MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
+MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
 _SAME_PLACE = 1e-9  # of the distance between two anchors
 
 
@@ -45,7 +45,7 @@ class Drives:
     def __init__(self, problem: Problem, V: fem.FunctionSpace, contact: Contact, stiffness: float) -> None:
         self.problem, self.V, self.comm, index_map = problem, V, V.mesh.comm, V.dofmap.index_map
         self.n_owned, self._n_local = index_map.size_local, index_map.size_local + index_map.num_ghosts
-        self._x, self._stiffness = V.tabulate_dof_coordinates()[:, :2], stiffness
+        self._x, self.stiffness = V.tabulate_dof_coordinates()[:, :2], stiffness
         self._drives = problem.all_drives
         self.names = names = [drive.name for drive in self._drives]
         self.rate, self.applied = (np.zeros((len(names), n, 2)) for n in (self._n_local, self.n_owned))
@@ -89,7 +89,7 @@ class Drives:
     def _weight(self, level: int, contact: Contact) -> float:
         """The unit of a level: one that moves a node by 1 at most, or whose forces are of the size of the stiffness."""
         if not self.moving[level]:
-            return self._stiffness / self.comm.allreduce(np.abs(self.applied[level]).sum())
+            return self.stiffness / self.comm.allreduce(np.abs(self.applied[level]).sum())
         largest = max(
             np.abs(self.rate[level]).max(initial=0.0), *(np.abs(d.rate[level]).max() for d in contact.rigid), 0
         )
@@ -115,25 +115,20 @@ class Drives:
         """The levels that are forces of the means ``name``."""
         return [self.names.index(mean.drive) for mean in self.problem.means if mean.name == name]
 
-    def held(self, body: Body, *, alone: bool = True) -> bool:
-        """Whether supports ``alone`` keep the ``body`` from moving rigidly; else whether they do with means while
-        drives without a prescribed displacement give way. Collective."""
+    def rigid_modes(self, body: Body) -> Array:
+        """The rigid motions ``(3, n_local, 2)`` of the ``body``: along x, along y, and turning. Collective."""
         nodes = np.unique(self.V.dofmap.list[self.problem.cells_of(body)])
         x = self._x[nodes] / self.comm.allreduce(np.abs(self._x[nodes]).max(initial=0.0), op=MPI.MAX)
-        modes = np.zeros((self._n_local, 2, 3))
-        modes[nodes, 0, 0] = modes[nodes, 1, 1] = 1.0
-        modes[nodes, 0, 2], modes[nodes, 1, 2] = -x[:, 1], x[:, 0]
-        fixed = self._holder >= 0
-        rows = np.hstack([modes[fixed], np.zeros((fixed.sum(), 0)) if alone else self.unknown_rate[:, fixed].T])
-        gram = self.comm.allreduce(rows.T @ rows)
-        released = np.linalg.pinv(gram[3:, 3:], rcond=_MOVABLE, hermitian=True)
-        stiffness = gram[:3, :3] - gram[:3, 3:] @ released @ gram[3:, :3]
-        if not alone:
-            along = np.tensordot(self.unknown_load / self._stiffness, modes[: self.n_owned], 2)
-            along = self.comm.allreduce(along)
-            stiffness += along.T @ along
-        smallest, _, largest = np.linalg.eigvalsh(stiffness)
-        return bool(smallest > _MOVABLE * largest)
+        modes = np.zeros((3, self._n_local, 2))
+        modes[0, nodes, 0] = modes[1, nodes, 1] = 1.0
+        modes[2, nodes] = np.stack([-x[:, 1], x[:, 0]], axis=1)
+        return modes
+
+    def held(self, body: Body) -> bool:
+        """Whether supports alone keep the ``body`` from moving rigidly. Collective."""
+        rows = self.rigid_modes(body)[:, self._holder >= 0]
+        smallest, _, largest = np.linalg.eigvalsh(self.comm.allreduce(rows @ rows.T))
+        return bool(smallest > MOVABLE * largest)
 
     def _anchors(self, bodies: Iterable[Body]) -> Array:
         """The rates ``(a, n_local, 2)`` of three anchors for each of the ``bodies`` that supports do not hold."""

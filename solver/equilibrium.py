@@ -29,7 +29,7 @@ from archord.solver.linear.bordered import Bordered
 from archord.solver.linear.choose import choose
 from archord.solver.linear.strategy import Facts
 from archord.solver.problem import Problem
-from archord.solver.stabilisation import Springs
+from archord.solver.stabilisation import RigidMotions, Springs
 from archord.solver.tangent import TangentMatrix
 
 
@@ -72,9 +72,8 @@ class Equilibrium:
         self.choice = choose(facts)
         self._factoriser = partial(self.choice.factoriser, V)  # of tangents of all displacements
         condense = self.choice.uses("condensed")
-        loose = [body for body in problem.bodies if problem.stabilise and not drives.held(body, alone=False)]
-        discs = problem.stabilise and any(disc.rate[drives.unknown].any() for disc in contact.rigid)
-        self.springs = Springs(drives, contact, loose, self._stiffest) if loose or discs else None
+        rigid = RigidMotions(drives, contact) if problem.stabilise else None
+        self.springs = Springs(rigid, self._stiffest) if rigid and len(rigid.free) else None
         self.tangent = TangentMatrix(bulk, contact, drives, self.springs, timer, condense=condense)
         self.border: Bordered | None = None
         with timer(BEFORE_SOLVING):
@@ -241,6 +240,8 @@ class Equilibrium:
         self.contact.search()
         self.evaluate()
         self._follow_pattern()
+        if self.springs:
+            self.springs.look()
 
     def commit(self) -> None:
         """Accept the last solve: bulk and contact keep their trial history."""

@@ -41,7 +41,8 @@ class LoadPath:
     The guess for a step is, where there is a ``coarse`` start, what a coarser mesh found. Else it extrapolates the last
     increment; where that fails elastic bodies start from the last state itself. Where the path starts or turns, or
     another drive takes over, the guess comes from the elastic solution, at the start from ``first_guess(load)``. Where
-    the bodies were not in equilibrium before the first step (a press fit), its increment says nothing about the next.
+    the bodies were not in equilibrium before the first step (a press fit), or before the last one were loose, its
+    increment says nothing about the next.
     """
 
     def __init__(
@@ -94,10 +95,11 @@ class LoadPath:
         """Go to ``load``, where the last attempt has found equilibrium, and keep its history."""
         at, new = self.at, self.solver.equilibrium.state()
         if load != at.load:
-            equilibrium = self.solver.equilibrium
-            known = (equilibrium.problem.from_rest and equilibrium.springs is None) or at.increment is not None
+            problem, springs = self.solver.equilibrium.problem, self.solver.equilibrium.springs
+            placed = springs is not None and not springs.idle
+            known = (problem.from_rest or at.increment is not None) and not placed
             at.increment = new - self.state if known else np.zeros_like(new)
-            at.stride = load - at.load
+            at.stride = 0.0 if placed else load - at.load
         at.load, self.state = load, new
         self.solver.equilibrium.commit()
         if self.coarse is not None and not self.coarse.follow():

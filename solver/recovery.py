@@ -13,12 +13,9 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.solver.contact.interaction import GAMMA_FACTOR
 from archord.solver.newton import CIRCLING, Newton, NewtonSolver
-from archord.solver.stabilisation import WEAK
 
 _STIFF_CONTACT = 5.0  # gamma factor above which it is raised in stages where a solve fails
 _GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
-_SPRING_RATIO = 4.0  # of the factors of springs from one stage to the next, its cube after
-_EASY = 2  # iterations
 _ROUGH = 1e-3  # residual over reaction at which a solution is good enough for a guess
 
 
@@ -39,27 +36,16 @@ class Recovery:
         self.equilibrium.load = load
         self._solves: list[Newton] = []
         for guess, afar in guesses:
-            if self._solve_with_springs(guess, afar):
+            if self._solve_placing(guess, afar):
                 break
         return Newton.together(self._solves)
 
-    def _solve_with_springs(self, guess: Array, afar: bool) -> bool:
-        """Solve from ``guess``. Bodies that touch nothing there find their places with springs that become weak in
-        stages, by rough equilibria of points that cannot yield (further)."""
-        springs, points = self.equilibrium.springs, self.equilibrium.plastic_points()
-        if springs is None or (not afar and springs.idle and self._solve_in_stages(guess, afar)):
-            return springs is not None or self._solve_in_stages(guess, afar)
-        for p in points:
-            p.elastic_only = True
-        springs.factor = 1.0
-        while springs.factor > WEAK and self._solve_either_way(guess, full_steps=True, goal=_ROUGH):
-            guess = self.equilibrium.state()
-            ratio = _SPRING_RATIO if self._solves[-1].iterations > _EASY else _SPRING_RATIO**3
-            springs.factor = WEAK if springs.idle else max(WEAK, springs.factor / ratio)
-        springs.factor = WEAK
-        for p in points:
-            p.elastic_only = False
-        return self._solve_in_stages(guess, afar=False)
+    def _solve_placing(self, guess: Array, afar: bool) -> bool:
+        """Solve from ``guess``; where springs may have to hold bodies, these come to rest first as if rigid."""
+        springs = self.equilibrium.springs
+        if springs is not None and (afar or not springs.idle):
+            guess, afar = springs.rigid.at_rest(self.equilibrium.load, guess), True
+        return self._solve_in_stages(guess, afar)
 
     def _solve_in_stages(self, guess: Array, afar: bool) -> bool:
         contact = self.equilibrium.contact

@@ -1,44 +1,150 @@
-"""Springs that keep bodies in place which touch nothing yet: between them and their last accepted state.
+"""Bodies that nothing holds before they touch: which, where they come to rest among others, and springs that keep them.
 
-Each point of a body of area ``A`` is pulled back with ``factor M / A`` per displacement and area, ``M`` being the
-modulus of uniaxial strain: a force moves the body by about ``1 / factor`` times as much as it deforms it. Rigid discs
-under forces have springs of ``factor M``.
+As if rigid, bodies go where contact and forces push them; from there the elastic ones find their equilibrium. Springs
+between them and their last accepted state hold what does not touch even then: each point of a body of area ``A`` is
+pulled back with `WEAK` times ``M / A`` per displacement and area, ``M`` being the modulus of uniaxial strain, so that a
+force moves the body by about ``1 / WEAK`` times as much as it deforms it. Rigid discs under forces have springs of
+`WEAK` times ``M``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.geometry.curve import ProjectionError
 from archord.solver.bulk import assemble, matrix
 from archord.solver.contact.contact import Contact
-from archord.solver.drives import Drives
-from archord.solver.problem import Body
+from archord.solver.contact.pair import Pair
+from archord.solver.contact.surface import RigidSurface
+from archord.solver.contact.tangent import trial_rate
+from archord.solver.drives import MOVABLE, Drives
 
-WEAK = 1e-8  # the factor of solutions: without influence, but well above the round-off of a factorisation
+WEAK = 1e-8  # without influence, but well above the round-off of a factorisation
 _LITTLE = 0.01  # part of the contact forces below which springs hold nothing
+_MOST = 100  # iterations
+_AT_REST = 1e-3  # part of the forces that may be left
+_ROUND_OFF = 1e-9  # the same, of the largest forces on the way
+_DAMPING = 10.0  # ratio of one damping to the next
+_LOOSE = 1e-6  # part of a free motion that a body has at least which takes part in it
+
+
+class RigidMotions:
+    """The ``free`` motions ``(r, n_local, 2)`` that supports, means and prescribed ``drives`` leave to the bodies, with
+    the ``levels`` ``(r, d)`` of unknown drives that go along; ``loose`` bodies take part in one. Collective."""
+
+    def __init__(self, drives: Drives, contact: Contact) -> None:
+        self.drives, self.contact, self.comm = drives, contact, drives.comm
+        bodies, moving = drives.problem.bodies, drives.moving[drives.unknown]
+        self._modes = np.concatenate([drives.rigid_modes(body) for body in bodies])
+        k, forces = len(self._modes), drives.unknown_load[~moving] / drives.stiffness
+        self._prescribed = np.hstack([self._modes[:, drives.fixed].T, -drives.unknown_rate[moving][:, drives.fixed].T])
+        along = self._on_bodies(self._modes, forces)
+        gram = self.comm.allreduce(self._prescribed.T @ self._prescribed)
+        gram[:k, :k] += along @ along.T
+        self._follow = np.linalg.pinv(gram, rcond=MOVABLE, hermitian=True)
+        sizes, vectors = np.linalg.eigh(gram)
+        free = vectors[:, sizes <= MOVABLE * sizes.max()]
+        self.free = np.tensordot(free[:k].T, self._modes, 1)
+        self.levels = np.zeros((free.shape[1], len(drives.rate)))
+        self.levels[:, drives.unknown[moving]] = free[k:].T * drives.weight[moving]
+        parts = np.abs(free[:k]).reshape(len(bodies), -1).max(axis=1, initial=0.0)
+        self.loose = [body for body, part in zip(bodies, parts, strict=True) if part > _LOOSE]
+
+    def _on_bodies(self, motions: Array, forces: Array) -> Array:
+        """Work ``(k, m)`` of ``forces`` ``(m, n_owned, 2)`` on nodes along ``motions`` ``(k, n_local, 2)``."""
+        return self.comm.allreduce(np.tensordot(motions[:, : self.drives.n_owned], forces, ((1, 2), (1, 2))))
+
+    def at_rest(self, load: float, state: Array) -> Array:
+        """A ``state`` of the equilibrium at ``load``, with bodies moved as their supports are, and loose ones moved to
+        where contact and forces push them; as it was where contact points find no partners on the way.
+
+        The contact law alone resists. Newton's method finds the least energy, damped as long as forces are large
+        (Levenberg 1944), in steps of a facet at most.
+        """
+        if not self.contact.pairs:
+            return state
+        drives, n = self.drives, self._modes[0].size
+        u, levels = state[:n].reshape(-1, 2).copy(), drives.values(load)
+        levels[drives.unknown] = state[n:][drives.unknown]
+        lacking = np.tensordot(levels, drives.rate, 1)[drives.fixed] - u[drives.fixed]
+        followed = self._follow @ self.comm.allreduce(self._prescribed.T @ lacking)
+        u += np.tensordot(followed[: len(self._modes)], self._modes, 1)
+        applied = self.levels @ drives.values(load) / drives.problem.symmetry
+        applied += self._on_bodies(self.free, np.tensordot(levels, drives.applied, 1)[None])[:, 0]
+        facet = min(surface.facet_lengths().mean() for surface in self.contact.surfaces)
+        step: Array = np.zeros(len(self.free))
+        damping, least, most = drives.stiffness, np.inf, 0.0
+        try:
+            for _ in range(_MOST):
+                left, stiffness, pressed, openings = self._contact(u, levels, load)
+                left, most = left + applied, max(most, pressed)
+                size = float(np.linalg.norm(left))
+                if size > 2 * least:  # back to the place before, for a smaller step
+                    u, levels = u - np.tensordot(step, self.free, 1), levels - step @ self.levels
+                    damping *= _DAMPING**2
+                else:
+                    least, damping = size, damping / _DAMPING
+                    last = stiffness, left, openings
+                if size <= max(_AT_REST * pressed, _AT_REST * float(np.linalg.norm(applied)), _ROUND_OFF * most):
+                    break
+                step = np.linalg.solve(last[0] + damping * np.eye(len(step)), last[1])
+                farthest = max((float(np.abs(opening @ step).max(initial=0.0)) for opening in last[2]), default=0.0)
+                step *= min(1.0, facet / (self.comm.allreduce(farthest, op=MPI.MAX) or facet))
+                u, levels = u + np.tensordot(step, self.free, 1), levels + step @ self.levels
+        except ProjectionError:
+            return state
+        return np.append(u, levels)
+
+    def _contact(self, u: Array, levels: Array, load: float) -> tuple[Array, Array, float, list[Array]]:
+        """Forces ``(r,)`` of the contact on the free motions, their stiffness ``(r, r)``, the sum of all forces, and of
+        each pair what the motions add to gap and slip ``(m, 2, r)``."""
+        self.contact.move(levels, self.drives.problem.fitted(load))
+        self.contact.evaluate(u, reach=False)
+        r, pressed, openings = len(self.free), 0.0, []
+        force, stiffness = np.zeros(r), np.zeros((r, r))
+        for pair in self.contact.pairs:
+            opening = np.stack(
+                [self._opening(pair, *motion) for motion in zip(self.free, self.levels, strict=True)], axis=2
+            )
+            weight = pair.share * pair.surface.weight.ravel()
+            force += np.einsum("m,mi,mik->k", weight, pair.traction, opening)
+            stiff = (weight * pair.gamma)[:, None, None] * pair.derivative
+            stiffness += np.tensordot(opening, stiff @ opening, ((0, 1), (0, 1)))
+            pressed += float(np.abs(pair.forces).sum())
+            openings.append(opening)
+        return *map(self.comm.allreduce, (force, stiffness, pressed)), openings
+
+    @staticmethod
+    def _opening(pair: Pair, motion: Array, levels: Array) -> Array:
+        opening = -trial_rate(pair, motion) / pair.gamma[:, None]
+        if isinstance(pair.opposite, RigidSurface):
+            opening -= pair.frame @ (levels @ pair.opposite.rate)
+        return opening
 
 
 class Springs:
-    """The springs of ``bodies``, and of discs of ``contact``. Collective.
+    """The springs of what ``rigid`` finds loose, bodies and discs; ``stiffness`` is that of discs. Collective.
 
     ``forces`` ``(n_owned dofs,)`` are those of the bodies' last displacements, ``on_levels`` ``(d,)`` those of discs,
     and ``work`` what the springs took up, of the modelled part; ``energy`` is its sum over accepted states.
-    ``of_free`` is their matrix at a factor of 1, without rows and columns of prescribed displacements.
+    ``of_free`` is their matrix without rows and columns of prescribed displacements. They are ``idle`` where contact
+    holds in the last accepted state what they do not.
     """
 
-    def __init__(self, drives: Drives, contact: Contact, bodies: Sequence[Body], stiffness: float) -> None:
-        V, self.comm, self.contact, self.factor, self.energy = drives.V, drives.comm, contact, WEAK, 0.0
+    def __init__(self, rigid: RigidMotions, stiffness: float) -> None:
+        drives, contact = rigid.drives, rigid.contact
+        self.rigid, self.comm, self._contact = rigid, drives.comm, contact
+        self.energy, self.idle, V = 0.0, False, drives.V
         u, v, forms = ufl.TrialFunction(V), ufl.TestFunction(V), []
-        for body in bodies:
+        for body in rigid.loose:
             dx = drives.measure(body.cells or body.name)
             area = drives.integral(fem.Constant(V.mesh, 1.0) * dx)
-            modulus = fem.Constant(V.mesh, float(body.material.elastic_tangent[0, 0]) / area)
+            modulus = fem.Constant(V.mesh, WEAK * float(body.material.elastic_tangent[0, 0]) / area)
             forms.append(fem.form(modulus * ufl.inner(u, v) * dx))
         self._matrix = matrix(V, forms)
         assemble(self._matrix, forms)
@@ -49,28 +155,28 @@ class Springs:
         self._x, self._y = self._matrix.createVecs()
         self.of_levels: Array = np.zeros(len(drives.rate))
         for disc in contact.rigid:
-            self.of_levels += stiffness * (disc.rate**2).sum(axis=1)
+            self.of_levels += WEAK * stiffness * (disc.rate**2).sum(axis=1)
         self.last: tuple[Array, Array] = np.zeros(2 * drives.n_owned), np.zeros(len(drives.rate))
 
     def pull(self, u: Array) -> Array:
         """Forces ``(n_owned dofs,)`` of displacements ``u``, alike, on the bodies' springs."""
         self._x.array[:] = u
         self._matrix.mult(self._x, self._y)
-        return self.factor * self._y.array_r
+        return self._y.array_r.copy()
 
     def evaluate(self, u: Array, levels: Array) -> None:
         """Forces and work at the displacements ``u`` ``(n_owned dofs,)`` and drives' ``levels`` ``(d,)``."""
         self._now, moved, turned = (u.copy(), levels.copy()), u - self.last[0], levels - self.last[1]
-        self.forces, self.on_levels = self.pull(moved), self.factor * self.of_levels * turned
+        self.forces, self.on_levels = self.pull(moved), self.of_levels * turned
         self.work = (self.comm.allreduce(float(self.forces @ moved)) + float(self.on_levels @ turned)) / 2
 
     def commit(self) -> None:
         """Accept the last evaluation: the springs rest there."""
         self.last, self.energy = self._now, self.energy + self.work
+        self.look()
 
-    @property
-    def idle(self) -> bool:
-        """Whether contact holds what the springs do not, at the last evaluation."""
-        forces = np.abs(self.forces).sum(), sum(float(np.abs(pair.forces).sum()) for pair in self.contact.pairs)
+    def look(self) -> None:
+        """See whether they are `idle`."""
+        forces = np.abs(self.forces).sum(), sum(float(np.abs(pair.forces).sum()) for pair in self._contact.pairs)
         pulled, pressed = self.comm.allreduce(np.array(forces))
-        return bool(pulled + np.abs(self.on_levels).sum() < _LITTLE * pressed)
+        self.idle = bool(pulled + np.abs(self.on_levels).sum() < _LITTLE * pressed)

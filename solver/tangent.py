@@ -109,7 +109,7 @@ class TangentMatrix:
             with self.timer("assemble bulk"):
                 self._elastic.copy(self.A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
                 if self.springs:
-                    self.A.axpy(self.springs.factor, self.springs.of_free, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+                    self.A.axpy(1.0, self.springs.of_free, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
                 self.bulk.assemble_correction(self.A, self._bcs)
         else:
             self.factorisations = 1
@@ -177,5 +177,5 @@ class TangentMatrix:
                 vector.destroy()
         D = self.comm.allreduce(D)
         if self.springs:
-            D += np.diag(self.springs.factor * self.springs.of_levels[drives.unknown] * drives.weight**2)
+            D += np.diag(self.springs.of_levels[drives.unknown] * drives.weight**2)
         return B * free[:, None], C * free[:, None], D

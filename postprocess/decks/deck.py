@@ -205,16 +205,16 @@ class _Writer:
     def _spring_lines(self) -> Iterator[str]:
         """Weak springs at the ends of bodies that nothing holds before they touch."""
         first = 1 + sum(map(len, self.mesh.elements.values()))
-        for body in self.problem.bodies if self.problem.stabilise else ():
-            if not self.system.equilibrium.drives.held(body, alone=False):
-                nodes = np.unique(self.mesh.elements[body.name])
-                along = self.mesh.x[nodes].sum(axis=1)
-                for axis in (1, 2):
-                    name = f"{label(body.name)}_SPRINGS_{axis}"
-                    yield f"*ELEMENT, TYPE=SPRING1, ELSET={name}"
-                    yield from (f"{first + k}, {nodes[n] + 1}" for k, n in enumerate((along.argmin(), along.argmax())))
-                    yield from (f"*SPRING, ELSET={name}", str(axis), number(_WEAK * body.material.E * self.thick))
-                    first += 2
+        springs = self.system.equilibrium.springs
+        for body in springs.rigid.loose if springs else ():
+            nodes = np.unique(self.mesh.elements[body.name])
+            along = self.mesh.x[nodes].sum(axis=1)
+            for axis in (1, 2):
+                name = f"{label(body.name)}_SPRINGS_{axis}"
+                yield f"*ELEMENT, TYPE=SPRING1, ELSET={name}"
+                yield from (f"{first + k}, {nodes[n] + 1}" for k, n in enumerate((along.argmin(), along.argmax())))
+                yield from (f"*SPRING, ELSET={name}", str(axis), number(_WEAK * body.material.E * self.thick))
+                first += 2
 
     def step_lines(self, targets: Sequence[float]) -> Iterator[str]:
         """A step to each of the ``targets``: displacements, forces, and what is to be printed."""

@@ -69,10 +69,10 @@ class Contact:
             for pair in interface.pairs:
                 pair.use_gamma(min(interface.interaction.gamma_factor, factor))
 
-    def evaluate(self, u: Array) -> bool:
+    def evaluate(self, u: Array, *, reach: bool = True) -> bool:
         """Gaps, tractions and trial history at the nodal displacements ``u`` ``(n, 2)`` of this rank; returns whether
-        the matrix pattern had to grow (the pairs slid out of it). Collective; raises `ProjectionError` on every rank if
-        a point on any of them finds no partner."""
+        the matrix pattern had to grow (the pairs slid out of it), which without ``reach`` it does not. Collective;
+        raises `ProjectionError` on every rank if a point on any of them finds no partner."""
         motions = [pair.opposite.curve_displacement(u) for pair in self.pairs]
         try:
             with on_every_rank(self.comm):
@@ -82,7 +82,7 @@ class Contact:
             self.search()
             raise
         self.active_set_changes = sum(pair.changes for pair in self.pairs)
-        grew = any([reach.extend() for reach in self._reaches if reach.pair.moves])
+        grew = reach and any([each.extend() for each in self._reaches if each.pair.moves])
         if grew:
             self.tangent = ContactTangent(self._reaches)
         return grew
