@@ -39,14 +39,13 @@ class GeneralAccount:
         timer = timer or Timer()
         with timer("mesh"):
             problem = general_problem(scene, comm, partitioner)
-        self.scene = scene
-        self._warnings: list[str] = []
-        with as_input_error(scene), timer("mesh"):
+        self.scene, self._warnings = scene, list[str]()
+        with as_input_error(scene):
             if scene.mesh.shape is None:
                 from archord.presets.held import check, require_facing  # with scipy, which solves of presets do without
 
-                self._warnings = check(scene, problem)
-        with as_input_error(scene):
+                with timer("mesh"):
+                    self._warnings = check(scene, problem)
             self.system = System(problem, timer=timer)
             require_mirrored(scene, self.system)
             if scene.mesh.shape is None:
@@ -70,14 +69,12 @@ class GeneralAccount:
         """Units of all values, by name and in order."""
         scene, units = self.scene, self.scene.units
         length, force, moment = units.length, scene.force_unit, units.energy_of(scene.analysis.thickness)
-        found = {}
+        area = f"{length}{3 if scene.analysis.thickness else 2}"  # displaced, over the thickness a volume
+        found: dict[str, str] = {}
         for load in scene.load:
-            turns = load.direction == "rotation"
-            found[f"{load.name} displacement"] = "rad" if turns else length
-            found[f"{load.name} force"] = moment if turns else force
-            if load.pressure is not None:
-                area = f"{length}{3 if scene.analysis.thickness else 2}"  # displaced, over the thickness a volume
-                found |= {f"{load.name} displacement": area, f"{load.name} force": units.stress}
+            pair = ("rad", moment) if load.direction == "rotation" else (length, force)
+            moved, by = (area, units.stress) if load.kind == "pressure" else pair
+            found |= {f"{load.name} displacement": moved, f"{load.name} force": by}
         for name in self._supports:
             found |= {f"{name} x": force, f"{name} y": force, f"{name} moment": moment}
         for part in scene.interaction:
@@ -92,9 +89,9 @@ class GeneralAccount:
 
     def driven(self) -> tuple[Array, Array]:
         """Displacements and forces of all loads. Collective."""
-        names = [load.name for load in self.scene.load]
-        q = [self.system.drive_displacement(name) for name in names]
-        return np.array(q), np.array([self.system.drive_force(name) for name in names])
+        q, force = self.system.driven()
+        loads = [self.system.drive_names.index(load.name) for load in self.scene.load]
+        return q[loads], force[loads]
 
     def profiles(self) -> dict[str, SurfaceProfile]:
         """The contact along the surfaces, by name. Collective."""
@@ -156,7 +153,8 @@ class GeneralAccount:
             touching = int((profile.in_contact > 0).sum())
             if 0 < touching < _FEW_FACETS:
                 said.append(f"only {touching} facets of {name!r} in contact; smaller elements would resolve it")
-        if (largest := max((v for k, v in m.values.items() if k.endswith(" peeq_max")), default=0.0)) > _LARGE_STRAIN:
+        largest = max((v for k, v in m.values.items() if k.endswith(" peeq_max")), default=0.0)
+        if largest > _LARGE_STRAIN:
             said.append(f"PEEQ reaches {largest:.2g}, too much for small-strain theory")
         if residual > 1e-8 and m.force_balance:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")

@@ -84,8 +84,10 @@ class _Builder:
 
     def __init__(self, scene: ProblemScene, mesh: TaggedMesh) -> None:
         self.scene, self.mesh = scene, mesh
-        self.couplings = {coupling.name: coupling for coupling in scene.coupling}
-        self.loaded = {(load.on, str(load.direction)): load for load in scene.load}
+        self.edges = [*mesh.facet_sets, *mesh.point_sets]
+        self.couplings = [coupling.name for coupling in scene.coupling]
+        self.discs = [part.name for part in scene.interaction if part.rigid]
+        self.loaded = {(load.on, str(load.direction)): load.name for load in scene.load}
         self.held = {(support.on, freedom) for support in scene.support for freedom in support.fixed}
         self.drives: list[Drive] = []
         self.supports: list[Support] = []
@@ -95,8 +97,7 @@ class _Builder:
     def problem(self) -> Problem:
         """All of them together. Raises ValueError."""
         scene, analysis = self.scene, self.scene.analysis
-        discs = {i.name for i in scene.interaction if i.rigid}
-        known = [*self._edges_and_points(), *self.mesh.cell_sets, *self.couplings, *discs]
+        known = [*self.edges, *self.mesh.cell_sets, *self.couplings, *self.discs]
         for on in [*(s.on for s in scene.support), *(q.on for q in scene.load)]:
             if on not in known:
                 raise ValueError(unknown("set or coupling", on, known))
@@ -104,7 +105,7 @@ class _Builder:
             if support.on not in self.couplings:
                 self.supports += [Support(support.name, support.on, _AXES[freedom]) for freedom in support.fixed]
         for load in scene.load:
-            self._load(load, on_disc=load.on in discs)
+            self._load(load)
         for coupling in scene.coupling:
             (self._rigid_point if coupling.kind == "rigid" else self._mean_point)(coupling)
         given: dict[tuple[str, int], str] = {}
@@ -112,8 +113,8 @@ class _Builder:
             if (other := given.setdefault((s.facets, s.axis), s.name)) != s.name:
                 raise ValueError(f"{other!r} and {s.name!r} both prescribe how {s.facets!r} moves in {'xy'[s.axis]}")
         lengths = [abs(v) for load in scene.load if load.kind == "displacement" for v in load.stages]
-        by_force = any(load.kind != "displacement" for load in scene.load)
         travel = sum(lengths) + max((i.interference + i.overlap for i in scene.interaction), default=0.0)
+        by_force = any(load.kind != "displacement" for load in scene.load)
         problem = Problem(
             self.mesh,
             [Body(body.name, body.constitutive(analysis.plane), body.cells or body.name) for body in scene.body],
@@ -131,37 +132,31 @@ class _Builder:
             max_iterations=analysis.max_iterations,
             guess=self._guess,
         )
-        self._driven = list(self._driven_bodies(problem))
+        displaced = [load for load in scene.load if load.kind == "displacement" and load.on in self.mesh.facet_sets]
+        self._driven = [(load, problem.body_of(load.on).name) for load in displaced]
         return problem
 
-    def _load(self, load: parts.Load, on_disc: bool) -> None:
-        by_force = load.kind == "force"
-        on_set = load.on not in self.couplings and not on_disc
-        spread = (
-            load.kind == "pressure"
-            or load.core is not None
-            or (on_set and by_force and load.on not in self._edges_and_points())
-        )
-        control: Literal["displacement", "force"] = "force" if by_force and not spread else "displacement"
+    def _load(self, load: parts.Load) -> None:
+        """A pressure; a force spread over cells; or what moves a set, a reference point or a disc."""
+        on_cells = load.kind == "force" and load.on not in [*self.edges, *self.couplings, *self.discs]
+        spread = on_cells or load.core is not None
+        control: Literal["displacement", "force"] = "force" if load.kind == "force" and not spread else "displacement"
         self.drives.append(Drive(load.name, self.scene.values(load), control))
-        if load.pressure is not None:
+        if load.kind == "pressure":
             self.loads.append(Load(facets=load.on, pressure=1.0, drive=load.name))
         elif spread:
             force = (1.0, 0.0) if load.direction == "x" else (0.0, 1.0)
             density = core_density(load.core.centre, load.core.radius) if load.core else None
             self.loads.append(Load(cells=load.on, force=force, density=density, drive=load.name))
-        elif on_set:
-            self.supports.append(Support(load.name, load.on, _AXES[load.direction or "x"], 1.0, load.name))
+        elif load.on not in [*self.couplings, *self.discs]:
+            self.supports.append(Support(load.name, load.on, _AXES[str(load.direction)], 1.0, load.name))
 
-    def _edges_and_points(self) -> list[str]:
-        return [*self.mesh.facet_sets, *self.mesh.point_sets]
-
-    def _freedoms(self, coupling: parts.Coupling) -> Iterator[tuple[str, str | None]]:
-        """The motions of a reference point that are not held, and the drive of each, None where nothing loads it."""
-        for freedom in _AXES:
-            if (coupling.name, freedom) not in self.held:
-                load = self.loaded.get((coupling.name, freedom))
-                yield freedom, load.name if load else None
+    def _drive(self, coupling: str, freedom: str, control: Literal["displacement", "force"]) -> str:
+        """The load of a reference point in one of its freedoms, or a drive of its own whose ``control`` is 0."""
+        if (coupling, freedom) in self.loaded:
+            return self.loaded[coupling, freedom]
+        self.drives.append(Drive(f"{coupling} {freedom}", (0.0, 0.0), control))
+        return self.drives[-1].name
 
     def _rigid_point(self, coupling: parts.Coupling) -> None:
         X, Y = coupling.point
@@ -171,34 +166,25 @@ class _Builder:
             "rotation": [(0, lambda x: Y - x[:, 1]), (1, lambda x: x[:, 0] - X)],
         }
         self.supports += [Support(coupling.name, coupling.facets, axis) for axis in (0, 1)]
-        for freedom, drive in self._freedoms(coupling):
-            if drive is None:
-                drive = f"{coupling.name} {freedom}"
-                self.drives.append(Drive(drive, (0.0, 0.0), "force"))
-            for axis, rate in rates[freedom]:
-                self.supports.append(Support(coupling.name, coupling.facets, axis, rate, drive))
+        for freedom in [f for f in _AXES if (coupling.name, f) not in self.held]:
+            drive = self._drive(coupling.name, freedom, "force")
+            self.supports += [Support(coupling.name, coupling.facets, axis, r, drive) for axis, r in rates[freedom]]
 
     def _mean_point(self, coupling: parts.Coupling) -> None:
         mirrored = self.scene.analysis.symmetry > 1  # with its mirror image an edge moves along the symmetry line alone
         point = None if mirrored else (coupling.point[0], coupling.point[1])
-        for freedom, axis in _AXES.items():
-            load = self.loaded.get((coupling.name, freedom))
-            drive = load.name if load else f"{coupling.name} {freedom}"
-            if load is None and (coupling.name, freedom) in self.held:
-                self.drives.append(Drive(drive, (0.0, 0.0)))
-            elif load is None:
-                continue
+        for freedom in [f for f in _AXES if (coupling.name, f) in self.held | self.loaded.keys()]:
             if mirrored and freedom == "rotation":
                 raise ValueError(f"the coupling {coupling.name!r} of a part with mirror images cannot turn")
-            self.means.append(Mean(coupling.name, coupling.facets, axis, point, drive))
+            drive = self._drive(coupling.name, freedom, "displacement")
+            self.means.append(Mean(coupling.name, coupling.facets, _AXES[freedom], point, drive))
 
     def _interaction(self, part: parts.Interaction, slide: float) -> Interaction:
         surfaces: tuple[str | Rigid, str] = (part.surfaces[0], part.surfaces[-1])
         if part.rigid is not None:
-            circle = RigidCircle(np.array(part.rigid.centre), part.rigid.radius)
             loads = [load for load in self.scene.load if load.on == part.name]
             rates = {load.name: (1.0, 0.0) if load.direction == "x" else (0.0, 1.0) for load in loads}
-            surfaces = Rigid(circle, rates), part.surfaces[0]
+            surfaces = Rigid(RigidCircle(np.array(part.rigid.centre), part.rigid.radius), rates), part.surfaces[0]
         return Interaction(
             part.name,
             surfaces,
@@ -210,12 +196,6 @@ class _Builder:
             interference=part.interference,
             overlap=part.overlap,
         )
-
-    def _driven_bodies(self, problem: Problem) -> Iterator[tuple[parts.Load, str]]:
-        """Loads that displace an edge, and the body that they take along. Collective."""
-        for load in self.scene.load:
-            if load.kind == "displacement" and load.on in self.mesh.facet_sets:
-                yield load, problem.body_of(load.on).name
 
     def _guess(self, factor: float) -> Guess:
         """Bodies moved rigidly as their edges are displaced."""

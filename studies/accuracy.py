@@ -104,34 +104,32 @@ class _End(Exception):
     """No further mesh is to be solved."""
 
 
+@dataclass
 class _Search:
     """The way to the accuracy, the same on all ranks."""
 
-    def __init__(
-        self,
-        scene: AnyScene,
-        folder: Path,
-        comm: MPI.Comm,
-        on_start: Callable[[System], None],
-        on_level: Callable[[Level], None],
-        options: dict[str, Any],
-    ) -> None:
-        if scene.analysis.accuracy is None:
+    scene: AnyScene
+    folder: Path
+    comm: MPI.Comm
+    on_start: Callable[[System], None]
+    on_level: Callable[[Level], None]
+    options: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        if self.scene.analysis.accuracy is None:
             raise InputError("analysis.accuracy is missing.")
-        self.scene, self.folder, self.comm, self.options = scene, folder, comm, options
-        self.on_start, self.on_level = on_start, on_level
-        self.asked = scene.analysis.accuracy
+        self.asked: float = self.scene.analysis.accuracy
         self.family: MeshFamily | ProblemFamily
-        if isinstance(scene, Scene):
-            self.family = MeshFamily(scene, self.asked / 2 if scene.plastic else self.asked)
+        if isinstance(self.scene, Scene):
+            self.family = MeshFamily(self.scene, self.asked / 2 if self.scene.plastic else self.asked)
         else:
-            self.family = ProblemFamily(scene)
+            self.family = ProblemFamily(self.scene)
         self.begun = perf_counter()
         self.levels: list[Level] = []
         self.outcome: Outcome | None = None
-        self.substeps, self.dofs = 1, 0
+        self.substeps = 1
         self.mesh_error: float | None = None
-        self.step_error: float | None = None if scene.plastic else 0.0
+        self.step_error: float | None = None if self.scene.plastic else 0.0
 
     def refine(self) -> None:
         """Solve until the estimate is as small as asked. Raises `_End` if no finer mesh is allowed, or a run does not
@@ -181,24 +179,15 @@ class _Search:
             raise _End
         begun, (size, growth) = perf_counter(), self.family.sizes(scene)
         self.outcome = outcome = solve_scene(scene, self.folder, self.comm, on_start=self._started, **self.options)
-        steps = outcome.steps
         if outcome.status != "done" and outcome.message != UNSEEN:
             raise _End
-        curve = self.comm.bcast(self.family.curve(steps))
-        level = Level(
-            mesh=mesh + 1,
-            element_size=size,
-            growth=growth,
-            substeps=substeps,
-            dofs=self.dofs,
-            last=curve[-1],
-            seconds=round(perf_counter() - begun, 4),
-            iterations=sum(m.iterations for m in steps),
-        )
-        return curve if self.family.resolved(scene, steps) else None, level
+        curve = self.comm.bcast(self.family.curve(outcome.steps))
+        iterations, seconds = sum(m.iterations for m in outcome.steps), round(perf_counter() - begun, 4)
+        level = Level(mesh + 1, size, growth, substeps, self.family.dofs, curve[-1], seconds, iterations)
+        return curve if self.family.resolved(scene, outcome.steps) else None, level
 
     def _started(self, system: System) -> None:
-        self.dofs = self.family.dofs = system.n_dofs
+        self.family.dofs = system.n_dofs
         self.on_start(system)
 
     def _tell(self, level: Level) -> None:
@@ -208,19 +197,10 @@ class _Search:
     def finish(self) -> Outcome:
         """Note in run.json how accurate the last run is; the outcome. Collective."""
         assert self.outcome is not None
-        done = self.outcome.status == "done"
-        estimated = None
-        if done and self.mesh_error is not None and self.step_error is not None:
-            estimated = self.mesh_error + self.step_error
-        accuracy = Accuracy(
-            asked=self.asked,
-            estimated=estimated,
-            mesh_error=None if estimated is None else self.mesh_error,
-            step_error=None if estimated is None else self.step_error,
-            substeps=self.substeps,
-            seconds=round(perf_counter() - self.begun, 4),
-            levels=tuple(self.levels),
-        )
+        done, seconds = self.outcome.status == "done", round(perf_counter() - self.begun, 4)
+        mesh, steps = (self.mesh_error, self.step_error) if done else (None, None)
+        estimated = None if mesh is None or steps is None else mesh + steps
+        accuracy = Accuracy(self.asked, estimated, mesh, steps, self.substeps, seconds, tuple(self.levels))
         warnings = [*self.outcome.warnings]
         if done and (estimated is None or estimated > self.asked) and self.comm.rank == 0:
             warnings.append(self._shortfall(accuracy))

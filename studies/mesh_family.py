@@ -13,9 +13,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from archord.presets.measures import Measures
+from archord.scene.file import AnyScene
 from archord.scene.geometry import JointGeometry
 from archord.scene.scene import Scene
-from archord.scene.sections import Stepping
 
 RATIO = 1.5  # of the element sizes from one mesh to the next
 _GROWTH = 6.25  # over the element size in R, for a wide contact
@@ -49,17 +49,13 @@ class MeshFamily:
     def scene_of(self, level: int, substeps: int) -> Scene | None:
         """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would be too fine for the
         limits of the keys."""
-        size, length = self.first / RATIO**level, 1 / substeps
-        joint = self.scene.joint.model_dump(exclude_none=True)
-        joint |= {"relative_element_size": _rounded(size * self.scale), "growth": _rounded(min(2.0, _GROWTH * size))}
-        stepping = self.scene.stepping.model_dump()
-        stepping |= {"initial": length, "maximum": length, "minimum": min(stepping["minimum"], length)}
+        size, keys = self.first / RATIO**level, self.scene.joint.model_dump(exclude_none=True)
+        keys |= {"relative_element_size": rounded(size * self.scale), "growth": rounded(min(2.0, _GROWTH * size))}
         try:
-            sections = {"joint": JointGeometry.model_validate(joint), "stepping": Stepping.model_validate(stepping)}
+            joint = JointGeometry.model_validate(keys)
         except ValidationError:
             return None
-        analysis = self.scene.analysis.model_copy(update={"accuracy": None})
-        return self.scene.model_copy(update={**sections, "analysis": analysis})
+        return self.scene.model_copy(update={"joint": joint} | chosen(self.scene, substeps))
 
     def sizes(self, scene: Any) -> tuple[float, float]:
         """Element size over R and growth of ``scene``."""
@@ -87,6 +83,16 @@ def expected_angle(scene: Scene) -> float:
     return math.atan2(math.sqrt(delta * (2 * dR + delta)), dR) if delta else _WIDE
 
 
-def _rounded(value: float) -> float:
+def chosen(scene: AnyScene, substeps: int) -> dict[str, Any]:
+    """The sections of ``scene`` that make it ask for no accuracy, but for so many ``substeps`` an output step."""
+    length = 1 / substeps
+    stepping = {"initial": length, "maximum": length, "minimum": min(scene.stepping.minimum, length)}
+    return {
+        "stepping": scene.stepping.model_copy(update=stepping),
+        "analysis": scene.analysis.model_copy(update={"accuracy": None}),
+    }
+
+
+def rounded(value: float) -> float:
     """Four digits, so that a scene can be read, and that round-off of its units does not matter."""
     return float(f"{value:.4g}")

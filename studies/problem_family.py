@@ -7,7 +7,7 @@ from typing import Any
 
 from archord.presets.measures import Record
 from archord.scene.problem import ProblemScene
-from archord.scene.sections import Stepping
+from archord.studies.mesh_family import chosen, rounded
 
 _OF_SHAPES, _OF_FILES = 1.5, 2.0  # ratios of element sizes from one mesh to the next
 _COARSEST = 2.0  # first element size of a shape over that of its scene
@@ -34,16 +34,10 @@ class ProblemFamily:
         changes: dict[str, Any] = {"refine": self.scene.mesh.refine + level}
         if self.shape is not None:
             factor = _COARSEST / self.ratio**level
-            size, growth = (float(f"{factor * value:.4g}") for value in (self.shape.h, self.shape.growth))
-            changes = {"shape": self.shape.model_copy(update={"element_size": size, "growth": growth})}
-        length, stepping = 1 / substeps, self.scene.stepping.model_dump()
-        stepping |= {"initial": length, "maximum": length, "minimum": min(stepping["minimum"], length)}
-        sections = {
-            "mesh": self.scene.mesh.model_copy(update=changes),
-            "stepping": Stepping.model_validate(stepping),
-            "analysis": self.scene.analysis.model_copy(update={"accuracy": None}),
-        }
-        return self.scene.model_copy(update=sections)
+            sizes = {"element_size": rounded(factor * self.shape.h), "growth": rounded(factor * self.shape.growth)}
+            changes = {"shape": self.shape.model_copy(update=sizes)}
+        mesh = self.scene.mesh.model_copy(update=changes)
+        return self.scene.model_copy(update={"mesh": mesh} | chosen(self.scene, substeps))
 
     def sizes(self, scene: Any) -> tuple[float, float]:
         """Element size and growth of ``scene``; of a file, the size over that of its own cells."""
