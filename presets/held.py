@@ -27,7 +27,12 @@ def check(scene: ProblemScene, problem: Problem) -> list[str]:
     cells = {body.name: body.cells for body in problem.bodies}
     overlap = max((part.overlap + part.interference for part in scene.interaction), default=0.0)
     in_mm = (scene.units.length, scene.units.stress) == ("mm", "MPa")
-    warnings = check_mesh(mesh, cells, [part.surfaces for part in scene.interaction], overlap, in_mm)
+    pairs: list[list[str | float]] = [
+        [name] for part in scene.interaction if part.law == "tied" for name in part.surfaces
+    ]
+    smooth = [part for part in scene.interaction if part.law != "tied"]
+    pairs += [[*part.surfaces, *([part.rigid.radius] if part.rigid else [])] for part in smooth]
+    warnings = check_mesh(mesh, cells, pairs, overlap, in_mm)
     whole, failure = gathered(mesh), ""
     owner = {name: problem.body_of(name).name for part in scene.interaction for name in part.surfaces}
     if whole is not None:

@@ -41,8 +41,9 @@ def as_input_error(scene: ProblemScene) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        source, said = scene.mesh.file or "mesh.shape", str(error).rstrip(".")
-        raise InputError(f"{said}." if said.startswith(source) else f"{source}: {said}.") from None
+        source, said = scene.mesh.file or "mesh.shape", str(error)
+        said = said if said.startswith(source) else f"{source}: {said}"
+        raise InputError(said if said.endswith((".", "?")) else f"{said}.") from None
 
 
 def scene_mesh(scene: ProblemScene, comm: MPI.Comm, partitioner=None) -> TaggedMesh:

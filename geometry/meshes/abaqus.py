@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
-from archord.geometry.meshes.plane_mesh import PlaneMesh, distinct_edges, in_basix_order, one_kind, sides_of
+from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order, one_kind, outer_sides
 
 _KINDS = re.compile(r"(CP[ES][3468]|T[23]D[23])[A-Z]*")  # with the number of nodes
 _UNREAD = {"PART", "INSTANCE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY"}  # they move or make nodes
@@ -163,9 +163,7 @@ def read_abaqus(path: Path) -> PlaneMesh:
             places = _places(rows[:, 0], elements, f"element of the surface {name!r}")
             facet_sets[name].append(corners[places][:, faces[face]])
     x, cells = in_basix_order(model.x, corners, perm_gmsh)
-    every = sides_of(cells)
-    first, which = distinct_edges(every[:, :2])
-    boundary = every[first[np.bincount(which) == 1]]
+    boundary, _ = outer_sides(cells)
     for (kind, key), numbers in model.sets.items():
         name = model.spelling[key]
         if kind == "NSET" and name not in facet_sets:

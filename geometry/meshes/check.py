@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from archord.geometry.basis import Array, bulk_quadrature, cell_kind, tabulate
 from archord.geometry.curve import Curve
 from archord.geometry.meshes.fenicsx import gathered
-from archord.geometry.meshes.plane_mesh import PlaneMesh, distinct_edges, sides_of
+from archord.geometry.meshes.plane_mesh import PlaneMesh, distinct_edges, outer_sides, sides_of
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
@@ -33,7 +33,7 @@ def _at(x: Array) -> str:
 
 def faults(mesh: PlaneMesh) -> list[str]:
     """Why nothing can be computed on ``mesh``: cells that are folded, collapsed, there twice, or three at an edge."""
-    J, said, middle = _jacobians(mesh)[0], [], mesh.x[mesh.cells].mean(axis=1)
+    (J, _), said, middle = _jacobians(mesh), [], mesh.x[mesh.cells].mean(axis=1)
     det, size = np.linalg.det(J), (J**2).sum(axis=(2, 3)).max(axis=1)
     bad = (det.min(axis=1) <= _FLAT * size) & (det.max(axis=1) >= -_FLAT * size)
     if bad.any():
@@ -71,26 +71,27 @@ def areas(mesh: PlaneMesh) -> Array:
 def check_mesh(
     tagged: TaggedMesh,
     bodies: Mapping[str, str],
-    pairs: Sequence[Sequence[str]] = (),
+    pairs: Sequence[Sequence[str | float]] = (),
     overlap: float = 0.0,
     millimetres: bool = False,
 ) -> list[str]:
-    """Warnings about a mesh whose ``bodies`` are the named cell sets, with ``pairs`` of surfaces in contact (one beside
-    a rigid disc). Collective.
+    """Warnings about a mesh whose ``bodies`` are the named cell sets, with ``pairs`` of surfaces in contact, each with
+    another one or with a rigid disc of that radius; one alone touches whatever its clearance. Collective.
 
     Bodies may lie in each other by the ``overlap``; lengths may be known to be in ``millimetres``. Raises ValueError
     with the first fault on all ranks.
     """
     for cells in bodies.values():
         tagged.cell_tags(cells)
-    for name in [name for pair in pairs for name in pair]:
+    surfaces = [name for pair in pairs for name in pair if isinstance(name, str)]
+    for name in surfaces:
         tags_of("facet", tagged.facet_sets, name)
     mesh, found, warnings = gathered(tagged), "", list[str]()
     if mesh is not None:
         inside = {body: np.isin(mesh.bodies, mesh.cell_sets[cells]) for body, cells in bodies.items()}
-        every = [faults(mesh), _metres(mesh) if millimetres else [], _of_bodies(mesh, inside)]
-        checks = [*every, *(_of_surface(mesh, inside, name) for pair in pairs for name in pair)]
-        checks += [*(sagitta(mesh, *pair) for pair in pairs if len(pair) == 2), _overlaps(mesh, inside, overlap)]
+        checks = [iter(faults(mesh)), _of_bodies(mesh, inside, millimetres)]
+        checks += [_of_surface(mesh, inside, name) for name in surfaces]
+        checks += [*(_sagitta(mesh, *pair) for pair in pairs if len(pair) == 2), _overlaps(mesh, inside, overlap)]
         found = next((said for check in checks for said in check), "")
         warnings = [said for body, cells in inside.items() for said in cracks(mesh, body, cells)]
     found, warnings = tagged.mesh.comm.bcast((found, warnings))
@@ -99,21 +100,17 @@ def check_mesh(
     return warnings
 
 
-def _metres(mesh: PlaneMesh) -> Iterator[str]:
-    size = np.ptp(mesh.x, axis=0).max()
-    if size < 1:
+def _of_bodies(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], millimetres: bool) -> Iterator[str]:
+    size, middle = np.ptp(mesh.x, axis=0).max(), mesh.x[mesh.cells].mean(axis=1)
+    if millimetres and size < 1:
         yield f"the mesh is {size:g} mm large; is it in metres? Then give mesh.scale = 1000"
-
-
-def _of_bodies(mesh: PlaneMesh, inside: Mapping[str, np.ndarray]) -> Iterator[str]:
-    middle = mesh.x[mesh.cells].mean(axis=1)
     of_none = ~np.logical_or.reduce(list(inside.values()))
     if of_none.any():
         yield f"{of_none.sum()} cells belong to no body, the first at {_at(middle[of_none][0])}"
     for a, b in combinations(inside, 2):
-        both = inside[a] & inside[b]
-        if both.any():
-            yield f"the bodies {a!r} and {b!r} share {both.sum()} cells, the first at {_at(middle[both][0])}"
+        if len(both := np.intersect1d(mesh.cells[inside[a]], mesh.cells[inside[b]])):
+            at = _at(mesh.x[both[0]])
+            yield f"the bodies {a!r} and {b!r} share {len(both)} nodes, as at {at}: mesh them apart, and tie them"
     for body, cells in inside.items():
         part = parts(mesh.cells[cells])
         count = np.bincount(part)
@@ -124,42 +121,45 @@ def _of_bodies(mesh: PlaneMesh, inside: Mapping[str, np.ndarray]) -> Iterator[st
 
 def parts(cells: np.ndarray) -> np.ndarray:
     """The part ``(m,)`` of each of ``cells``, from 0: cells that share sides are of one."""
+    if not len(cells):
+        return np.zeros(0, dtype=np.int32)
     _, which = distinct_edges(sides_of(cells)[:, :2])
     cell = np.arange(len(which)) // (len(which) // len(cells))
-    shape = (len(cells), which.max() + 1)
-    at_sides = coo_matrix((np.ones(len(which)), (cell, which)), shape).tocsr()
+    at_sides = coo_matrix((np.ones(len(which)), (cell, which))).tocsr()
     return connected_components(at_sides @ at_sides.T, directed=False)[1]
 
 
+def _facets(mesh: PlaneMesh, name: str) -> np.ndarray:
+    return mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])]
+
+
 def _of_surface(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], name: str) -> Iterator[str]:
-    sides = sides_of(mesh.cells)[:, :2]
-    edges = mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])][:, :2]
-    _, which = distinct_edges(np.concatenate([sides, edges]))
-    cells = np.flatnonzero(np.isin(which[: len(sides)], which[len(sides) :])) * len(mesh.cells) // len(sides)
-    owners = [body for body, of_body in inside.items() if of_body[cells].any()]
+    edges, (outer, _) = _facets(mesh, name), outer_sides(mesh.cells)
+    owners = [body for body, cells in inside.items() if np.isin(edges, mesh.cells[cells]).any()]
     if len(owners) > 1:
         yield f"the facet set {name!r} is of the bodies {' and '.join(map(repr, owners))}; a surface is of one"
-    elif len(cells) > len(edges):
+    _, which = distinct_edges(np.concatenate([outer, edges])[:, :2])
+    if not np.isin(which[len(outer) :], which[: len(outer)]).all():
         yield f"the facet set {name!r} lies inside the body {owners[0]!r}; a surface is on a boundary"
 
 
-def _outline(mesh: PlaneMesh, cells: np.ndarray) -> Array:
-    """The sides ``(k, pieces + 1, 2)`` around ``cells`` as polygons."""
-    sides = sides_of(mesh.cells[cells])
-    first, which = distinct_edges(sides[:, :2])
-    outer = sides[first[np.bincount(which) == 1]]
-    order = outer.shape[1] - 1
-    xi = np.linspace(0, 1, _PIECES + 1)
-    shape, _ = Curve(np.zeros((order + 1, 2)), order).shapes(xi)
-    return np.einsum("qa,kai->kqi", shape, mesh.x[outer[:, [0, *range(2, order + 1), 1]]])
+def _polygons(mesh: PlaneMesh, edges: np.ndarray) -> Array:
+    """Points ``(k, pieces + 1, 2)`` on ``edges`` ``(k, b)``."""
+    order = edges.shape[1] - 1
+    shape, _ = Curve(np.zeros((order + 1, 2)), order).shapes(np.linspace(0, 1, _PIECES + 1))
+    return np.einsum("qa,kai->kqi", shape, mesh.x[edges[:, [0, *range(2, order + 1), 1]]])
 
 
 def _overlaps(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], allowed: float) -> Iterator[str]:
-    """Vertices of a body that lie in another by more than is ``allowed``."""
-    outlines = {body: _outline(mesh, cells) for body, cells in inside.items()}
+    """Boundary vertices of a body, or middles of its cells there, that lie in another by more than is ``allowed``."""
+    outlines, probes = {}, {}
+    for body, cells in inside.items():
+        sides, behind = outer_sides(mesh.cells[cells])
+        outlines[body] = _polygons(mesh, sides)
+        probes[body] = np.concatenate([mesh.x[sides[:, 0]], mesh.x[mesh.cells[cells][behind]].mean(axis=1)])
     for a, b in permutations(outlines, 2):
         start, end = outlines[b][:, :-1].reshape(-1, 2), outlines[b][:, 1:].reshape(-1, 2)
-        points = outlines[a][:, 0]
+        points = probes[a]
         points = points[((points > start.min(axis=0)) & (points < start.max(axis=0))).all(axis=1)]
         spare = allowed + _INTO[mesh.edges.shape[1] > 2] * _PIECES * np.linalg.norm(end - start, axis=1)
         for part in np.array_split(points, 1 + len(points) * len(start) // _AT_ONCE):
@@ -191,9 +191,7 @@ def _distance(x: Array, start: Array, end: Array) -> tuple[Array, np.ndarray]:
 
 def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
     """A warning of nodes of a ``body`` of these ``cells`` that ought to be one."""
-    sides = sides_of(mesh.cells[cells])
-    first, which = distinct_edges(sides[:, :2])
-    nodes = np.unique(sides[first[np.bincount(which) == 1], :2])
+    nodes = np.unique(outer_sides(mesh.cells[cells])[0][:, :2])
     pairs = cKDTree(mesh.x[nodes]).query_pairs(_SAME * np.ptp(mesh.x, axis=0).max(), output_type="ndarray")
     if len(pairs):
         at = _at(mesh.x[nodes[pairs[0, 0]]])
@@ -202,34 +200,32 @@ def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
 
 def circle_through(x: Array) -> tuple[Array, float] | None:
     """Centre and radius of the circle that the points ``x`` ``(n, 2)`` lie on; None if there is none (Kasa 1976)."""
-    shift = x.mean(axis=0)
+    shift, size = x.mean(axis=0), np.ptp(x, axis=0).max()
     y = x - shift
     (a, b, c), *_ = np.linalg.lstsq(np.column_stack([2 * y, np.ones(len(y))]), (y**2).sum(axis=1), rcond=None)
-    radius = np.sqrt(max(c + a * a + b * b, 0.0))
+    radius = float(np.sqrt(max(c + a * a + b * b, 0.0)))
     off = np.abs(np.linalg.norm(y - [a, b], axis=1) - radius).max()
-    size = np.ptp(y, axis=0).max()
-    return (
-        None
-        if len(x) < 4 or off > _ROUND * size or _ROUND * radius > size
-        else (shift + np.array([a, b]), float(radius))
-    )
+    return None if len(x) < 4 or off > _ROUND * size or _ROUND * radius > size else (shift + np.array([a, b]), radius)
 
 
-def sagitta(mesh: PlaneMesh, first: str, second: str) -> Iterator[str]:
-    """What is said if two round surfaces have straight sides, whose sagitta h^2/(8 R) spoils the clearance."""
-    if mesh.edges.shape[1] > 2:
-        return
-    edges = [mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])] for name in (first, second)]
-    circles = [circle_through(mesh.x[np.unique(nodes)]) for nodes in edges]
-    if circles[0] is None or circles[1] is None:
-        return
-    length = [np.linalg.norm(np.diff(mesh.x[nodes], axis=1), axis=2).max() for nodes in edges]
-    deep = max(h**2 / (8 * circle[1]) for h, circle in zip(length, circles, strict=True) if circle)
-    clearance = abs(circles[0][1] - circles[1][1])
-    if deep > _COARSE * clearance:
-        arcs = f"the arcs {first!r} and {second!r} have straight sides with a sagitta of {deep:.2g}"
-        remedy = "give order = 2 in [mesh] with a [[mesh.circle]] for each, or a mesh of second order"
-        yield f"{arcs}, too much for their clearance of {clearance:.2g}; {remedy}"
+def _sagitta(mesh: PlaneMesh, *pair: str | float) -> Iterator[str]:
+    """What is said if a round surface beside another, or beside a disc of that radius, has straight sides, whose
+    sagitta h^2/(8 R) spoils the clearance."""
+    radii, deepest, names = [], 0.0, [name for name in pair if isinstance(name, str)]
+    for name in names:
+        edges = _facets(mesh, name)
+        if (circle := circle_through(mesh.x[np.unique(edges[:, :2])])) is None:
+            return
+        radii.append(circle[1])
+        side = _polygons(mesh, edges)
+        sagitta = ((side[:, -1] - side[:, 0]) ** 2).sum(axis=1) / (8 * circle[1])
+        bulge = np.linalg.norm(side[:, _PIECES // 2] - (side[:, 0] + side[:, -1]) / 2, axis=1)
+        deepest = max(deepest, sagitta[bulge < sagitta / 2].max(initial=0.0))
+    first, second = [*radii, *(radius for radius in pair if not isinstance(radius, str))]
+    if deepest > _COARSE * abs(first - second):
+        arcs = f"the arcs {' and '.join(map(repr, names))} have straight sides with a sagitta of {deepest:.2g}"
+        remedy = "give order = 2 in [mesh] and a [[mesh.circle]] for each, or a mesh that is curved"
+        yield f"{arcs}, too much for their clearance of {abs(first - second):.2g}; {remedy}"
 
 
 def free_motions(
@@ -240,18 +236,20 @@ def free_motions(
     Each body is ``held`` at points ``(k, 2)`` in directions ``(k, 2)``. Two bodies hold each other likewise by
     ``links``: contact without friction along its normals, ties in both directions.
     """
-    rows, names = [np.zeros((1, len(held), 3))], list(held)
+    names, rows = list(held), [np.zeros((3 * len(held), len(held), 3))]
     everything = [(a, a, x, n) for a, found in held.items() for x, n in found] + list(links)
-    size = max((np.abs(x).max() for _, _, x, _ in everything), default=1.0) or 1.0
+    size = max((np.ptp(x, axis=0).max() for _, _, x, _ in everything), default=1.0) or 1.0
+    centre = {name: next((x[0] for a, b, x, _ in everything if name in (a, b)), 0.0) for name in names}
     for a, b, x, n in everything:
         row = np.zeros((len(x), len(names), 3))
-        row[:, names.index(a)] = np.column_stack([n, (x[:, 0] * n[:, 1] - x[:, 1] * n[:, 0]) / size])
-        row[:, names.index(b)] -= row[:, names.index(a)] if a != b else 0.0
+        for body, sign in {b: -1, a: 1}.items():
+            X, Y = (x - centre[body]).T / size
+            row[:, names.index(body)] = sign * np.column_stack([n, X * n[:, 1] - Y * n[:, 0]])
         rows.append(row)
     moves = np.zeros((len(names), 3), dtype=bool)
     for kept in (3, 2):  # with rotations, of which others are a part, and without
         matrix = np.concatenate(rows)[:, :, :kept].reshape(-1, kept * len(names))
-        _, value, modes = np.linalg.svd(matrix.T @ matrix)
+        _, value, modes = np.linalg.svd(np.linalg.qr(matrix, mode="r"))
         free = modes[value <= _HELD * max(value.max(), 1.0)].reshape(-1, len(names), kept)
         moves[:, :kept] = (np.abs(free) > _HELD).any(axis=0)
     return {name: list(compress(_MOTIONS, moved)) for name, moved in zip(names, moves, strict=True)}

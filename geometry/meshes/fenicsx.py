@@ -97,7 +97,8 @@ def _made(
         for tag, name in curves.items():
             nodes = np.unique(mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])])
             mesh.x[nodes] = adjust(mesh.x[nodes], int(tag))
-        mesh.centre()
+        if quads:
+            mesh.centre()
     return mesh
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 from dolfinx.mesh import CellType, to_type
 
-from archord.geometry.basis import Array, cell_kind, lagrange_element
+from archord.geometry.basis import TRIANGLE, Array, cell_kind, lagrange_element
 
 _FAR = 1e30  # coordinates beyond overflow
 _THICK = 1e-6  # difference of z over the mesh's size
@@ -110,20 +110,30 @@ class PlaneMesh:
         return replace(self, x=x, cells=cells, edges=np.column_stack([self.edges, of_edges]))
 
     def centre(self) -> None:
-        """Put the middle nodes of second-order quadrilaterals where their edges want them."""
-        if self.cells.shape[1] == 9:
-            self.x[self.cells[:, 8]] = _middles(self.x, self.cells)
+        """Put the nodes within cells where those on the cells' sides want them."""
+        weights = _within(self.cells.shape[1])
+        if n := len(weights):
+            self.x[self.cells[:, -n:]] = np.einsum("ib,cbk->cik", weights, self.x[self.cells[:, :-n]])
 
 
 def with_middle_nodes(x: Array, cells: np.ndarray) -> tuple[Array, np.ndarray]:
     """Nodes and cells ``(m, 9)`` of quadrilaterals ``cells`` ``(m, 8)``, four vertices before the middles of four edges
     in any order, with nodes ``x`` ``(n, 2)``: a middle node each, behind the others, where its 8 nodes interpolate."""
     middle = len(x) + np.arange(len(cells))
-    return np.concatenate([x, _middles(x, cells)]), np.column_stack([cells, middle])
+    return np.concatenate([x, np.einsum("b,cbk->ck", _within(9)[0], x[cells])]), np.column_stack([cells, middle])
 
 
-def _middles(x: Array, cells: np.ndarray) -> Array:
-    return x[cells[:, 4:8]].sum(axis=1) / 2 - x[cells[:, :4]].sum(axis=1) / 4
+def _within(nodes: int) -> Array:
+    """Weights ``(i, b)`` with which the ``b`` nodes on the sides of a cell of so many ``nodes`` place those within.
+
+    They are exact for all polynomials that the sides determine (Coons 1967), in cubic triangles for quadratic ones.
+    """
+    kind, order = cell_kind(nodes)
+    element, p = lagrange_element(kind, order), np.arange(order + 1)
+    x, y = (element.points[:, k, None] ** p for k in range(2))
+    i, j = np.nonzero(p[:, None] + p < order if kind == TRIANGLE else np.minimum(p[:, None], p) <= 1)
+    values, n = x[:, i] * y[:, j], len(element.entity_dofs[2][0])
+    return values[len(values) - n :] @ np.linalg.pinv(values[: len(values) - n])
 
 
 def distinct_edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -225,3 +235,11 @@ def sides_between(cells: np.ndarray, ends: np.ndarray) -> np.ndarray:
     sides = sides_of(cells)
     first, which = distinct_edges(np.concatenate([sides[:, :2], ends]))
     return first[which[len(sides) :]]
+
+
+def outer_sides(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Those of `sides_of` ``cells`` that one cell alone has, and the place ``(k,)`` of that cell."""
+    sides = sides_of(cells)
+    first, which = distinct_edges(sides[:, :2])
+    alone = first[np.bincount(which) == 1]
+    return sides[alone], alone * len(cells) // len(sides)

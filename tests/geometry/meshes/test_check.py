@@ -54,7 +54,12 @@ def test_a_sound_mesh_has_nothing_said_of_it(comm):
         (TWO, {"lower": "0", "upper": "2"}, {}, r"no cell set '2'"),
         (TWO, BOTH, {"pairs": [("0 top", "1 bottm")]}, r"no facet set '1 bottm' \(did you mean '1 bottom'\?\)"),
         (TWO, {"lower": "0"}, {}, r"6 cells belong to no body, the first at \(0.166667, 1.26\)"),
-        (TWO, {"lower": "0", "upper": "1", "again": "1"}, {}, "bodies 'upper' and 'again' share 6 cells"),
+        (
+            TWO,
+            {"lower": "0", "upper": "1", "again": "1"},
+            {},
+            "'upper' and 'again' share 12 nodes, as at .0, 1.01.",
+        ),
         (TWO, {"one": "both"}, {}, r"'one' has 2 unconnected parts, the smallest of 4 cells at \(0.25, 0.25\)"),
         (TWO, BOTH, {"pairs": [("seam",)]}, "set 'seam' is of the bodies 'lower' and 'upper'; a surface is of one"),
         (TWO, BOTH, {"pairs": [("middle",)]}, "set 'middle' lies inside the body 'lower'; a surface is on a boundary"),
@@ -65,7 +70,13 @@ def test_a_sound_mesh_has_nothing_said_of_it(comm):
             {},
             r"'lower' lies 0.1 deep in the body 'upper' at \(0.5, 1\)",
         ),
-        (joined(grid(2, 2), grid(1, 1, (0.2, 0.3), (0.1, 0.1))), BOTH, {}, "'upper' lies 0.3 deep in the body 'lower'"),
+        (
+            joined(grid(2, 2), grid(1, 1, (0.2, 0.3), (0.1, 0.1))),
+            BOTH,
+            {},
+            "'upper' lies 0.3 deep in the body 'lower'",
+        ),
+        (joined(grid(2, 2), grid(2, 2)), BOTH, {}, "'lower' lies 0.25 deep in the body 'upper'"),
     ],
 )
 def test_each_fault_has_its_sentence(comm, made, bodies, options, said):
@@ -115,11 +126,20 @@ PAIR = {"pairs": [("0 top", "1 top")]}
 
 
 def test_straight_sides_of_arcs_are_told_with_their_sagitta():
-    """pi/20 squared over 8 is 0.0031; with middle nodes on the circles there is none."""
+    """pi/20 squared over 8 is 0.0031, with middle nodes on straight sides, too; on the circles there is none. Tied arcs
+    may be as they are."""
     bodies = {"pin": "0", "plate": "1"}
     with pytest.raises(ValueError, match=r"a sagitta of 0.0031, too much for their clearance of 0.01"):
         check(MPI.COMM_SELF, arcs(0.01), bodies, **PAIR)
     assert check(MPI.COMM_SELF, arcs(0.1), bodies, **PAIR) == []
+    rigid = [(name, 0.99) for name in ("0 top", "1 top")]
+    with pytest.raises(ValueError, match=r"arcs '0 top' have .* a sagitta of 0.0031, too much for .* of 0.01"):
+        check(MPI.COMM_SELF, arcs(0.1), bodies, pairs=rigid[:1])
+    assert check(MPI.COMM_SELF, arcs(0.1), bodies, pairs=rigid[1:]) == []
+    straight = refined(PlaneMesh.of_sets(*arcs(0.01), {}), order=2)
+    with pytest.raises(ValueError, match=r"a sagitta of 0.0031"):
+        check_mesh(distribute(MPI.COMM_SELF, straight), bodies, **PAIR)
+    assert check_mesh(distribute(MPI.COMM_SELF, straight), bodies, pairs=[(name,) for name in PAIR["pairs"][0]]) == []
     circles = [Circle("0 top", (0.0, 0.0), 1.0), Circle("1 top", (0.0, 0.0), 1.01)]
     curved = refined(PlaneMesh.of_sets(*arcs(0.01), {}), order=2, circles=circles)
     assert check_mesh(distribute(MPI.COMM_SELF, curved), bodies, **PAIR) == []
@@ -173,10 +193,18 @@ def along(direction, *points):
         ([along(X, (7, 5), (7, 8))], ["y"]),
         ([along(X, (7, 5)), along(Y, (7, 5))], ["rotation"]),
         ([along(X, (7, 5)), along(Y, (7, 5), (8, 5))], []),
+        ([along(X, (1e6, 5)), along(Y, (1e6, 5), (1e6 + 1, 5))], []),
     ],
 )
 def test_motions_that_nothing_holds(held, free):
     assert free_motions({"body": held}) == {"body": free}
+
+
+def test_a_short_clamp_beside_a_long_one_holds():
+    long = np.random.default_rng(1).uniform(-500, 500, (3000, 2))
+    wide = [(long, np.tile(d, (3000, 1))) for d in (X, Y)]
+    narrow = [along(X, (1000, 0)), along(Y, (1000, 0), (1000.1, 0))]
+    assert free_motions({"a": wide, "b": narrow}) == {"a": [], "b": []}
 
 
 def test_bodies_that_hold_each_other():

@@ -24,7 +24,7 @@ from archord.geometry.meshes.refine import Circle
 CIRCLES = [Circle("arc", (0.0, 0.0), 1.0), Circle("hole", (0.0, 0.0), 1.01)]
 
 
-def draw(order, quads=False):
+def draw(order, quads=False, size=0.5):
     """A disc "pin" with its edge "arc" in a "plate" with a "hole", and the disc's point "east"."""
     model = gmsh.model
     disc, plate, hole = model.occ.addDisk(0, 0, 0, 1, 1), model.occ.addRectangle(-2, -2, 0, 4, 4), 9
@@ -38,7 +38,7 @@ def draw(order, quads=False):
     for name, lines in {"arc": [arc], "hole": hole, "rim": sorted(set(edges) - set(hole)), "plate": edges}.items():
         model.addPhysicalGroup(1, lines, name=name)
     model.addPhysicalGroup(0, [model.getBoundary([(1, arc)], combined=False)[0][1]], name="east")
-    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     if quads:
         gmsh.option.setNumber("Mesh.RecombineAll", 1)
         gmsh.option.setNumber("Mesh.RecombinationAlgorithm", 3)
@@ -282,6 +282,21 @@ def test_refined_and_raised_meshes_become_round(comm, quads, tmp_path):
         assert off[order, 1][1] == 4 * off[order, 0][1]
         assert off[order, 0][0] / off[order, 1][0] == pytest.approx(4 if order == 1 else 16, rel=0.1)
     np.testing.assert_allclose(mesh.point_sets["east"], [[1, 0]], atol=1e-9)
+
+
+@pytest.mark.parametrize("quads", [False, True])
+def test_nodes_within_cubic_cells_follow_the_circles(module, quads):
+    """Smooth functions are interpolated to the fourth power of the size beside the circles, too."""
+    off = []
+    for size in (0.25, 0.125):
+        gmsh.clear()
+        draw(1, quads, size)
+        mesh = read_mesh(gmsh, MPI.COMM_SELF, order=3, circles=CIRCLES).mesh
+        f, x = fem.Function(fem.functionspace(mesh, ("Lagrange", 3))), ufl.SpatialCoordinate(mesh)
+        f.interpolate(lambda x: np.sin(3 * x[0] + x[1]))
+        dx = ufl.dx(metadata={"quadrature_degree": 8})
+        off.append(fem.assemble_scalar(fem.form(abs(f - ufl.sin(3 * x[0] + x[1])) ** 4 * dx)) ** 0.25)
+    assert off[0] / off[1] == pytest.approx(16, rel=0.2)
 
 
 @pytest.mark.mpi
