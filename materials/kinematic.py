@@ -11,15 +11,14 @@ twice. In plane stress the strain out of the plane is found such that the stress
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from archord.materials.elasticity import Elastic
-from archord.materials.hardening import Hardening, LinearHardening
-from archord.materials.material import Array, Material
+from archord.materials.j2 import J2Material
+from archord.materials.material import Array, State
+from archord.materials.return_map import PlasticState, bracketed_newton
 
-_ITERATIONS = 60
 _TWICE = np.array([1.0, 1.0, 1.0, 2.0])  # products of tensors; engineering over tensor shear
 _TRACE = np.array([1.0, 1.0, 1.0, 0.0])
 _DEVIATOR = np.diag([1.0, 1.0, 1.0, 0.5]) - np.outer(_TRACE, _TRACE) / 3  # of engineering strains
@@ -27,27 +26,21 @@ _PLANE = np.array([0, 1, 3])
 
 
 @dataclass(frozen=True)
-class KinematicState:
-    """History of ``n`` points: plastic strain ``(n, 4)`` (tensor shear), PEEQ ``(n,)``, ``m`` back stresses
-    ``(n, m, 4)``, and the plastic work density ``(n,)``."""
+class KinematicState(PlasticState):
+    """History of ``n`` points, with ``m`` back stresses ``(n, m, 4)`` and the plastic work density ``(n,)``."""
 
-    plastic_strain: Array
-    peeq: Array
     back_stress: Array
     work: Array
 
 
 @dataclass(frozen=True)
-class KinematicMaterial(Elastic):
-    """Elastic-plastic solid with isotropic ``hardening`` and back stresses ``(C, gamma)``, moduli and rates of
+class KinematicMaterial(J2Material):
+    """Elastic-plastic solid with isotropic ``hardening`` and ``back_stresses`` ``(C, gamma)``, moduli and rates of
     recovery; ``gamma = 0`` is Prager's linear kinematic hardening. With recovery its tangent is not symmetric.
 
     Raises ValueError unless C is positive and gamma is not negative.
     """
 
-    yields = True
-
-    hardening: Hardening
     back_stresses: tuple[tuple[float, float], ...]
 
     def __post_init__(self) -> None:
@@ -55,25 +48,18 @@ class KinematicMaterial(Elastic):
         if not all(C > 0 and gamma >= 0 for C, gamma in self.back_stresses):
             raise ValueError("moduli of back stresses must be positive, rates of recovery must not be negative")
 
-    def elastic(self) -> Material:
-        """The solid with a yield stress out of reach."""
-        return replace(self, hardening=LinearHardening(np.inf))
-
     def state(self, n: int) -> KinematicState:
         """``n`` points that never yielded."""
         back = np.zeros((n, len(self.back_stresses), 4))
         return KinematicState(np.zeros((n, 4)), np.zeros(n), back, np.zeros(n))
 
-    def update(self, strain: Array, state: KinematicState) -> tuple[Array, Array, KinematicState]:
+    def update(self, strain: Array, state: State) -> tuple[Array, Array, KinematicState]:
         """The return map; in plane stress with the strain out of the plane as one more unknown."""
         whole = np.zeros((len(strain), 4))
         whole[:, _PLANE] = strain
-        if self.plane == "strain":
-            stress, tangent, new = self._return(whole, state)
-            flows = new.peeq > state.peeq
-        else:
-            stress, tangent, new = self._plane_stress(whole, state)
-            flows = new.peeq > state.peeq
+        stress, tangent, new = (self._return if self.plane == "strain" else self._plane_stress)(whole, state)
+        flows = new.peeq > state.peeq
+        if self.plane == "stress":
             ratio = tangent[:, :, 2] / tangent[:, 2, 2, None]
             tangent = tangent - ratio[:, :, None] * tangent[:, 2, None]
             stress = stress - ratio * stress[:, 2, None]  # all normal stresses share the pressure's round-off
@@ -83,26 +69,19 @@ class KinematicMaterial(Elastic):
 
     def _plane_stress(self, strain: Array, old: KinematicState) -> tuple[Array, Array, KinematicState]:
         """`_return` at the ``eps_zz`` at which ``s_zz`` vanishes, which increases with it."""
-        elastic, modulus = strain - old.plastic_strain * _TWICE, self.lame[0] + 2 * self.lame[1]
-        strain[:, 2] = old.plastic_strain[:, 2] - self.nu / (1 - self.nu) * (elastic[:, 0] + elastic[:, 1])
-        bounds: tuple[Array, Array] = np.full(len(strain), -np.inf), np.full(len(strain), np.inf)
-        low, high = bounds
-        for _ in range(_ITERATIONS):
-            stress, tangent, new = self._return(strain, old)
-            off, z = stress[:, 2], strain[:, 2]
-            low, high = np.where(off < 0, z, low), np.where(off > 0, z, high)
-            step = off / tangent[:, 2, 2]
-            strains = (np.abs(strain) + np.abs(old.plastic_strain)).sum(axis=1)
-            moving = ~(np.abs(off) <= 1e-13 * np.abs(stress).max(axis=1) + 4e-15 * modulus * strains)
-            if not moving.any():
-                break
-            z = np.where(moving, z - step, z)
-            astray = moving & ~((z > low) & (z < high))
+        modulus = self.lame[0] + 2 * self.lame[1]
+
+        def off(z: Array) -> tuple:
             strain[:, 2] = z
-            strain[astray, 2] = (low[astray] + high[astray]) / 2
-        else:
-            stress[moving] = np.nan
-        return stress, tangent, new
+            stress, tangent, new = self._return(strain, old)
+            strains = (np.abs(strain) + np.abs(old.plastic_strain)).sum(axis=1)
+            close = 1e-13 * np.abs(stress).max(axis=1) + 4e-15 * modulus * strains
+            return stress[:, 2], tangent[:, 2, 2], close / tangent[:, 2, 2], stress, tangent, new
+
+        elastic, far = strain - old.plastic_strain * _TWICE, np.full(len(strain), 1e100)
+        z = old.plastic_strain[:, 2] - self.nu / (1 - self.nu) * (elastic[:, 0] + elastic[:, 1])
+        _, (_, _, _, *found) = bracketed_newton(off, z, -far, far)
+        return tuple(found)
 
     def _return(self, strain: Array, old: KinematicState) -> tuple[Array, Array, KinematicState]:
         """Stress ``(n, 4)``, tangent ``(n, 4, 4)`` and new state at engineering strains ``(n, 4)``."""
@@ -151,36 +130,24 @@ class KinematicMaterial(Elastic):
         ``theta``, ``eta`` and its derivative."""
         _, mu = self.lame
         C, gamma = np.array(self.back_stresses, dtype=float).reshape(-1, 2).T
-        start: tuple[Array, Array] = np.zeros(len(trial)), np.zeros(len(trial))
-        d_peeq, low = start
-        high: Array = np.sqrt(1.5) * (_norm(trial) + _norm(back).sum(axis=1)) / (3 * mu)
-        close = 1e-14 * high
-        for _ in range(_ITERATIONS):
+        high = np.sqrt(1.5) * (_norm(trial) + _norm(back).sum(axis=1)) / (3 * mu)
+        close, start = 1e-14 * high, np.zeros(len(trial))
+
+        def off(d_peeq: Array) -> tuple:
             theta = 1 / (1 + gamma * d_peeq[:, None])
             eta = trial - np.einsum("nk,nki->ni", theta, back)
             rate = np.einsum("nk,nki->ni", gamma * theta**2, back)
-            length = _norm(eta)
-            off = np.sqrt(1.5) * length - (3 * mu + theta @ C) * d_peeq - self.hardening.stress(peeq + d_peeq)
-            slope = self.hardening.slope(peeq + d_peeq)
-            fall = 3 * mu + (theta**2) @ C + slope - np.sqrt(1.5) * _dot(rate, eta) / length
-            low, high = np.where(off > 0, d_peeq, low), np.where(off < 0, d_peeq, high)
-            step = off / fall
-            moving = ~(np.abs(step) <= close)
-            if not moving.any():
-                return d_peeq, fall, theta, eta, rate
-            d_peeq = np.where(moving, d_peeq + step, d_peeq)
-            astray = moving & ~((d_peeq >= low) & (d_peeq <= high))
-            d_peeq[astray] = (low + high)[astray] / 2
-        d_peeq[moving] = np.nan
+            length, after = _norm(eta), peeq + d_peeq
+            value = (3 * mu + theta @ C) * d_peeq + self.hardening.stress(after) - np.sqrt(1.5) * length
+            fall = 3 * mu + theta**2 @ C + self.hardening.slope(after) - np.sqrt(1.5) * _dot(rate, eta) / length
+            return value, fall, close, theta, eta, rate
+
+        d_peeq, (_, fall, _, theta, eta, rate) = bracketed_newton(off, start, start, high)
         return d_peeq, fall, theta, eta, rate
 
-    def dissipation(self, state: KinematicState) -> Array:
+    def dissipation(self, state: State) -> Array:
         """Plastic work density ``(n,)``, with what the back stresses store."""
         return state.work
-
-    def peeq(self, state: KinematicState) -> Array:
-        """PEEQ ``(n,)``."""
-        return state.peeq
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -12,6 +12,7 @@ With linear hardening in plane strain it has a closed form, `radial_return`, com
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -91,32 +92,42 @@ def plastic_multiplier(
     """``zeta`` and von Mises stress ``q``, ``(n,)`` each, of points that yield.
 
     With components ``a`` ``(n, k)`` of the trial stress, ``q^2 = sum_k weights_k (a_k / (1 + zeta compliance_k))^2``,
-    and ``d_peeq = 2/3 zeta q`` from the old ``peeq``. ``1/q - 1/stress(PEEQ)`` increases with ``zeta``: Newton's steps
-    that leave what brackets its zero, as they can where a hardening law is not concave, are halved intervals instead.
-    What does not converge is not a number.
+    and ``d_peeq = 2/3 zeta q`` from the old ``peeq``: the zero of ``1/q - 1/stress(PEEQ)``, which increases.
     """
-    start: tuple[Array, ...] = tuple(np.full(len(a), value) for value in (0.0, 0.0, np.inf))
-    zeta, low, high = start
-    close = 1e-10 / compliance.max()  # Newton is quadratic: a step this small leaves nothing but round-off
-    for _ in range(_ITERATIONS):
+
+    def off(zeta: Array) -> tuple[Array, Array, Array]:
         shrink = 1 + zeta[:, None] * compliance
         q = np.sqrt((a / shrink) ** 2 @ weights)
         fall = ((a**2 / shrink**3) @ (weights * compliance)) / q  # - dq / dzeta
         now = peeq + 2 / 3 * zeta * q
         strength = hardening.stress(now)
         rise = hardening.slope(now) * 2 / 3 * (q - zeta * fall)
-        off = 1 / q - 1 / strength
-        low, high = np.where(off < 0, zeta, low), np.where(off > 0, zeta, high)
-        step = off / (fall / q**2 + rise / strength**2)
-        moving = ~(np.abs(step) <= 1e-10 * zeta + close)
-        zeta = zeta - step
-        astray = moving & ~((zeta > low) & (zeta < high))
-        zeta[astray] = np.where(high == np.inf, 2 * low + close, (low + high) / 2)[astray]
-        if not moving.any():
-            break
-    else:
-        zeta[moving] = np.nan
+        return 1 / q - 1 / strength, fall / q**2 + rise / strength**2, 1e-10 * (zeta + 1 / compliance.max())
+
+    zeta, (value, slope, _) = bracketed_newton(off, np.zeros(len(a)), np.zeros(len(a)), np.full(len(a), np.inf))
+    zeta = zeta - value / slope  # so short a step of Newton's leaves nothing but round-off
     return zeta, np.sqrt((a / (1 + zeta[:, None] * compliance)) ** 2 @ weights)
+
+
+def bracketed_newton(f: Callable[[Array], tuple], x: Array, low: Array, high: Array) -> tuple[Array, tuple]:
+    """Zeros ``(n,)`` of functions that increase, from ``x``, and what ``f`` gives there; not a number where it does not
+    converge.
+
+    ``f(x)`` begins with values, slopes, and how short Newton's step from a zero is. Steps that leave what is known to
+    bracket a zero, as they can where a hardening law is not concave, are halved intervals instead.
+    """
+    for _ in range(_ITERATIONS):
+        found = off, slope, close, *_ = f(x)
+        low, high = np.where(off < 0, x, low), np.where(off > 0, x, high)
+        step = off / slope
+        moving = ~(np.abs(step) <= close)
+        if not moving.any():
+            return x, found
+        x = np.where(moving, x - step, x)
+        astray = moving & ~((x > low) & (x < high))
+        x = np.where(astray, np.where(high == np.inf, 2 * low + close, (low + high) / 2), x)
+    x = np.where(moving, np.nan, x)
+    return x, f(x)
 
 
 def radial_return(
