@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.solver.linear.direct import Direct
-from archord.solver.linear.strategy import Facts, Inverse, Strategy
+from archord.solver.linear.strategy import Facts, Strategy
 
 _SINGULAR = 1e-9  # stiffness against a motion over ``stiffness`` below which nothing resists the force
 _FORCED = 1e-3  # part of a right-hand side along such a motion above which the system has no solution
@@ -25,7 +25,7 @@ def why_not(facts: Facts) -> str | None:
     return None if facts.by_force else "no load is the force on a motion, or a mean displacement"
 
 
-class Bordered(Inverse):
+class Bordered(Strategy):
     """Python context of the bordered matrix and of its preconditioner, which solves with the last one that was
     factorised.
 
@@ -38,16 +38,13 @@ class Bordered(Inverse):
         self, A: PETSc.Mat, m: int, stiffness: float, factoriser: Callable[[PETSc.Mat], Strategy] = Direct
     ) -> None:
         self.comm, self._stiffness, self._factoriser = A.comm.tompi4py(), stiffness, factoriser
-        self._n = A.getLocalSize()[0]
-        self._extra = m if self.comm.rank == 0 else 0
-        self.B: Array = np.zeros((self._n, m))
-        self.C: Array = np.zeros((self._n, m))
+        self._n, self._extra = A.getLocalSize()[0], m if self.comm.rank == 0 else 0
+        zero: Array = np.zeros((self._n, m))
+        self.B = self.C = self._along_B = zero
         self.D: Array = np.zeros((m, m))
-        self._factorised: tuple[Array, Array] = self.C, self.D  # with the matrix that the preconditioner is of
-        self._stale = True
+        self._factorised = self.C, self.D  # with the matrix that the preconditioner is of
         self.singular: int | None = None
         self._x, self._y = A.createVecs()
-        self._along_B: Array = np.zeros((self._n, m))
         self._ksp = PETSc.KSP()
         size = (self._n + self._extra, None)
         self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=self.comm)

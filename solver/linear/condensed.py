@@ -22,7 +22,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.solver.linear.strategy import Facts, Inverse
+from archord.solver.linear.direct import Direct
+from archord.solver.linear.strategy import Facts, Strategy
 
 _MOST_DOFS = 8_000  # beyond, the work on contact dofs takes longer than factorisations
 _LARGE_GAMMA = 5.0  # beyond, the small system is close to singular
@@ -44,7 +45,7 @@ def why_not(facts: Facts) -> str | None:
     return None if facts.held() else "supports alone do not hold every body"
 
 
-class Condensed(Inverse):
+class Condensed(Strategy):
     """Python context of the matrix ``K + E D`` and of its preconditioner, which solves with it. Collective.
 
     ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)``, sorted, are the block dofs that may get
@@ -59,11 +60,7 @@ class Condensed(Inverse):
         self._start, self._end = K.getOwnershipRange()
         K.setOption(PETSc.Mat.Option.SPD, True)
         self._ksp = PETSc.KSP().create(K.comm)
-        self._ksp.setType("preonly")
-        self._ksp.setOperators(K)
-        pc = self._ksp.getPC()
-        pc.setType("cholesky")
-        pc.setFactorSolverType("mumps")
+        Direct(K, "cholesky").attach(self._ksp)
         self._y = K.createVecLeft()
         self._Z = self._responses(_dofs(nodes))
         self.occupy(*np.zeros((2, 0), dtype=np.int64))
@@ -122,7 +119,6 @@ class Condensed(Inverse):
         self._blocks: Array = np.zeros((len(rows), 2, 2))
         self._own_D, self._DZ = np.zeros((m, len(self._columns))), np.zeros((m, m))
         self._D = self._own_D if self.comm.size == 1 else self._own_D.copy()
-        self._filled = np.zeros(m, dtype=bool)  # rows of D
 
     def update(self, blocks: Array) -> None:
         """Make ``E D`` the sum of all ranks' ``blocks`` ``(b, 2, 2)``; what has not changed costs nothing."""
@@ -133,8 +129,7 @@ class Condensed(Inverse):
         touched[self._row[changed]] = 1.0
         row = _dofs(np.flatnonzero(self._sum(touched)))
         D = self._sum(self._own_D[row])
-        self._D[row], self._filled[row] = D, D.any(axis=1)
-        used = np.flatnonzero(D.any(axis=0))
+        self._D[row], used = D, np.flatnonzero(D.any(axis=0))
         self._DZ[row] = D[:, used] @ self._near_Z[used]
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -161,7 +156,7 @@ class Condensed(Inverse):
     def _drawn(self, y: Array) -> Array:
         """``(1 + D Z)^-1 D y`` of ``y`` ``(2 k,)`` at ``near``, a force on each dof of the nodes ``(2 m,)``."""
         force = np.zeros(len(self._DZ))
-        rows = np.flatnonzero(self._filled)
+        rows = np.flatnonzero(self._D.any(axis=1))
         small = self._DZ[np.ix_(rows, rows)]
         small[np.diag_indices(len(rows))] += 1
         try:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from petsc4py import PETSc
 
+from archord.solver.linear.strategy import Strategy
+
 _SPARE = 60  # per cent of MUMPS's workspace
 
 
-class Direct:
-    """One sparse factorisation of the whole ``matrix``, by MUMPS. Collective."""
+class Direct(Strategy):
+    """One sparse factorisation of the whole ``matrix``, by MUMPS, of the ``kind`` "lu" or "cholesky". Collective."""
 
-    def __init__(self, matrix: PETSc.Mat) -> None:
-        self.matrix = matrix
+    def __init__(self, matrix: PETSc.Mat, kind: str = "lu") -> None:
+        self.matrix, self._kind = matrix, kind
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` factorise the matrix."""
         ksp.setType("preonly")
         ksp.setOperators(self.matrix)
         pc = ksp.getPC()
-        pc.setType("lu")
+        pc.setType(self._kind)
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
         factors = pc.getFactorMatrix()

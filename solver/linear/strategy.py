@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -24,18 +23,10 @@ class Facts:
     held: Callable[[], bool]
 
 
-class Strategy(Protocol):
-    """A way to solve with a matrix, as PETSc's linear solver ``ksp`` is told by `attach`; beside it a function
+class Strategy:
+    """A way to solve with a ``matrix``, as PETSc's linear solver ``ksp`` is told by `attach`: unless a strategy says
+    otherwise it is the Python context of a preconditioner, which solves exactly. Beside it a function
     ``why_not(facts)`` returns a reason not to use it, or None. Collective."""
-
-    matrix: PETSc.Mat
-
-    def attach(self, ksp: PETSc.KSP) -> None:
-        """Let ``ksp`` solve so."""
-
-
-class Inverse:
-    """A strategy that is the Python context of a preconditioner, which solves with the ``matrix`` exactly."""
 
     matrix: PETSc.Mat
 

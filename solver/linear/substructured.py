@@ -22,7 +22,7 @@ from petsc4py import PETSc
 
 from archord.kernels.compiled import CompilerError, library, pointer
 from archord.solver.linear.nested_dissection import before_corners, corners, metis
-from archord.solver.linear.strategy import Facts, Inverse
+from archord.solver.linear.strategy import Facts, Strategy
 
 _LARGEST_INTERFACE = 4000  # unknowns: every rank factorises a dense matrix of that size
 
@@ -78,7 +78,7 @@ def schur_kernels() -> Any:
     return library(Path(__file__).with_name("schur.c"), libraries=("dmumps",))
 
 
-class Substructures(Inverse):
+class Substructures(Strategy):
     """Python context of a preconditioner that solves with matrices of the pattern of ``A``, whose dofs ``interface``
     ``(m,)``, sorted, separate the ranks, and whose nodes have ``corner`` as in `corners`. Collective."""
 
