@@ -42,7 +42,7 @@ class Bordered(Strategy):
         zero: Array = np.zeros((self._n, m))
         self.B = self.C = self._along_B = zero
         self.D: Array = np.zeros((m, m))
-        self._factorised = self.C, self.D  # with the matrix that the preconditioner is of
+        self._factorised: tuple[Array, Array] = self.C, self.D  # with the matrix that the preconditioner is of
         self.singular: int | None = None
         self._x, self._y = A.createVecs()
         self._ksp = PETSc.KSP()
