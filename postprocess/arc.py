@@ -15,32 +15,29 @@ from archord.presets.arc import ArcProfile
 from archord.presets.edge import PER_STEP, SurfaceProfile
 from archord.scene.errors import InputError
 
-_FIXED, _PER_STEP = ("s", "weight", "X"), (*PER_STEP, "slip")  # of general runs
-
 
 def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
     """The sides of ``run``, of a joint, at ``step`` (from 1); a side whose arc was not integrated is absent.
 
     Raises `InputError` if contact.h5 is missing, damaged or does not hold the step.
     """
+    if run.folder is None:
+        raise InputError(f"{run.name}: has no folder.")
     radius = {"pin": run.R, "hole": run.R + run.dR}
-    found = _read(run.folder, run.name, step, ("s", "weight"), PER_STEP)
+    found = _read(run.folder, step, ("s", "weight"), PER_STEP)
     return {side: ArcProfile(**found[side], radius=radius[side]) for side in radius if side in found}
 
 
 def read_surfaces(folder: Path, step: int) -> dict[str, SurfaceProfile]:
     """The integrated surfaces of a general run at ``step``, by name. Raises `InputError` as `read_arcs`."""
-    return {
-        name: SurfaceProfile(**found) for name, found in _read(folder, str(folder), step, _FIXED, _PER_STEP).items()
-    }
+    found = _read(folder, step, ("s", "weight", "X"), (*PER_STEP, "slip"))
+    return {name: SurfaceProfile(**arrays) for name, arrays in found.items()}
 
 
-def _read(
-    folder: Path | None, said: str, step: int, fixed: tuple[str, ...], per_step: tuple[str, ...]
-) -> dict[str, dict[str, Array]]:
-    path = folder / "contact.h5" if folder else None
-    if path is None or not path.is_file():
-        raise InputError(f"{said}: is not a complete run folder: contact.h5 is missing.")
+def _read(folder: Path, step: int, fixed: tuple[str, ...], per_step: tuple[str, ...]) -> dict[str, dict[str, Array]]:
+    path = folder / "contact.h5"
+    if not path.is_file():
+        raise InputError(f"{folder}: is not a complete run folder: contact.h5 is missing.")
     try:
         with h5py.File(path) as file:
             if int(file["accepted"][()]) < step:

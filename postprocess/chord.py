@@ -5,9 +5,7 @@ from the contact axis is projected along its radius onto the chord of length ``l
 
     x = R cos(eps/2) [ tan(phi - eps/2) + tan(eps/2) ],    dx = R dphi cos(eps/2)/cos^2(phi - eps/2),
 
-and the pressure there carries the arc's vertical force, ``py dx = p cos(phi) R dphi``:
-
-    py = p cos(phi) cos^2(phi - eps/2)/cos(eps/2).
+and the pressure there carries the arc's vertical force, ``py dx = p cos(phi) R dphi``.
 """
 
 from __future__ import annotations
@@ -28,14 +26,13 @@ from archord.scene.errors import InputError
 class ChordPressure:
     """Vertical pressure on the chord of one half of the joint, at ``n`` points ordered from the contact axis.
 
-    ``x`` runs from 0 at the deepest point to ``l`` at the edge ``eps`` of the contact; points that carry pressure
-    beyond the edge have ``x > l``. ``weight`` is each point's share of the chord, so that ``sum(weight py)`` is the
-    force of the half.
+    ``x`` runs from 0 at the deepest point to the ``length`` at the edge ``eps`` of the contact, and beyond where points
+    carry pressure there.
     """
 
     x: Array  # (n,)
     py: Array  # (n,) positive in compression
-    weight: Array  # (n,)
+    weight: Array  # (n,) each point's share of the chord
     eps: float
     R: float
 
@@ -68,13 +65,11 @@ def arc_angle(x: ArrayLike, eps: float, R: float) -> Array:
 def chord_projection(
     phi: ArrayLike, pressure: ArrayLike, eps: float, R: float, weight: ArrayLike | None = None
 ) -> ChordPressure:
-    """Project ``pressure`` at the angles ``phi`` [rad] from the contact axis onto the chord of ``eps`` (eq. 15).
+    """Project ``pressure`` at the rising angles ``phi`` [rad] from the contact axis onto the chord of ``eps`` (eq. 15).
 
-    Arrays of one shape, in the order of the angle; ``weight`` is each point's share of arc length, by default that of
-    the trapezoidal rule, which counts nothing between the axis and a first point past it. The resultant is that of the
-    arc, ``2 sum(weight pressure cos(phi))``, but for round-off, whatever ``eps`` is: points beyond it stay as long as
-    they carry pressure, the others there are left out. Raises ValueError for angles that do not rise from 0, pressure
-    beyond pi/2, numbers that are not finite, and a contact angle that is not between 0 and pi.
+    Arrays of one shape; ``weight`` is each point's share of arc length, by default that of the trapezoidal rule. The
+    resultant is that of the arc, whatever ``eps`` is: points beyond it stay as long as they carry pressure. Raises
+    ValueError for arrays that are no such arc, and for pressure beyond pi/2.
     """
     angle, p = (np.ravel(np.asarray(values, float)) for values in (phi, pressure))
     gap = np.diff(angle) * R
@@ -84,29 +79,26 @@ def chord_projection(
         raise ValueError(f"the contact semi-angle {eps:g} must be between 0 and pi, the radius {R:g} positive.")
     if not 1 < len(angle) == len(p) == len(measure):
         raise ValueError("phi, pressure and weight must have the same length, two or more.")
-    if not (angle[0] >= 0 and (np.diff(angle) >= 0).all() and np.isfinite(p).all()):
+    if not (angle[0] >= 0 and (gap >= 0).all() and np.isfinite(p).all()):
         raise ValueError("phi must rise from the contact axis, from 0 or more, and the pressure must be finite.")
     kept = (angle <= eps) | (p != 0)
     angle, p, measure = angle[kept], p[kept], measure[kept]
     if len(angle) and angle[-1] > np.pi / 2 * (1 + 1e-12):
         raise ValueError("the contact must end within pi/2 of the axis.")
     stretch = np.cos(eps / 2) / np.cos(angle - eps / 2) ** 2
-    x, py = chord_coordinate(angle, eps, R), p * np.cos(angle) / stretch
-    return ChordPressure(x, py, measure * stretch, float(eps), float(R))
+    return ChordPressure(chord_coordinate(angle, eps, R), p * np.cos(angle) / stretch, measure * stretch, eps, R)
 
 
 def read_chord_pressure(folder: str | Path, step: int | None = None, side: str | None = None) -> ChordPressure:
     """Chord pressure on one ``side`` ("pin" or "hole"; the hole, if both are there) at a ``step`` of a run (the last).
 
-    ``R`` is the side's own radius (that of the hole is R + dR) and ``eps`` the step's in history.csv. Raises
-    `InputError` where there is no run, no such step or side, no contact angle, or one beyond pi/2 (a ring).
+    ``R`` is the side's own radius and ``eps`` the step's in history.csv. Raises `InputError` where there is no such
+    run, step or side, no contact angle, or one beyond pi/2 (a ring).
     """
     run = Run(folder)
     number, arc = run.number(step), run.arc(step, side)
-    eps = run.columns["eps"][number - 1]
-    if not eps > 0:
-        raise InputError(f"{folder}: has no contact angle at step {number}.")
+    eps = run.curve.eps[number - 1]
     try:
         return chord_projection(arc.angle, arc.pressure, eps, arc.radius, arc.weight)
-    except ValueError as error:  # a ring's contact beyond a quarter circle, or a file that is not a run's
+    except ValueError as error:
         raise InputError(f"{folder}: step {number} cannot be projected: {error}") from None

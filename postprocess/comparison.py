@@ -1,8 +1,9 @@
-"""Runs against the first of them: P, p0 and eps at common displacements, and what differs in their scenes.
+"""Runs against the first of them: their curves at common loads, and what differs in their scenes.
 
-Runs that were led through the same displacements are compared step by step, unloading included. Of others the first
-loading counts, the steps before the pin first goes back, at those displacements of the first run that all reach;
-between their steps the others are interpolated by monotone cubics (Fritsch and Carlson 1980).
+Of joints P, p0 and eps over the displacement, of general runs the quantities that all of them have over the load
+factor. Runs that were led through the same loads are compared step by step, unloading included. Of others the first
+loading counts, the steps before the pin first goes back, at those loads of the first run that all reach; between their
+steps the others are interpolated by monotone cubics (Fritsch and Carlson 1980).
 """
 
 from __future__ import annotations
@@ -10,29 +11,30 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from archord.materials.material import Array
-from archord.postprocess.curve import RunCurve, gap_name
+from archord.postprocess.curve import RunCurve, first_loading, gap_name
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import scene_keys
-from archord.scene.scene import Scene
 
 COMPARED = ("P", "p0", "eps")
-_SAME = 1e-9  # relative difference up to which displacements, or sizes of the joint, are the same
+COMMON = (" force", " largest pressure", " peeq_max")  # ends of what general runs are compared by
+_SAME = 1e-9  # relative difference up to which loads, or sizes of the joint, are the same
 _NOTHING = 1e-9  # part of the largest value below which a relative difference says nothing
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """``r`` runs at ``n`` common displacements, in the form of `comparable`."""
+    """``r`` runs at ``n`` common loads."""
 
     runs: list[Run]
-    labels: dict[str, str]  # of "delta", or the load factor, and of the quantities: `COMPARED`, of a joint
+    labels: dict[str, str]  # of "load" and of the quantities
     step_by_step: bool
-    delta: Array  # (n,)
+    load: Array  # (n,)
     values: dict[str, Array]  # (r, n)
     interpolated: np.ndarray  # (r, n) whether the values lie between steps
 
@@ -51,61 +53,50 @@ def compare_runs(runs: list[Run]) -> Comparison:
     """Compare ``runs`` with the first. Raises `InputError` for fewer than two, one without steps, or no common load."""
     if len(runs) < 2:
         raise InputError("compare: needs two runs or more.")
-    if not any(run.is_joint for run in runs):
-        return _of_problems(runs)
-    curves, labels, _ = comparable(runs)
-    delta = curves[0].delta
-    margin = _SAME * np.abs(delta).max()
-    step_by_step = all(len(c.delta) == len(delta) and np.allclose(c.delta, delta, rtol=0, atol=margin) for c in curves)
-    between: np.ndarray = np.zeros((len(runs), len(delta)), dtype=bool)
-    if not step_by_step:
-        curves = [curve.first_loading() for curve in curves]
-        low, high = max(c.delta[0] for c in curves), min(c.delta[-1] for c in curves)
-        delta = curves[0].delta
-        delta = delta[(delta >= low - margin) & (delta <= high + margin)]
-        if not len(delta):
-            raise InputError(f"{runs[0].folder}: shares no range of displacements with the others.")
-        between = np.array([np.abs(delta[:, None] - c.delta).min(axis=1) > margin for c in curves])
-        curves = [_at(delta, curve, k) for curve, k in zip(curves, between, strict=True)]
-    values = {name: np.array([getattr(curve, name) for curve in curves]) for name in COMPARED}
-    return Comparison(runs, labels, step_by_step, delta, values, between)
+    if any(run.is_joint for run in runs):
+        curves, labels, _ = comparable(runs)
+        labels["load"] = labels.pop("delta")
+        tables = [{"load": curve.delta} | {name: getattr(curve, name) for name in COMPARED} for curve in curves]
+    else:
+        tables, labels = _of_problems(runs)
+    load = tables[0]["load"]
+    margin = _SAME * np.abs(load).max()
+    alike = [len(t["load"]) == len(load) and np.allclose(t["load"], load, rtol=0, atol=margin) for t in tables]
+    between: np.ndarray = np.zeros((len(runs), len(load)), dtype=bool)
+    if not all(alike):
+        tables = [{name: values[first_loading(t["load"])] for name, values in t.items()} for t in tables]
+        low, high = max(t["load"][0] for t in tables), min(t["load"][-1] for t in tables)
+        load = tables[0]["load"]
+        load = load[(load >= low - margin) & (load <= high + margin)]
+        if not len(load):
+            raise InputError(f"{runs[0].folder}: shares no range of {runs[0].loads_said} with the others.")
+        between = np.array([np.abs(load[:, None] - t["load"]).min(axis=1) > margin for t in tables])
+    pairs = list(zip(tables, between, strict=True))
+    values = {name: np.array([_at(load, t["load"], t[name], k) for t, k in pairs]) for name in labels if name != "load"}
+    return Comparison(runs, labels, all(alike), load, values, between)
 
 
-def _of_problems(runs: list[Run]) -> Comparison:
-    """Forces, largest pressures and PEEQ that all ``runs`` of general scenes have, at load factors of the first."""
-    from scipy.interpolate import PchipInterpolator
-
+def _of_problems(runs: list[Run]) -> tuple[list[dict[str, Array]], dict[str, str]]:
+    """Columns of general ``runs`` that all have, and their labels."""
+    units = runs[0].units
+    names = [name for name in runs[0].columns if name.endswith(COMMON) and all(name in run.columns for run in runs)]
     for run in runs:
         run.number(None)
-        if (run.scene.units, run.force_unit) != (runs[0].scene.units, runs[0].force_unit):
-            raise InputError(f"{run.folder}: has other units, or another unit of force, than {runs[0].folder}.")
-    paths = [np.array(run.path) for run in runs]
-    low, high = (ends(path[end] for path in paths) for ends, end in ((max, 0), (min, -1)))
-    at = paths[0][(paths[0] >= low - _SAME) & (paths[0] <= high + _SAME)]
-    units, ends = runs[0].history.attrs["units"], (" force", " largest pressure", " peeq_max")
-    names = [n for n in runs[0].columns if n.endswith(ends) and all(n in run.columns for run in runs)]
-    if not len(at) or not names:
-        raise InputError(f"{runs[0].folder}: shares no range of load factors, or no load, with the others.")
-    between = np.array([np.abs(at[:, None] - path).min(axis=1) > _SAME for path in paths])
-    values: dict[str, Array] = {name: np.empty((len(runs), len(at))) for name in names}
-    for k, (run, path) in enumerate(zip(runs, paths, strict=True)):
-        for name in names:
-            table = np.array(run.columns[name])
-            values[name][k] = table[np.abs(at[:, None] - path).argmin(axis=1)]
-            if between[k].any():
-                values[name][k, between[k]] = PchipInterpolator(path, table)(at[between[k]])
-    labels = {"delta": "load factor"} | {n: f"{n} [{units[n]}]" if n in units else n for n in names}
-    return Comparison(runs, labels, not between.any(), at, values, between)
+        if any(run.units.get(name) != units.get(name) for name in names):
+            raise InputError(f"{run.folder}: has other units than {runs[0].folder}.")
+    if not names:
+        raise InputError(f"{runs[0].folder}: shares no load with the others.")
+    tables = [{"load": np.array(run.path)} | {name: np.array(run.columns[name]) for name in names} for run in runs]
+    return tables, {"load": "load factor"} | {name: runs[0].heading(name) for name in names}
 
 
-def _at(delta: Array, curve: RunCurve, between: np.ndarray) -> RunCurve:
-    """The ``curve`` at ``delta`` ``(n,)``; interpolated where that lies ``between`` its steps."""
-    found = curve.at(np.abs(delta[:, None] - curve.delta).argmin(axis=1))
+def _at(load: Array, own: Array, values: Array, between: np.ndarray) -> Array:
+    """The ``values`` of a run with its ``own`` loads at ``load`` ``(n,)``; interpolated where that lies ``between``."""
+    found = values[np.abs(load[:, None] - own).argmin(axis=1)]
     if between.any():
         from scipy.interpolate import PchipInterpolator
 
-        for name in COMPARED:
-            getattr(found, name)[between] = PchipInterpolator(curve.delta, getattr(curve, name))(delta[between])
+        found[between] = PchipInterpolator(own, values)(load[between])
     return found
 
 
@@ -127,7 +118,7 @@ def comparable(runs: Sequence[Run]) -> tuple[list[RunCurve], dict[str, str], lis
     return scaled, labels, scales
 
 
-def differing_keys(scenes: Sequence[Scene]) -> dict[str, list[str]]:
+def differing_keys(scenes: Sequence[Any]) -> dict[str, list[str]]:
     """Keys in which the ``scenes`` differ, and their values as TOML writes them; empty where a scene has none."""
     tables = [scene_keys(scene) for scene in scenes]
     names = list(dict.fromkeys(name for table in tables for name in table))

@@ -17,7 +17,7 @@ _SAME = 1e-6  # relative difference of two forces that are the same but for what
 
 @dataclass(frozen=True)
 class RunCurve:
-    """Accepted steps of a run, in the scene's units: arrays ``(n,)`` over the steps."""
+    """Accepted steps of a run, in the scene's units: arrays ``(n,)`` over the steps. Forces are per unit thickness."""
 
     name: str
     scene: Scene
@@ -38,30 +38,24 @@ class RunCurve:
         """Radius of the pin."""
         return self.scene.joint.radius
 
-    @cached_property
+    @property
     def dR(self) -> float:
         """Clearance."""
         return self.scene.joint.dR
 
-    @cached_property
+    @property
     def sigY(self) -> float | None:
         """Yield stress of the weaker body; None if neither yields."""
-        given = [s.yield_stress for s in (self.scene.pin, self.scene.block) if s.yield_stress is not None]
-        return min(given, default=None)
+        return min((s.yield_stress for s in self.scene.solids.values() if s.yield_stress is not None), default=None)
 
     @property
     def plane(self) -> str:
         """Plane of the analysis: "strain" or "stress"."""
         return self.scene.analysis.plane
 
-    def at(self, steps: np.ndarray | slice) -> RunCurve:
-        """The chosen ``steps`` alone."""
-        return replace(self, **{name: getattr(self, name)[steps] for name in CURVES})
-
     def first_loading(self) -> RunCurve:
         """The steps before the pin first goes back."""
-        back = np.flatnonzero(np.diff(self.delta) <= 0)
-        return self.at(slice(int(back[0]) + 1 if len(back) else None))
+        return self._at(first_loading(self.delta))
 
     def loading(self) -> RunCurve:
         """The steps at which the pin is deeper in the hole than ever before; unloading and what it repeats left out.
@@ -74,7 +68,16 @@ class RunCurve:
         first, going_on = np.zeros(len(self.delta), dtype=bool), True
         for i in range(len(first)):
             first[i] = going_on = deeper[i] and (going_on or stronger[i])
-        return self.at(first)
+        return self._at(first)
+
+    def _at(self, steps: np.ndarray | slice) -> RunCurve:
+        return replace(self, **{name: getattr(self, name)[steps] for name in CURVES})
+
+
+def first_loading(load: Array) -> slice:
+    """The steps before ``load`` ``(n,)`` first goes back."""
+    back = np.flatnonzero(np.diff(load) <= 0)
+    return slice(int(back[0]) + 1 if len(back) else None)
 
 
 def gap_name(dR: float, symbol: str = "dR") -> str:

@@ -23,11 +23,10 @@ _DATA_OF_ARC = ("pressure", "raw_pressure", "gap", "angle", "s")
 
 
 def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
-    """Write history.csv and contact.csv (all steps, with step and delta, or the load factor, before the columns of
-    `Run.pressure`) into ``folder``, which is made if need be; returns the files. Columns are headed ``name [unit]``.
+    """Write history.csv and contact.csv (`Run.pressure` of all steps) into ``folder``; returns the files.
 
-    Raises `InputError` if the run has no accepted step, a file of it is damaged, or one that would be written is there
-    already and ``force`` is not given.
+    Columns are headed ``name [unit]``. Raises `InputError` if the run has no accepted step, a file of it is damaged, or
+    one that would be written is there already and ``force`` is not given.
     """
     import pandas as pd
 
@@ -36,9 +35,10 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
     run.number(None)
     tables = {folder / "history.csv": run.history}
     if run.has_contact:
+        names = ["step", "delta" if run.is_joint else "load_factor"]
         steps = {(n, load): run.pressure(n) for n, load in enumerate(run.path, 1)}
-        contact = pd.concat(steps, names=["step", "delta" if run.is_joint else "load_factor"]).reset_index(level=[0, 1])
-        contact.attrs["units"] = run.pressure().attrs["units"] | {"delta": run.scene.units.length}
+        contact = pd.concat(steps, names=names).reset_index(level=[0, 1])
+        contact.attrs["units"] = run.pressure().attrs["units"] | {n: run.units[n] for n in names if n in run.units}
         tables[folder / "contact.csv"] = contact
     _check_new(tables, folder, force)
     for file, table in tables.items():
@@ -48,11 +48,10 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
 
 
 def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> list[Path]:
-    """Write all steps of ``run``, or one ``step`` alone, into ``folder``, which is made if need be; returns the files,
-    the .pvd first. Time is delta, or the load factor; the number of the step, where that does not only grow.
+    """Write all steps of ``run``, or one ``step`` alone, into ``folder``; returns the files, the .pvd first.
 
-    Raises `InputError` if the run wrote no fields or has no such step, a file of it is damaged, or one that would be
-    written is there already and ``force`` is not given.
+    Time is delta, or the load factor; the number of the step, where that does not only grow. Raises `InputError` as
+    `export_csv`, and if the run wrote no fields.
     """
     import meshio
 
@@ -76,7 +75,7 @@ def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool =
 
 
 def _bodies(fields: Fields) -> dict:
-    """All bodies: points, second-order cells and their data, as meshio takes them."""
+    """All bodies, as meshio takes them."""
     return {
         "points": np.pad(fields.coordinates, ((0, 0), (0, 1))),
         "cells": [({6: "triangle6", 9: "quad9"}[fields.cells.shape[1]], fields.cells)],
@@ -87,7 +86,7 @@ def _bodies(fields: Fields) -> dict:
 
 def _contact(run: Run, step: int) -> dict:
     """The integration points of the arcs, joined by lines within each facet, and their data; ``side`` is 1 on the pin
-    and 2 on the hole, or counts the surfaces of a general run."""
+    and 2 on the hole, or counts the surfaces."""
     table = run.pressure(step)
     sides = ["pin", "hole"] if run.is_joint else list(table["side"].unique())
     facet, side = table["facet"].to_numpy(), table["side"].map(sides.index).to_numpy(np.int8) + 1
@@ -101,10 +100,7 @@ def _contact(run: Run, step: int) -> dict:
 
 
 def _check_new(files: Iterable[Path], folder: Path, force: bool) -> None:
-    """Make ``folder`` and check that all ``files`` in it can be written, over others only with ``force``.
-
-    Raises `InputError`.
-    """
+    """Make ``folder`` and check that all ``files`` in it can be written. Raises `InputError`."""
     claim_folder(folder, force=True)
     for file in files:
         check_target(file, (), force=force)

@@ -12,6 +12,7 @@ import pandas as pd
 
 from archord.postprocess.arc import undeformed
 
+_OF_POINTS = ("s", "angle", "weight", "pressure", "raw_pressure", "gap")
 _TEXT = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
 
 
@@ -53,12 +54,9 @@ def contact_frame(arcs: dict[str, Any], scene: Any) -> pd.DataFrame:
     parts = []
     for side, arc in arcs.items():
         X = undeformed(arc, side, scene)
-        (x, y), moved = np.moveaxis(X, -1, 0), arc.coordinates - X
-        facet = np.broadcast_to(np.arange(1, len(x) + 1)[:, None], x.shape)
-        columns = {"facet": facet} | {
-            name: getattr(arc, name) for name in ("s", "angle", "weight") if hasattr(arc, name)
-        }
-        columns |= {name: getattr(arc, name) for name in ("pressure", "raw_pressure", "gap")}
-        columns |= {"x": x, "y": y, "ux": moved[..., 0], "uy": moved[..., 1]}
+        (x, y), (ux, uy) = np.moveaxis(X, -1, 0), np.moveaxis(arc.coordinates - X, -1, 0)
+        columns = {"facet": np.broadcast_to(np.arange(1, len(x) + 1)[:, None], x.shape)}
+        columns |= {name: getattr(arc, name) for name in _OF_POINTS if hasattr(arc, name)}
+        columns |= {"x": x, "y": y, "ux": ux, "uy": uy}
         parts.append(pd.DataFrame({"side": side} | {name: values.ravel() for name, values in columns.items()}))
     return frame_of(pd.concat(parts, ignore_index=True), units)

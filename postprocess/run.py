@@ -5,6 +5,7 @@ Arrays and tables are read when they are asked for, and pandas is imported only 
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Sequence
 from functools import cached_property
@@ -37,7 +38,7 @@ class Run:
 
     ``status`` says how it ended: "done", "stopped" (``message`` says why) or "interrupted"; "running", if it has not or
     was killed. ``steps`` is the number of accepted steps, which are counted from 1; ``columns`` are those of
-    history.csv by name without unit, as plain lists; ``summary`` is run.json, ``warnings`` those in it.
+    history.csv by name, as plain lists, and ``units`` their units; ``summary`` is run.json, ``warnings`` those in it.
 
     Raises `InputError` if it is no run folder, or its scene, report or history cannot be read.
     """
@@ -52,8 +53,8 @@ class Run:
                 raise InputError(f"{self.folder}: {is_no_run}.")
         self.scene: Any = load_scene(self.folder / "scene.toml")
         self.is_joint = isinstance(self.scene, Scene)
-        self.columns = _read_columns(self.folder / "history.csv", (*_NEEDED, *(_OF_A_JOINT if self.is_joint else ())))
-        self.summary: dict[str, Any] = _read_report(self.folder / "run.json")
+        self.columns, self.units = self._read_history()
+        self.summary: dict[str, Any] = self._read_report()
         self.status, self.message, self.warnings = (self.summary[key] for key in ("status", "message", "warnings"))
         self.steps = len(self.columns["step"])
 
@@ -66,10 +67,9 @@ class Run:
     @cached_property
     def history(self) -> pd.DataFrame:
         """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of every column."""
-        from archord.postprocess.frames import read_frame
+        from archord.postprocess.frames import frame_of
 
-        table = read_frame(self.folder / "history.csv").head(self.steps)
-        return table.astype(dict.fromkeys((name for name in table if name not in _WHOLE), float))
+        return frame_of(self.columns, self.units).astype(dict.fromkeys(_WHOLE, int))
 
     @cached_property
     def curve(self) -> RunCurve:
@@ -81,14 +81,12 @@ class Run:
             raise InputError(f"{self.folder}: is the run of a general scene; this is for those of a [joint].")
         self.number(None)
         columns = {name: np.array(self.columns[name]) for name in CURVES}
-        columns["P"] = columns["P"] / self.scene.thickness
+        columns["P"] /= self.scene.thickness
         return RunCurve(str(self.folder), self.scene, **columns, folder=self.folder)
 
     def contact(self, step: int | None = None) -> dict[str, Any]:
-        """The contact along the surfaces at ``step`` (the last), arrays by name: of a joint "pin" and "hole".
-
-        A side that is not integrated is absent. Raises `InputError` without such a step, and where nothing touches.
-        """
+        """The contact along the integrated surfaces at ``step`` (the last), arrays by name: of a joint "pin" and
+        "hole". Raises `InputError` without such a step, and where nothing may touch."""
         step = self.number(step)
         if not self.has_contact:
             raise InputError(f"{self.folder}: has no contact: its scene has no interaction.")
@@ -102,19 +100,13 @@ class Run:
         return arcs[side or list(arcs)[-1]]
 
     def pressure(self, step: int | None = None, side: str | None = None) -> pd.DataFrame:
-        """`contact` as a table with a row for each point, sorted by side and angle; of one ``side`` if given.
-
-        Raises `InputError` without such a step or side.
-        """
+        """`contact` as a table with a row for each point; of one ``side`` if given. Raises `InputError`."""
         from archord.postprocess.frames import contact_frame
 
         return contact_frame({side: self.arc(step, side)} if side else self.contact(step), self.scene)
 
     def fields(self, step: int | None = None) -> Fields:
-        """Mesh, displacement, stress and plastic strain at ``step`` (the last).
-
-        Raises `InputError` without such a step, and if the run wrote no fields.
-        """
+        """Mesh, displacement, stress and plastic strain at ``step`` (the last). Raises `InputError`."""
         return read_fields(self.folder, self.scene, self.number(step), self.bodies)
 
     @property
@@ -128,18 +120,21 @@ class Run:
         return self.is_joint or bool(self.scene.interaction)
 
     @property
-    def force_unit(self) -> str:
-        """Unit of the forces in `columns`, which are per unit thickness where the scene has none."""
-        return self.scene.units.force_of(self.scene.analysis.thickness)
-
-    @property
     def path(self) -> list[float]:
         """How far the load was at every step: delta of a joint, else the load factor."""
         return self.columns["delta" if self.is_joint else "load_factor"]
 
+    @property
+    def loads_said(self) -> str:
+        """What `path` holds, in words."""
+        return "displacements" if self.is_joint else "load factors"
+
+    def heading(self, name: str) -> str:
+        """The name of a column with its unit."""
+        return f"{name} [{self.units[name]}]" if name in self.units else name
+
     def points(self, step: int | None = None) -> dict[str, np.ndarray]:
-        """The integration points at ``step`` (the last) by name: "coordinates", "stress" and, where a body can yield,
-        "plastic_strain" and "peeq". Raises `InputError` without such a step, and if the run did not write them."""
+        """The integration points at ``step`` (the last): see `read_points`. Raises `InputError`."""
         return read_points(self.folder, self.scene, self.number(step))
 
     def probe(self, edge: str = "", quantity: str = "", step: int | None = None, line: Sequence[float] = ()) -> Probe:
@@ -161,22 +156,25 @@ class Run:
             raise InputError(f"{self.folder}: has no step {step}; its accepted steps are 1 to {self.steps}.")
         return int(step)
 
+    def _read_history(self) -> tuple[dict[str, list[float]], dict[str, str]]:
+        path = self.folder / "history.csv"
+        try:
+            columns = read_history(path)
+            headings = next(csv.reader([path.read_text(encoding="utf-8").partition("\n")[0]]))
+            needed = (*_NEEDED, *(_OF_A_JOINT if self.is_joint else ()))
+            if not np.isfinite([columns[name] for name in needed]).all():
+                raise ValueError("numbers that are not finite")
+        except (ValueError, IndexError, KeyError, OSError):
+            raise InputError(f"{path}: cannot be read as the history of a run.") from None
+        named = (heading.partition(" [") for heading in headings)
+        return columns, {name: unit.removesuffix("]") for name, _, unit in named if unit}
 
-def _read_columns(path: Path, needed: tuple[str, ...]) -> dict[str, list[float]]:
-    try:
-        columns = read_history(path)
-        if not np.isfinite([columns[name] for name in needed]).all():
-            raise ValueError("numbers that are not finite")
-    except (ValueError, IndexError, KeyError, OSError):
-        raise InputError(f"{path}: cannot be read as the history of a run.") from None
-    return columns
-
-
-def _read_report(path: Path) -> dict[str, Any]:
-    try:
-        report = json.loads(path.read_text(encoding="utf-8"))
-        if not report.keys() >= _KNOWN:
-            raise ValueError("keys")
-    except (OSError, ValueError, AttributeError):
-        raise InputError(f"{path}: cannot be read as the report of a run.") from None
-    return report
+    def _read_report(self) -> dict[str, Any]:
+        path = self.folder / "run.json"
+        try:
+            report = json.loads(path.read_text(encoding="utf-8"))
+            if not report.keys() >= _KNOWN:
+                raise ValueError("keys")
+        except (OSError, ValueError, AttributeError):
+            raise InputError(f"{path}: cannot be read as the report of a run.") from None
+        return report

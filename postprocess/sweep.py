@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,10 +31,8 @@ class Sweep:
             if not (self.folder / name).is_file():
                 cure = f"; archord sweep {self.folder} --gather writes it" if is_sweep(self.folder) else ""
                 raise InputError(f"{self.folder}: is not the folder of a sweep: {name} is missing{cure}.")
-        self.cases = self._read("cases.csv")
+        self.cases = self._read("cases.csv", _FIRST)
         names = list(self.cases)
-        if names[:3] != _FIRST or "message" not in names:
-            raise InputError(f"{self.folder / 'cases.csv'}: cannot be read as a table of a sweep.")
         self.keys: list[str] = names[len(_FIRST) : names.index("message")]
 
     def __len__(self) -> int:
@@ -57,15 +56,18 @@ class Sweep:
     @cached_property
     def history(self) -> pd.DataFrame:
         """sweep.csv: a row for each case and accepted step; ``attrs["units"]`` names units."""
-        return self._read("sweep.csv")
+        return self._read("sweep.csv", [])
 
-    def _read(self, name: str) -> pd.DataFrame:
+    def _read(self, name: str, first: list[str]) -> pd.DataFrame:
         from archord.postprocess.frames import read_frame
 
         try:
-            return read_frame(self.folder / name)
+            table = read_frame(self.folder / name)
+            if list(table)[: len(first)] != first or (first and "message" not in table):
+                raise ValueError("columns")
         except (OSError, ValueError):
             raise InputError(f"{self.folder / name}: cannot be read as a table of a sweep.") from None
+        return table
 
     def run(self, case: int | str) -> Run:
         """The run of a case, by the case's number or the run's name. Raises `InputError` if there is none (yet)."""
@@ -79,8 +81,6 @@ class Sweep:
         """The runs by case that have an accepted step and can be read; cases that share a run by the first of them."""
         found = {}
         for case in self.cases.drop_duplicates("run")["case"]:
-            try:
+            with suppress(InputError):
                 found[int(case)] = self.run(int(case))
-            except InputError:
-                continue
         return {case: run for case, run in found.items() if run.steps}

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from archord.postprocess.comparison import Comparison, differing_keys
+from archord.postprocess.comparison import COMMON, COMPARED, Comparison, differing_keys
 from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
@@ -18,6 +18,7 @@ from archord.scene.faults import shortened
 _MOST = 40  # rows of a table
 _LAST = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "steps", "iterations", "cutbacks", "seconds")
 _WHOLE = ("iterations", "cutbacks", "seconds")
+_OF_STEPS = ("step", "delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", *_WHOLE)
 _OF_A_RUN = {  # what a comparison tells of each run
     "status": lambda run: run.status,
     "steps": lambda run: f"{run.steps} of {len(run.scene.targets)}",
@@ -33,10 +34,9 @@ def run_text(run: Run) -> str:
     """State, joint, history, peaks, cost and warnings of a run."""
     words = {"running": "running, or killed (if no archord works there, --restart continues it)"}
     state = f"{run.folder}: {words.get(run.status, run.status)}; {run.steps} of {len(run.scene.targets)} steps"
-    facts, history = (_joint, _history) if run.is_joint else (_problem, _loads)
-    parts = [f"{state}: {run.message}" if run.message else state, Table("", "", rows=facts(run), left=2)]
+    parts = [f"{state}: {run.message}" if run.message else state, Table("", "", rows=_facts(run), left=2)]
     if run.steps:
-        parts += [_thinned(history(run), run.folder / "history.csv"), _peaks(run)]
+        parts += [_thinned(_history(run), run.folder / "history.csv"), _peaks(run)]
     return "\n\n".join(map(str, (*parts, Table("", "", rows=_cost(run), left=2))))
 
 
@@ -103,67 +103,44 @@ def _thinned(table: Table, whole: object) -> str:
     return f"{table}\n{_MOST} of {n} rows; {whole} has all of them"
 
 
-def _joint(run: Run) -> Iterable[tuple[str, str]]:
-    scene, mesh = run.scene, run.summary.get("mesh", {})
-    g, a, length, stress = scene.joint, scene.analysis, scene.units.length, scene.units.stress
-    yield "joint", f"{g.model}, R = {g.radius:g} {length}, dR = {g.dR:g} {length}, dR/R = {g.dR / g.radius:g}"
-    yield "", f"plane {a.plane}, contact {a.kinematics}, E* = {scene.E_star:g} {stress}"
-    for name, body in (("pin", scene.pin), ("block", scene.block)):
-        yield name, ", ".join(f"{key} = {value}" for key, value in body.model_dump(exclude_none=True).items())
-    counts = f"{mesh.get('cells', '?')} {mesh.get('kind', 'cells')} of degree {a.degree}, {mesh.get('dofs', '?')} dofs"
-    yield "mesh", f"{counts}; ranks: {run.summary.get('ranks', '?')}"
-
-
-def _problem(run: Run) -> Iterable[tuple[str, str]]:
-    scene, mesh = run.scene, run.summary.get("mesh", {})
-    yield "problem", f"plane {scene.analysis.plane}, {scene.loading}"
-    for kind in ("body", "interaction", "coupling", "support", "load"):
-        for part in getattr(scene, kind):
-            said = part.model_dump(exclude_none=True, exclude={"name"}).items()
-            yield f"{kind} {part.name}", shortened(", ".join(f"{key} = {value}" for key, value in said if value))
-    degree, kind = scene.analysis.degree, mesh.get("kind", "cells")
-    counts = f"{mesh.get('cells', '?')} {kind} of degree {degree}, {mesh.get('dofs', '?')} dofs"
-    yield "mesh", f"{counts}; ranks: {run.summary.get('ranks', '?')}"
-
-
-def _loads(run: Run) -> Table:
-    """The steps: what each load did, the largest pressure of each interaction, plastic strain, cost."""
-    units, ends = run.history.attrs["units"], (" displacement", " force", " largest pressure", " peeq_max")
-    names = ["step", "load_factor", *(name for name in run.columns if name.endswith(ends)), *_WHOLE]
-    table = Table(*(f"{name} [{units[name]}]" if name in units else name for name in names))
-    for row in zip(*(run.columns[name] for name in names), strict=True):
-        table.add(*(f"{value:.6g}" for value in row))
-    return table
+def _facts(run: Run) -> Iterable[tuple[str, str]]:
+    """What was solved: the joint, or the parts of a general scene; and on what mesh."""
+    scene, mesh, plane = run.scene, run.summary.get("mesh", {}), f"plane {run.scene.analysis.plane}"
+    if run.is_joint:
+        g, length = scene.joint, scene.units.length
+        yield "joint", f"{g.model}, R = {g.radius:g} {length}, dR = {g.dR:g} {length}, dR/R = {g.dR / g.radius:g}"
+        yield "", f"{plane}, contact {scene.analysis.kinematics}, E* = {scene.E_star:g} {scene.units.stress}"
+        parts = [("pin", scene.pin), ("block", scene.block)]
+    else:
+        yield "problem", f"{plane}, {scene.loading}"
+        kinds = ("body", "interaction", "coupling", "support", "load")
+        parts = [(f"{kind} {part.name}", part) for kind in kinds for part in getattr(scene, kind)]
+    for name, part in parts:
+        said = part.model_dump(exclude_none=True, exclude={"name"}).items()
+        yield name, shortened(", ".join(f"{key} = {value}" for key, value in said if value not in ("", [])))
+    counts = f"{mesh.get('cells', '?')} {mesh.get('kind', 'cells')} of degree {scene.analysis.degree}"
+    yield "mesh", f"{counts}, {mesh.get('dofs', '?')} dofs; ranks: {run.summary.get('ranks', '?')}"
 
 
 def _history(run: Run) -> Table:
-    """The steps: load, force, pressure, angle, plastic strain, cost."""
-    unit, h = run.scene.units, run.columns
-    table = Table("step", f"delta [{unit.length}]", "delta/dR", f"P [{run.force_unit}]", "P/(E* R)",
-                  f"p0 [{unit.stress}]", "p0/E*", "eps [°]", "PEEQ max", *_WHOLE)  # fmt: skip
+    """The steps: loads and forces, pressures, angle, plastic strain, cost."""
+    names, h = _OF_STEPS, run.columns
+    if not run.is_joint:
+        names = ("step", "load_factor", *(name for name in h if name.endswith((" displacement", *COMMON))), *_WHOLE)
+    table = Table(*("eps [°]" if name == "eps" else run.heading(name) for name in names))
     for k in range(run.steps):
-        table.add(
-            f"{h['step'][k]:g}",
-            *(f"{h[name][k]:.6g}" for name in ("delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*")),
-            f"{math.degrees(h['eps'][k]):.2f}",
-            f"{h['peeq_max'][k]:.2e}",
-            *(f"{h[name][k]:g}" for name in ("iterations", "cutbacks")),
-            f"{h['seconds'][k]:.2f}",
-        )
+        table.add(*(f"{math.degrees(h[name][k]) if name == 'eps' else h[name][k]:.6g}" for name in names))
     return table
 
 
 def _peaks(run: Run) -> str:
     """Largest values over the run, and where it first yielded."""
     h, said = run.columns, []
-    shown = {"P": run.force_unit, "p0": run.scene.units.stress, "eps": "rad", "peeq_max": ""}
-    if not run.is_joint:
-        units, ends = run.history.attrs["units"], (" force", " largest pressure", " peeq_max")
-        shown = {name: units.get(name, "") for name in h if name.endswith(ends)}
-    for name, unit in shown.items():
+    names = (*COMPARED, "peeq_max") if run.is_joint else tuple(name for name in h if name.endswith(COMMON))
+    for name in names:
         k = int(np.argmax(h[name]))
-        said.append(f"{name} = {' '.join([f'{h[name][k]:.6g}', unit]).rstrip()} at step {h['step'][k]:g}")
-    yields = np.any([h[name] for name in shown if name.endswith("peeq_max")] or [[0.0]], axis=0)
+        said.append(f"{name} = {h[name][k]:.6g} {run.units.get(name, '')}".rstrip() + f" at step {h['step'][k]:g}")
+    yields = np.any([h[name] for name in names if name.endswith("peeq_max")] or [[0.0]], axis=0)
     if yields.any():
         said.append(f"plastic strain first at step {h['step'][np.flatnonzero(yields)[0]]:g}")
     return f"largest: {', '.join(said)}"
@@ -184,14 +161,12 @@ def _differences(comparison: Comparison, quantity: str, names: list[str]) -> Tab
     """One row a load: the quantity of each run, and its relative difference to the first; ~ marks interpolated
     values."""
     others = [heading for name in names[1:] for heading in (name, "difference")]
-    table = Table(comparison.labels["delta"], f"{comparison.labels[quantity]}: {names[0]}", *others)
+    table = Table(comparison.labels["load"], f"{comparison.labels[quantity]}: {names[0]}", *others)
     relative, marks = comparison.relative(quantity), np.where(comparison.interpolated, "~", "")
-    for k, load in enumerate(comparison.delta):
-        first, *values = (
-            f"{mark}{v:.6g}" for mark, v in zip(marks[:, k], comparison.values[quantity][:, k], strict=True)
-        )
-        pairs = zip(values, (_percent(float(part)) for part in relative[1:, k]), strict=True)
-        table.add(f"{load:.6g}", first, *(cell for pair in pairs for cell in pair))
+    for k, load in enumerate(comparison.load):
+        pairs = zip(marks[:, k], comparison.values[quantity][:, k], relative[:, k], strict=True)
+        cells = [cell for mark, value, off in pairs for cell in (f"{mark}{value:.6g}", _percent(off))]
+        table.add(f"{load:.6g}", cells[0], *cells[2:])
     largest = np.abs(np.nan_to_num(relative[1:])).max(axis=1)
     table.add("", "largest difference", *(cell for size in largest for cell in ("", _percent(size))))
     return table
@@ -204,11 +179,10 @@ def _percent(relative: float) -> str:
 
 def _note(comparison: Comparison) -> str:
     """How the runs were compared."""
-    joints = comparison.runs[0].is_joint
-    loads = "displacements" if joints else "load factors"
+    loads = comparison.runs[0].loads_said
     if comparison.step_by_step:
         return f"compared step by step: all runs went through the same {loads}."
-    note = f"compared over {'the first loading' if joints else 'the common path'} of all runs, at {loads} of the first"
+    note = f"compared over the first loading of all runs, at {loads} of the first"
     return f"{note}; ~: between steps, by a monotone cubic." if comparison.interpolated.any() else f"{note}."
 
 

@@ -34,7 +34,7 @@ def force_panel(axes: Any, run: Run) -> None:
         first = int(np.flatnonzero(history["peeq_max"])[0]) + 1
         axes.plot(delta[first], P[first], "o", ms=8, mfc="none", color="tab:red", label="first plastic strain")
         axes.legend(frameon=False, loc="upper left")
-    axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{run.force_unit}]", title="force of the joint")
+    axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{run.units['P']}]", title="force of the joint")
     axes.set(xlim=(min(delta), None), ylim=(min(P), None))
     axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)

@@ -63,7 +63,7 @@ def test_other_steps_are_interpolated(runs, more):
     """Exactly at common displacements, and to a percent and between the neighbours elsewhere."""
     comparison, steps = compare_runs([Run(runs["coarse"]), Run(more["stepped"])]), Run(more["stepped"]).curve
     assert not comparison.step_by_step
-    at_step = np.isclose(comparison.delta[:, None], steps.delta, rtol=1e-9).any(axis=1)
+    at_step = np.isclose(comparison.load[:, None], steps.delta, rtol=1e-9).any(axis=1)
     np.testing.assert_array_equal(comparison.interpolated[1], ~at_step)
     for name, values in comparison.values.items():
         relative, own = np.abs(comparison.relative(name)[1]), getattr(steps, name)
@@ -76,10 +76,10 @@ def test_unloading_counts_only_where_the_ways_are_the_same(runs, more):
     """Against itself step by step; against another run up to where the pin first goes back, also if it later goes
     further than before; runs that share no range of that are not compared."""
     released, stepped = Run(more["released"]), Run(more["stepped"])
-    assert len(compare_runs([released, released]).delta) == 6
+    assert len(compare_runs([released, released]).load) == 6
     for pair in ([stepped, released], [released, stepped]):
         comparison = compare_runs(pair)
-        assert len(comparison.delta) == 4
+        assert len(comparison.load) == 4
         assert np.abs(comparison.relative("P")).max() < 1e-8
     delta = np.array([1.0, 2.0, 3.0, 2.0, 1.0, 4.0])
     stepped.curve = RunCurve("x", paper_joint(), *5 * [delta])

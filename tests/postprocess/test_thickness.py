@@ -18,17 +18,17 @@ def test_forces_of_a_thick_joint_are_said_in_their_own_unit(tmp_path):
     """N where they were N/mm; what is dimensionless, the curve and the second axis of the picture stay."""
     scenes = {str(t): paper_joint(0.2, 2, analysis={"thickness": t}) for t in (None, THICK)}
     thin, thick = (archord.load(folder) for folder in solved(scenes, tmp_path).values())
-    assert (thin.force_unit, thick.force_unit) == ("N/mm", "N")
+    assert (thin.units["P"], thick.units["P"]) == ("N/mm", "N")
     assert abs(thick.columns["P"][-1] / thin.columns["P"][-1] / THICK - 1) < 1e-9
     for run in (thin, thick):
         text, P = run_text(run), run.columns["P"][-1]
-        assert f"P [{run.force_unit}]" in text
-        assert f"P = {P:.6g} {run.force_unit} at step 2" in text
+        assert f"P [{run.units['P']}]" in text
+        assert f"P = {P:.6g} {run.units['P']} at step 2" in text
         assert run.history.attrs["units"]["peeq_integral"] == ("mm2" if run is thin else "mm3")
         axes = new_figure(4, 4).subplots()
         force_panel(axes, run)
         axes.figure.draw_without_rendering()
-        assert axes.get_ylabel() == f"P [{run.force_unit}]"
+        assert axes.get_ylabel() == f"P [{run.units['P']}]"
         second = next(axis for axis in axes.child_axes if axis.get_ylabel())
         assert abs(second.get_ylim()[1] / axes.get_ylim()[1] * P / run.columns["P/(E* R)"][-1] - 1) < 1e-9
     last = type("Step", (), {name: values[-1] for name, values in thick.columns.items()})
