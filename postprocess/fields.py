@@ -9,19 +9,18 @@ one body has slid by s along the other.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from archord.materials.elasticity import principal_stresses, von_mises
 from archord.materials.material import COMPONENTS, Array
 from archord.output.step_file import all_arrays, step_name
+from archord.postprocess.arc import opened
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
@@ -49,7 +48,7 @@ class Fields:
     """
 
     step: int
-    delta: float
+    delta: float  # or the load factor
     coordinates: Array  # (n, 2) undeformed
     cells: np.ndarray  # (m, 6), or (m, 9) of quadrilaterals
     body: np.ndarray  # (m,) the tag of the cell's body
@@ -72,7 +71,7 @@ class Fields:
 
     @cached_property
     def body_of_node(self) -> np.ndarray:
-        """Body ``(n,)`` that every node belongs to; pin and block share none."""
+        """Body ``(n,)`` that every node belongs to; bodies share none."""
         found = np.zeros(len(self.coordinates), dtype=self.body.dtype)
         found[self.cells] = self.body[:, None]
         return found
@@ -92,8 +91,7 @@ class Fields:
 
     def cell_fields(self) -> dict[str, Array]:
         """The fields of the cells by name; `peeq` only where a body can yield."""
-        values = {name: getattr(self, name) for name in CELL_FIELDS}
-        return {name: value for name, value in values.items() if value is not None}
+        return {name: getattr(self, name) for name in CELL_FIELDS if getattr(self, name) is not None}
 
     @property
     def triangles(self) -> np.ndarray:
@@ -121,15 +119,15 @@ def read_fields(folder: str | Path, scene: Scene, step: int, bodies: Mapping[str
     Raises `InputError` if the run wrote none, or the file is missing, damaged or does not hold the step.
     """
     at = step_name(step)
-    with _opened(folder, scene, step) as file:
+    _require(scene.output.fields, folder, "fields", "fields")
+    with opened(folder, "fields", step) as file:
         mesh = file["mesh"]
-        means: dict[str, Any] = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
-        nodal: dict[str, Any] = {}
+        found: dict[str, Any] = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
         for name in ("stress", "plastic_strain"):
             if f"{name}_xx/{at}" in file:
-                nodal[name] = np.stack([file[f"{name}_{c}/{at}"][()] for c in COMPONENTS], axis=1)
+                found[name] = np.stack([file[f"{name}_{c}/{at}"][()] for c in COMPONENTS], axis=1)
         if f"peeq_nodal/{at}" in file:
-            nodal["peeq_nodal"] = file[f"peeq_nodal/{at}"][()]
+            found["peeq_nodal"] = file[f"peeq_nodal/{at}"][()]
         return Fields(
             step,
             float(file["load"][step - 1]),
@@ -137,8 +135,7 @@ def read_fields(folder: str | Path, scene: Scene, step: int, bodies: Mapping[str
             mesh["cells"][()],
             mesh["body"][()],
             file[f"displacement/{at}"][:, :2],
-            **means,
-            **nodal,
+            **found,
             bodies=bodies,
             edges=dict(all_arrays(file["edges"])) if "edges" in file else {},
         )
@@ -147,31 +144,16 @@ def read_fields(folder: str | Path, scene: Scene, step: int, bodies: Mapping[str
 def read_points(folder: str | Path, scene: Scene, step: int) -> dict[str, Array]:
     """What `output.points` writes at ``step``: "coordinates" ``(m, q, 2)`` of the integration points, "stress"
     ``(m, q, 4)`` and, where a body can yield, "plastic_strain" and "peeq" ``(m, q)``. Raises `InputError`."""
-    with _opened(folder, scene, step) as file:
-        if "points" not in file:
-            raise InputError(f"{folder}: has no integration points: it was solved with output.points = false.")
+    _require(scene.output.fields, folder, "fields", "fields")
+    _require(scene.output.points, folder, "integration points", "points")
+    with opened(folder, "fields", step) as file:
         points, at = file["points"], step_name(step)
-        steps = {name: points[f"{name}/{at}"][()] for name in points if name != "coordinates"}
-        return {"coordinates": points["coordinates"][()]} | steps
+        return {name: points[name if name == "coordinates" else f"{name}/{at}"][()] for name in points}
 
 
-@contextmanager
-def _opened(folder: str | Path, scene: Scene, step: int) -> Iterator[h5py.File]:
-    """The open fields.h5 of a run, which holds the step. What it lacks and cannot be read becomes an `InputError`."""
-    path = Path(folder) / "fields.h5"
-    if not scene.output.fields:
-        raise InputError(f"{folder}: has no fields: it was solved with output.fields = false.")
-    if not path.is_file():
-        raise InputError(f"{folder}: is not a complete run folder: fields.h5 is missing.")
-    try:
-        with h5py.File(path) as file:
-            if int(file["accepted"][()]) < step:
-                raise KeyError(step)
-            yield file
-    except InputError:
-        raise
-    except (OSError, KeyError, RuntimeError, TypeError, ValueError, IndexError):
-        raise InputError(f"{path}: cannot be read as the fields of a run at step {step}.") from None
+def _require(written: bool, folder: str | Path, what: str, key: str) -> None:
+    if not written:
+        raise InputError(f"{folder}: has no {what}: it was solved with output.{key} = false.")
 
 
 def magnification(scene: Scene, fields: Fields) -> float:

@@ -84,7 +84,7 @@ def test_a_process_tells_bad_input_once(tmp_path, ranks, arguments, said):
 
 
 FIELDS = "run/fields.h5: cannot be read as the fields of a run at step 6."
-CONTACT = "run/contact.h5: cannot be read as the contact of a run."
+CONTACT = "run/contact.h5: cannot be read as the contact of a run at step"
 HISTORY = "run/history.csv: cannot be read as the history of a run."
 REPORT = "run/run.json: cannot be read as the report of a run."
 

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.curve import gap_name
-from archord.postprocess.fields import Fields, magnification, magnified, rigid_arc
+from archord.postprocess.fields import magnification, magnified, rigid_arc
+from archord.postprocess.pictures.problems import draw_cells, draw_lines, outline
 from archord.postprocess.run import Run
 from archord.scene.scene import Scene
 
-_EDGE_POINTS = 5  # along a curved edge
 _STEPS = 4  # whose pressure is drawn
+_BEFORE: dict[str, Any] = {"color": "0.35", "lw": 0.9, "ls": (0, (4, 3))}
 
 
 def _load(scene: Scene, delta: float) -> str:
@@ -65,15 +66,11 @@ def arc_panel(axes: Any, run: Run) -> None:
 
 
 def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
-    """PEEQ, or von Mises stress where nothing can yield, at ``step`` (the last) on the deformed joint near the
-    contact, with its outline before (dashed) and after; displacement and clearance are magnified by the factor in the
-    title."""
+    """`draw_cells` at ``step`` (the last) on the deformed joint near the contact, with its outline before (dashed) and
+    after; displacement and clearance are magnified by the factor in the title."""
     scene, fields = run.scene, run.fields(step)
     factor = magnification(scene, fields)
     x, ring, R = magnified(scene, fields, factor), scene.joint.is_ring, scene.joint.radius
-    values, label, cmap = fields.von_mises, f"von Mises stress [{scene.units.stress}]", "viridis"
-    if fields.peeq is not None:
-        values, label, cmap = 100 * fields.peeq, "equivalent plastic strain [%]", "inferno_r"
     gap = max(0.0, factor * scene.joint.dR)
     right, low = min(1.6 * R + gap, scene.joint.W), -min(1.9 * R + gap, scene.joint.W)
     high = right if ring or scene.pin.whole else 0.06 * R
@@ -81,31 +78,15 @@ def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
     near = (corners.max(axis=1) > [0, low]).all(axis=1) & (corners.min(axis=1) < [right, high]).all(axis=1)
     # in a ring the core on which the load acts does not count for the range of colours
     away = np.hypot(*fields.coordinates[fields.cells[:, :3]].mean(axis=1).T) > (R / 2 if ring else 0)
-    drawn = axes.tripcolor(
-        *x.T, fields.triangles[near].reshape(-1, 3),
-        facecolors=np.repeat(values[near], fields.triangles.shape[1]), cmap=cmap,
-        vmin=0, vmax=values[away].max() or None,
-    )  # fmt: skip
-    cut = "max" if values[near].max() > drawn.norm.vmax else "neither"
-    axes.figure.colorbar(drawn, ax=axes, label=label, shrink=0.85, extend=cut)
-    _outline(axes, scene, fields, factor)
+    draw_cells(axes, run, fields, x, near, away)
+    for displaced, style in ((False, _BEFORE), (True, {"color": "black", "lw": 1.1})):
+        lines = outline(fields, magnified(scene, fields, factor, displaced))
+        arc = rigid_arc(scene, fields.delta if displaced else 0.0, factor)
+        draw_lines(axes, [*lines, *([arc] if scene.pin.rigid else [])], **style)
+    if scene.pin.rigid:
+        axes.fill(*np.concatenate([arc, [[0.0, arc[-1, 1]]]]).T, color="0.85", zorder=0)
+        axes.text(0.35 * R, arc[-1, 1] - 0.35 * R, "rigid pin", ha="center")
     length = scene.units.length
     axes.set(xlim=(0, right), ylim=(low, high), aspect="equal", xlabel=f"x [{length}]", ylabel=f"y [{length}]")
     what = "not magnified" if factor == 1 else f"displacement and clearance × {factor:g}"
     axes.set_title(f"step {fields.step}, {_load(scene, fields.delta)}\n{what}", fontsize="medium")
-
-
-def _outline(axes: Any, scene: Scene, fields: Fields, factor: float) -> None:
-    """Draw the boundary before and after, edges as the parabolas that they are, and a rigid pin."""
-    from matplotlib.collections import LineCollection
-
-    t, R = np.linspace(0, 1, _EDGE_POINTS), scene.joint.radius
-    shape = np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
-    before: dict[str, Any] = {"color": "0.35", "lw": 0.9, "ls": (0, (4, 3))}
-    for displaced, style in ((False, before), (True, {"color": "black", "lw": 1.1})):
-        lines = list(shape @ magnified(scene, fields, factor, displaced)[fields.outline()])
-        arc = rigid_arc(scene, fields.delta if displaced else 0.0, factor)
-        axes.add_collection(LineCollection([*lines, *([arc] if scene.pin.rigid else [])], **style), autolim=False)
-    if scene.pin.rigid:
-        axes.fill(*np.concatenate([arc, [[0.0, arc[-1, 1]]]]).T, color="0.85", zorder=0)
-        axes.text(0.35 * R, arc[-1, 1] - 0.35 * R, "rigid pin", ha="center")

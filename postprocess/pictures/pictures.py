@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,16 +34,13 @@ def save_figure(figure: Figure, target: Path) -> Path:
 
 
 def draw_run(run: Run, target: Path) -> Path:
-    """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``; returns the file.
-
-    Raises `InputError` if the run has no accepted step, a file of it is damaged, or ``target`` cannot be written.
-    """
+    """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``; returns the file. Raises
+    `InputError`."""
     run.number(None)
+    draws = [problems.field_panel, problems.contact_panel, problems.load_panel]
     if run.is_joint:
-        draws = [joint.field_panel] * run.scene.output.fields + [joint.arc_panel, joint.force_panel]
-    else:
-        draws = [problems.field_panel] * run.scene.output.fields
-        draws += [problems.contact_panel] * run.has_contact + [problems.load_panel]
+        draws = [joint.field_panel, joint.arc_panel, joint.force_panel]
+    draws = list(compress(draws, (run.scene.output.fields, run.has_contact, True)))
     widths = [1.0, 1.2, 1.1] if len(draws) == 3 else [1.2, 1.1][-len(draws) :]
     figure = new_figure(5.0 * len(widths), 4.4)
     for axes, draw in zip(np.atleast_1d(figure.subplots(1, len(widths), width_ratios=widths)), draws, strict=True):
@@ -65,10 +63,11 @@ def draw_probe(probe: Probe, target: Path) -> Path:
 
 
 def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
-    """Draw force, pressure at the last common displacement and contact angle of ``runs`` with their ``names`` as
-    ``target``, in the form of `comparable`; returns the file. Of more than ten the colour runs with the order instead.
+    """Draw ``runs`` with their ``names`` over each other as ``target``; returns the file.
 
-    Raises `InputError` if the file cannot be written or a run's contact cannot be read.
+    Of joints force, pressure at the last common displacement and contact angle, in the form of `comparable`; of more
+    than ten the colour runs with the order instead. Of general runs the first three quantities that all share, over the
+    load factor. Raises `InputError` if the file cannot be written or a run's contact cannot be read.
     """
     from matplotlib import colormaps
 
@@ -76,7 +75,7 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
         return _draw_problems(runs, names, target)
     many = len(runs) > _FEW
     figure = new_figure(15, 4.6)
-    force, pressure, angle = figure.subplots(1, 3)
+    force, pressure, angle = panels = figure.subplots(1, 3)
     curves, labels, scales = comparable(runs)
     last = min(float(curve.first_loading().delta[-1]) for curve in curves)
     for k, (run, curve, name) in enumerate(zip(runs, curves, names, strict=True)):
@@ -90,7 +89,7 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
     pressure.set(xlabel="angle from the contact axis [°]", ylabel=labels["p0"].replace("p0", "p"), xlim=(0, None))
     pressure.set(ylim=(0, None), title=f"contact pressure at {labels['delta']} = {last:.4g}")
     angle.set(xlabel=labels["delta"], ylabel="contact semi-angle [°]", title="contact angle", ylim=(0, None))
-    for axes in (force, pressure, angle):
+    for axes in panels:
         axes.grid(alpha=0.3)
     if not many:
         figure.legend(*force.get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
@@ -98,7 +97,6 @@ def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
 
 
 def _draw_problems(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
-    """The first three quantities that general ``runs`` share, over the load factor, as ``target``; returns the file."""
     compared = list(compare_runs(list(runs)).labels.items())[1:4]
     figure = new_figure(5.0 * len(compared), 4.4)
     for axes, (column, label) in zip(np.atleast_1d(figure.subplots(1, len(compared))), compared, strict=True):

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from archord.materials.material import Array
+from archord.postprocess.fields import Fields
 from archord.postprocess.probe import Probe, probe_edge
 from archord.postprocess.run import Run
 
@@ -14,27 +16,43 @@ _EDGE = np.array([[1.0, 0.0, 0.0], [0.375, 0.75, -0.125], [0.0, 1.0, 0.0], [-0.1
 
 
 def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
-    """PEEQ, or von Mises stress where nothing has yielded, at ``step`` (the last) on the deformed bodies, with their
-    outlines; displacements are magnified by the factor in the title, and not where bodies may touch, as they would
-    then overlap."""
-    from matplotlib.collections import LineCollection
-
+    """`draw_cells` at ``step`` (the last) on the deformed bodies, with their outlines; displacements are magnified by
+    the factor in the title, and not where bodies may touch, as they would then overlap."""
     fields, length = run.fields(step), run.scene.units.length
     size, farthest = np.ptp(fields.coordinates, axis=0).max(), np.abs(fields.displacement).max()
     free = not run.has_contact and farthest > 0
     factor = max(float(f"{_MAGNIFIED * size / farthest:.0e}"), 1.0) if free else 1.0
-    x = fields.coordinates + factor * fields.displacement
-    values, label, cmap = fields.von_mises, f"von Mises stress [{run.scene.units.stress}]", "viridis"
-    if fields.peeq is not None and fields.peeq.any():
-        values, label, cmap = 100 * fields.peeq, "equivalent plastic strain [%]", "inferno_r"
-    triangles = fields.triangles.reshape(-1, 3)
-    shown = {"facecolors": np.repeat(values, fields.triangles.shape[1])}
-    drawn = axes.tripcolor(*x.T, triangles, cmap=cmap, vmin=0, vmax=values.max() or None, **shown)
-    axes.figure.colorbar(drawn, ax=axes, label=label, shrink=0.85)
-    axes.add_collection(LineCollection(list(_EDGE @ x[fields.outline()]), color="black", lw=0.8))
+    x, everywhere = fields.coordinates + factor * fields.displacement, np.ones(len(fields.cells), dtype=bool)
+    draw_cells(axes, run, fields, x, everywhere, everywhere)
+    draw_lines(axes, outline(fields, x), color="black", lw=0.8)
     axes.set(aspect="equal", xlabel=f"x [{length}]", ylabel=f"y [{length}]")
     what = "not magnified" if factor == 1 else f"displacement × {factor:g}"
     axes.set_title(f"step {fields.step}, load factor {fields.delta:.4g}\n{what}", fontsize="medium")
+
+
+def draw_cells(axes: Any, run: Run, fields: Fields, x: Array, shown: np.ndarray, ranged: np.ndarray) -> None:
+    """PEEQ, or von Mises stress where nothing has yielded, in the ``shown`` cells ``(m,)`` with the nodes at ``x``; the
+    colours end at the largest of the ``ranged`` ones."""
+    values, label, cmap = fields.von_mises, f"von Mises stress [{run.scene.units.stress}]", "viridis"
+    if fields.peeq is not None and (run.is_joint or fields.peeq.any()):
+        values, label, cmap = 100 * fields.peeq, "equivalent plastic strain [%]", "inferno_r"
+    triangles, most = fields.triangles[shown], values[ranged].max() or None
+    colours = {"facecolors": np.repeat(values[shown], triangles.shape[1]), "cmap": cmap}
+    drawn = axes.tripcolor(*x.T, triangles.reshape(-1, 3), vmin=0, vmax=most, **colours)
+    cut = "max" if values[shown].max() > drawn.norm.vmax else "neither"
+    axes.figure.colorbar(drawn, ax=axes, label=label, shrink=0.85, extend=cut)
+
+
+def outline(fields: Fields, x: Array) -> list[Array]:
+    """The boundary of the bodies with the nodes at ``x``: points ``(5, 2)`` along every edge, which is a parabola."""
+    return list(_EDGE @ x[fields.outline()])
+
+
+def draw_lines(axes: Any, lines: list[Array], **style: Any) -> None:
+    """Draw ``lines`` that leave the limits of the axes as they are."""
+    from matplotlib.collections import LineCollection
+
+    axes.add_collection(LineCollection(lines, **style), autolim=False)
 
 
 def contact_panel(axes: Any, run: Run) -> None:

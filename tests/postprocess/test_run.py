@@ -81,7 +81,7 @@ def test_a_step_that_the_fields_do_not_hold_yet(runs, tmp_path):
     assert run.steps == 8
     with pytest.raises(archord.InputError, match=r"fields\.h5: cannot be read as the fields of a run at step 8\."):
         run.fields()
-    with pytest.raises(archord.InputError, match=r"contact\.h5: cannot be read as the contact of a run\."):
+    with pytest.raises(archord.InputError, match=r"contact\.h5: cannot be read as the contact of a run at step 8\."):
         run.pressure()
 
 
