@@ -55,16 +55,14 @@ def reproduce(figures: tuple[str, ...], output: Path, quiet: bool) -> int:
 
     from archord.benchmarks.paper.reproduce import reproduce as make
 
-    comm, say = MPI.COMM_WORLD, _telling(quiet)
+    comm = MPI.COMM_WORLD
     try:
-        files = make(figures or ["all"], output, comm, lambda case, P: say(f"{case.name}: P(2 dR)/(E* R) = {P:.6f}"))
+        files = make(figures or ["all"], output, comm, _telling(quiet))
     except RuntimeError as error:
         if comm.rank == 0:
             print(f"archord: {error}.", file=sys.stderr)
         return 3
-    if not quiet:
-        for file in files:
-            print(file)
+    print(*([] if quiet else files), sep="\n", end="" if quiet else "\n")
     return 0
 
 
@@ -86,21 +84,12 @@ def stability(output: Path, only: str | None, quiet: bool) -> int:
     from mpi4py import MPI
 
     from archord.benchmarks.stability import run as table
-    from archord.benchmarks.stability.report import markdown, write
+    from archord.benchmarks.stability.report import write
 
-    comm, say = MPI.COMM_WORLD, _telling(quiet)
-
-    def said(case, result) -> None:
-        say(
-            f"{case.group}: {case.name}: {result.status}, {result.steps} steps, "
-            f"{result.iterations} iterations, {result.cutbacks} cutbacks, {result.seconds:.1f} s"
-        )
-
-    lines = table.run(table.chosen(only), output / "runs", comm, said)
+    comm = MPI.COMM_WORLD
+    lines = table.run(table.chosen(only), output / "runs", comm, _telling(quiet))
     wrong = [f"{line.case.group}: {line.case.name}: {line.verdict}" for line in lines if line.faults]
-    if comm.rank != 0:
-        return 1 if wrong else 0
-    return _conclude(markdown(lines), write(lines, output), wrong, quiet)
+    return int(bool(wrong)) if comm.rank else _conclude(*write(lines, output), wrong, quiet)
 
 
 @benchmark.command()

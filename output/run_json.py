@@ -25,7 +25,6 @@ from archord.report.timer import BEFORE_SOLVING
 from archord.report.version import VERSION
 from archord.solver.stepping import Step
 
-_KILOBYTES = 1 if sys.platform == "darwin" else 1024  # unit of ru_maxrss in bytes
 _INSIDE_SOLVE = ("return mapping", "assemble force", "contact", "assemble bulk", "assemble contact", "assemble border")
 
 
@@ -143,7 +142,7 @@ def peak_memory() -> int:
         _, _, after = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").partition("VmHWM:")
         return 1024 * int(after.split()[0])
     except (OSError, IndexError, ValueError):
-        return _KILOBYTES * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _finite(value: dict[str, Any]) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from archord.benchmarks.case import Case
 from archord.benchmarks.paper.claims import judged
 from archord.benchmarks.paper.figures import FIGURES, LAYOUTS, draw_zones, write
 from archord.benchmarks.paper.runs import JOINTS, PLANES, Runs, cases, solve_missing
@@ -26,12 +25,11 @@ def chosen(names: Sequence[str]) -> list[str]:
     return [name for name in FIGURES if name in names or "all" in names]
 
 
-def reproduce(names: Sequence[str], folder: Path, comm: MPI.Comm, said: Callable[[Case, float], None]) -> list[Path]:
+def reproduce(names: Sequence[str], folder: Path, comm: MPI.Comm, said: Callable[[str], None]) -> list[Path]:
     """Solve what ``names`` need and is not in ``folder`` yet, and write their CSV files and pictures.
 
-    With all figures also ``report.md``. ``said(case, P)`` follows every run. Returns the files, on
-    rank 0. Raises `InputError` for unknown figures and a folder that cannot be written, and RuntimeError if a run
-    failed. Collective.
+    With all figures also ``report.md``. ``said(sentence)`` follows every run. Returns the files, on rank 0. Raises
+    `InputError` for unknown figures and a folder that cannot be written, and RuntimeError if a run failed. Collective.
     """
     wanted = chosen(names)
     agreed(comm, lambda: claim_folder(folder, force=True))

@@ -75,15 +75,16 @@ class Runs:
         return self.run(joint, plane, mesh).curve
 
 
-def solve_missing(wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[Case, float], None]) -> list[str]:
+def solve_missing(wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[str], None]) -> list[str]:
     """Solve the cases that are not done yet into ``folder``, each on one rank, the ranks side by side.
 
-    ``said(case, P)`` follows each on the rank that solved it. Returns the complaints of all that failed. Collective.
+    ``said(sentence)`` follows each on the rank that solved it. Returns the complaints of all that failed. Collective.
     """
 
     def complaint(number: int) -> str:
         try:
-            said(wanted[number], wanted[number].solve(folder).steps[-1].P)
+            P = wanted[number].solve(folder).steps[-1].P
+            said(f"{wanted[number].name}: P(2 dR)/(E* R) = {P:.6f}")
         except (RuntimeError, InputError) as error:
             return str(error).rstrip(".")
         return ""

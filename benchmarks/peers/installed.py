@@ -9,11 +9,12 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 PLACE = Path(__file__).resolve().parents[2] / ".cache" / "peers-venv" / "bin" / "python"
-_PROBE_LIMIT = 120.0  # seconds; the first import from a cold disk is slow
+_LIMIT = 120.0  # seconds; the first import from a cold disk is slow
 
 
 @dataclass(frozen=True)
@@ -31,19 +32,18 @@ class Peer:
     def command(self, case: str, size: float, order: int, steps: int, output: Path) -> list[str]:
         """The command line that solves ``case`` and writes its result, JSON, to ``output``."""
         options = {"--case": case, "--size": size, "--order": order, "--steps": steps, "--output": output}
-        return [*self._start, *(str(word) for option in options.items() for word in option)]
+        return [self.python, self._path, *(str(word) for option in options.items() for word in option)]
 
     @property
-    def _start(self) -> list[str]:
-        return [self.python, str(Path(__file__).with_name(self.script))]
+    def _path(self) -> str:
+        return str(Path(__file__).with_name(self.script))
 
     def probe(self) -> str | None:
         """The version of the code, None if it is not here."""
-        try:
-            done = subprocess.run([*self._start, "--probe"], capture_output=True, text=True, timeout=_PROBE_LIMIT)
-        except (OSError, subprocess.TimeoutExpired):
-            return None
-        return done.stdout.strip() if done.returncode == 0 else None
+        with suppress(OSError, subprocess.SubprocessError):
+            command = [self.python, self._path, "--probe"]
+            return subprocess.run(command, capture_output=True, check=True, text=True, timeout=_LIMIT).stdout.strip()
+        return None
 
 
 _COARSE = ((0.16, 2), (0.08, 2), (0.04, 2), (0.02, 2))

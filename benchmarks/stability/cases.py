@@ -1,4 +1,5 @@
-"""The cases of the stability benchmark: joints read from ``cases.toml``, general scenes, and what each must give.
+"""The cases of the stability benchmark: joints read from ``cases.toml``, general scenes from ``problems.toml``, whose
+blocks are drawn here; and what each must give.
 
 A case names what its numbers must agree with: a closed form; another case of the same run that gets there another way
 (other units, other steps, the other control); or the same joint on a fine mesh, stored in ``fine.json``, which
@@ -12,13 +13,15 @@ import tempfile
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from archord.benchmarks.case import Case, Expected, paper_joint, quantities, varied
 from archord.benchmarks.persson import persson_joint, theory
-from archord.benchmarks.stability.problems import groups, problem_scene
-from archord.scene.file import AnyScene
+from archord.scene.file import AnyScene, parse_any
 from archord.scene.scene import Scene
 
 Values = dict[str, dict[str, float]]  # by case and quantity
@@ -32,14 +35,26 @@ _TINY_LOAD = 0.02  # delta/dR up to which the contact is tiny
 
 def cases() -> dict[str, Case]:
     """All cases by name, in the order of the table."""
-    joints = tomllib.loads(Path(__file__).with_name("cases.toml").read_text(encoding="utf-8"))
-    kinds = (joints, _scene, "P/(E* R)"), (groups(), problem_scene, "")  # what is compared by default
-    return {
-        name: _case(name, group, keys, scene, default)
-        for table, scene, default in kinds
-        for group, cases in table.items()
-        for name, keys in cases.items()
-    }
+    joints, problems = (
+        tomllib.loads(FILE.with_name(f"{name}.toml").read_text(encoding="utf-8")) for name in ("cases", "problems")
+    )
+    bases = problems.pop("base")
+    found = {}
+    for group, table in joints.items():
+        for name, keys in table.items():
+            found[name] = _case(name, group, keys, _joint, "P/(E* R)")  # which is compared by default
+    for group, table in problems.items():
+        for name, keys in table.items():
+            found[name] = _case(name, group, _merged(bases[keys.pop("base", group)], keys), _problem, "")
+    return found
+
+
+def _merged(base: Any, keys: Any) -> Any:
+    """``base`` with ``keys`` on top, table by table; None where a key is "none"."""
+    if not (isinstance(base, dict) and isinstance(keys, dict)):
+        return keys
+    both = base | {name: _merged(base.get(name), value) for name, value in keys.items()}
+    return {name: value for name, value in both.items() if value != "none"}
 
 
 def _case(name: str, group: str, keys: dict[str, Any], scene: Callable[[Any], AnyScene], default: str) -> Case:
@@ -61,7 +76,7 @@ def _expected(keys: dict[str, Any], stops: bool, default: str) -> tuple[Expected
     return tuple(Expected(quantity, *said) for quantity in of or [default or "pull force"])
 
 
-def _scene(keys: dict[str, Any]) -> Scene:
+def _joint(keys: dict[str, Any]) -> Scene:
     """The joint that the rest of the ``keys`` of a case describe."""
     size, steps = keys.pop("size", _COARSE), keys.pop("steps", _STEPS)
     strength, load, both = keys.pop("yield_stress", None), keys.pop("persson", None), keys.pop("both", None)
@@ -76,6 +91,41 @@ def _scene(keys: dict[str, Any]) -> Scene:
     if load is not None:
         return persson_joint(load, size, steps, **keys)
     return paper_joint(size, steps, strength, **keys)
+
+
+def _problem(keys: dict[str, Any]) -> AnyScene:
+    """The scene of a case's ``keys``, its ``blocks``, if there are any, drawn as a mesh file."""
+    load = keys["load"]
+    if cycles := keys.pop("cycles", None):
+        load |= {name: value * cycles for name, value in load.items() if isinstance(value, list)}
+    if blocks := keys.pop("blocks", None):
+        keys["mesh"] = keys.get("mesh", {}) | {"file": str(_drawn(json.dumps(blocks), keys.pop("triangles", False)))}
+    return parse_any(keys)
+
+
+@cache
+def _drawn(blocks: str, triangles: bool) -> Path:
+    """An .inp file of ``blocks`` by name: ranges x0, y0, x1, y1, and numbers of quadrilaterals across and up, which
+    ``triangles`` cut in two; x and y are radius and angle (times pi) with a 1 behind. Sets: "NAME left" and so on."""
+    file, start = Path(tempfile.mkdtemp()) / "blocks.inp", 1
+    with file.open("wb") as out:
+        for name, (x0, y0, x1, y1, n, m, *polar) in json.loads(blocks).items():
+            x, y = np.meshgrid(np.linspace(x0, x1, n + 1), np.linspace(y0, y1, m + 1))
+            if polar:
+                x, y = x * np.cos(np.pi * y), x * np.sin(np.pi * y)
+            ids = start + np.arange(x.size).reshape(x.shape)
+            quads = np.stack([ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]], axis=2).reshape(-1, 4)
+            cells = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) if triangles else quads
+            numbered = np.column_stack([start + np.arange(len(cells)), cells])
+            rows = {"*NODE": np.column_stack([ids.ravel(), x.ravel(), y.ravel()])}
+            rows[f"*ELEMENT, TYPE=CPE{cells.shape[1]}, ELSET={name}"] = numbered
+            sides = {"left": ids[:, 0], "right": ids[:, -1], "bottom": ids[0], "top": ids[-1]}
+            rows |= {f"*NSET, NSET={name} {side}": nodes for side, nodes in sides.items()}
+            for heading, values in rows.items():
+                out.write(f"{heading}\n".encode())
+                np.savetxt(out, values, "%.15g", ", ")
+            start += max(x.size, len(cells))
+    return file
 
 
 def fine_scene(scene: Any) -> Scene:
@@ -93,14 +143,9 @@ def fine_scene(scene: Any) -> Scene:
     )
 
 
-def read_fine() -> Values:
-    """The stored values."""
-    return json.loads(FILE.read_text(encoding="utf-8"))
-
-
 def main() -> None:
     """Solve the joints that `FILE` lacks on fine meshes, and write after each. Raises RuntimeError if a run stops."""
-    known, values = cases(), read_fine()
+    known, values = cases(), json.loads(FILE.read_text(encoding="utf-8"))
     for name, case in known.items():
         if name not in values and any(expected.value == FINE for expected in case.expected):
             fine = replace(case, scene=fine_scene(case.scene))

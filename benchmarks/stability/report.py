@@ -53,9 +53,10 @@ def markdown(lines: list[Line]) -> str:
     )
 
 
-def write(lines: list[Line], folder: Path) -> list[Path]:
-    """Write stability.csv, stability.md and stability.png into ``folder``; returns the files."""
-    return write_report(folder, "stability", [*map(row, lines)], markdown(lines), lambda file: draw(lines, file))
+def write(lines: list[Line], folder: Path) -> tuple[str, list[Path]]:
+    """Write stability.csv, stability.md and stability.png into ``folder``; returns the Markdown and the files."""
+    text = markdown(lines)
+    return text, write_report(folder, "stability", [*map(row, lines)], text, lambda file: draw(lines, file))
 
 
 def draw(lines: list[Line], file: Path) -> Path:

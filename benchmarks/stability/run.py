@@ -15,8 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.benchmarks.case import Case, Expected, driven, matches, quantities, side_by_side
-from archord.benchmarks.stability.cases import FINE, Values, cases, read_fine
-from archord.output.folder import claim_folder
+from archord.benchmarks.stability.cases import FILE, FINE, Values, cases
 from archord.output.history import read_history
 from archord.output.run import Outcome
 from archord.output.step_file import all_arrays
@@ -40,9 +39,9 @@ class Check:
     @property
     def share(self) -> float:
         """The error over what is allowed; infinite for a nan."""
-        if self.error <= self.allowed:
-            return self.error / self.allowed if self.allowed else 0.0
-        return self.error / self.allowed if self.error < math.inf and self.allowed else math.inf
+        if self.allowed and self.error < math.inf:
+            return self.error / self.allowed
+        return 0.0 if self.error <= self.allowed else math.inf
 
 
 @dataclass
@@ -112,17 +111,18 @@ def with_references(names: list[str]) -> list[str]:
     return [name for name in table if name in wanted]
 
 
-def run(names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[Case, Result], None]) -> list[Line]:
+def run(names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[str], None]) -> list[Line]:
     """Solve the cases ``names`` and those they are compared with below ``folder``, each on one rank; judge ``names``.
 
-    ``said(case, result)`` follows each on the rank that solved it. The lines are the same on all ranks. Collective.
+    ``said(sentence)`` follows each on the rank that solved it. The lines are the same on all ranks. Collective.
     """
-    table, order, fine = cases(), with_references(names), read_fine()
+    table, order, fine = cases(), with_references(names), json.loads(FILE.read_text(encoding="utf-8"))
 
     def solved(name: str) -> Result:
-        result = solve_case(table[name], folder)
-        said(table[name], result)
-        return result
+        r = solve_case(table[name], folder)
+        cost = f"{r.steps} steps, {r.iterations} iterations, {r.cutbacks} cutbacks, {r.seconds:.1f} s"
+        said(f"{table[name].group}: {name}: {r.status}, {cost}")
+        return r
 
     results = dict(zip(order, side_by_side(comm, order, solved), strict=True))
     return [judge(table[name], results, fine) for name in names]
@@ -131,9 +131,8 @@ def run(names: list[str], folder: Path, comm: MPI.Comm, said: Callable[[Case, Re
 def solve_case(case: Case, folder: Path) -> Result:
     """Solve ``case`` into its run folder below ``folder`` on this rank; errors become part of the result.
 
-    Raises KeyboardInterrupt if a signal interrupted the run, `InputError` if the folder cannot be written.
+    Raises KeyboardInterrupt if a signal interrupted the run.
     """
-    claim_folder(case.folder(folder), force=True)
     result, begun = Result(), perf_counter()
 
     def attempted(load: float, iterations: int) -> None:
@@ -154,8 +153,7 @@ def solve_case(case: Case, folder: Path) -> Result:
 def _look(result: Result, scene: AnyScene, outcome: Outcome) -> None:
     """Fill in what the run's files and steps tell."""
     report = json.loads((outcome.folder / "run.json").read_text(encoding="utf-8"))
-    result.not_finite = not_finite(outcome.folder)
-    result.warnings = report["warnings"]
+    result.not_finite, result.warnings = not_finite(outcome.folder), report["warnings"]
     result.steps = len(outcome.steps)
     result.cutbacks = sum(m.cutbacks for m in outcome.steps) + report.get("failed_step", {}).get("cutbacks", 0)
     if outcome.steps:
@@ -163,9 +161,8 @@ def _look(result: Result, scene: AnyScene, outcome: Outcome) -> None:
         balance, energy = estimates["force_balance"], estimates["energy_balance"] or 0.0
         allowed = max(_BALANCE, _SPREAD * estimates["newton_residual"])
         result.forces = Check(balance, allowed, f"forces differ by {balance:.1e} of P")
-        result.energy = Check(
-            energy, 1.001 * _energy_limit(scene, outcome.steps) + 1e-8, f"energy is off by {energy:.1e} of the work"
-        )
+        limit = 1.001 * _energy_limit(scene, outcome.steps) + 1e-8
+        result.energy = Check(energy, limit, f"energy is off by {energy:.1e} of the work")
         result.quantities = quantities(scene, outcome.steps[-1])
 
 
@@ -183,14 +180,11 @@ def _energy_limit(scene: AnyScene, steps: list[Any]) -> float:
 
 def not_finite(folder: Path) -> list[str]:
     """The places in a run's files that hold a nan or an infinity."""
-    found = []
-    if (folder / "run.json").exists():
-        constants: list[str] = []
-        json.loads((folder / "run.json").read_text(encoding="utf-8"), parse_constant=constants.append)
-        found += [f"run.json: {name}" for name in sorted(set(constants))]
-    if (folder / "history.csv").exists():
-        history = read_history(folder / "history.csv")
-        found += [f"history.csv: {name}" for name, column in history.items() if not np.all(np.isfinite(column))]
+    constants: list[str] = []
+    json.loads((folder / "run.json").read_text(encoding="utf-8"), parse_constant=constants.append)
+    found = [f"run.json: {name}" for name in sorted(set(constants))]
+    history = read_history(folder / "history.csv")
+    found += [f"history.csv: {name}" for name, column in history.items() if not np.all(np.isfinite(column))]
     for path in (folder / "fields.h5", folder / "contact.h5"):
         if path.exists():
             with h5py.File(path) as file:

@@ -1,6 +1,7 @@
 """The stability benchmark: its command, its table of cases, and what makes a line wrong."""
 
 import csv
+import json
 import math
 import re
 from dataclasses import replace
@@ -8,7 +9,7 @@ from dataclasses import replace
 import h5py
 
 from archord.benchmarks.case import Expected, slug
-from archord.benchmarks.stability.cases import FINE, cases, fine_scene, read_fine
+from archord.benchmarks.stability.cases import FILE, FINE, cases, fine_scene
 from archord.benchmarks.stability.run import Check, Result, chosen, judge, not_finite, solve_case, with_references
 from archord.cli import run
 from archord.scene.scene import Scene
@@ -40,7 +41,7 @@ def a_case(**changes):
 def test_the_table_is_whole():
     """At least 160 scenes, 40 of them general; what a case is compared with exists and is another. Fine scenes
     are the same joint with smaller elements of one size, and more steps where a body can yield."""
-    table = cases()
+    table, fine = cases(), json.loads(FILE.read_text(encoding="utf-8"))
     assert len({slug(name) for name in table}) == len(table) >= 160
     assert sum(not isinstance(case.scene, Scene) for case in table.values()) >= 40
     for case in table.values():
@@ -48,7 +49,7 @@ def test_the_table_is_whole():
         for expected in case.expected:
             assert expected.value != case.name
             if expected.value == FINE:
-                assert expected.quantity in read_fine()[case.name]
+                assert expected.quantity in fine[case.name]
                 own, scene = case.scene, fine_scene(case.scene)
                 assert (scene.pin, scene.block, scene.load.legs) == (own.pin, own.block, own.load.legs)
                 assert (scene.joint.dR, scene.joint.size_ratio) == (own.joint.dR, 1)
