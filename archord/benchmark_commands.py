@@ -30,16 +30,13 @@ def _telling(quiet: bool) -> Say:
     return say
 
 
-def _conclude(printed: str, files: Iterable[Path], faults: Iterable[str], quiet: bool) -> int:
+def _conclude(printed: str, files: Iterable[Path], faults: list[str], quiet: bool) -> int:
     """Print a benchmark's tables, what it wrote, and what is wrong; the exit code."""
-    faults = list(faults)
     if not quiet:
-        print(printed)
-        for file in files:
-            print(file)
+        print(printed, *files, sep="\n")
     for fault in faults:
         print(f"archord: {fault}.", file=sys.stderr)
-    return 1 if faults else 0
+    return int(bool(faults))
 
 
 @click.command()
@@ -62,7 +59,8 @@ def reproduce(figures: tuple[str, ...], output: Path, quiet: bool) -> int:
         if comm.rank == 0:
             print(f"archord: {error}.", file=sys.stderr)
         return 3
-    print(*([] if quiet else files), sep="\n", end="" if quiet else "\n")
+    if not quiet:
+        print(*files, sep="\n")
     return 0
 
 
@@ -72,28 +70,27 @@ def benchmark() -> None:
 
 
 @benchmark.command()
-@output("folder for runs, table and heat map", "runs/stability")
+@output("folder for runs and table", "runs/stability")
 @click.option("--only", metavar="PATTERN", help="cases or groups with such a name")
 @quiet("what is wrong")
 def stability(output: Path, only: str | None, quiet: bool) -> int:
     """Solve a table of extreme scenes, each within a budget, and hold every line against what it must give.
 
-    Writes stability.csv, stability.md and stability.png. Under mpirun the ranks solve different scenes side by side.
+    Writes stability.csv and stability.md. Under mpirun the ranks solve different scenes side by side.
     Exit code 0 only if every scene is as it should be.
     """
     from mpi4py import MPI
 
     from archord.benchmarks.stability import run as table
-    from archord.benchmarks.stability.report import write
 
     comm = MPI.COMM_WORLD
     lines = table.run(table.chosen(only), output / "runs", comm, _telling(quiet))
     wrong = [f"{line.case.group}: {line.case.name}: {line.verdict}" for line in lines if line.faults]
-    return int(bool(wrong)) if comm.rank else _conclude(*write(lines, output), wrong, quiet)
+    return int(bool(wrong)) if comm.rank else _conclude(*table.write(lines, output), wrong, quiet)
 
 
 @benchmark.command()
-@output("folder for runs, table and picture", "runs/scaling")
+@output("folder for runs and table", "runs/scaling")
 @click.option("--largest", type=click.FloatRange(5000), default=1_000_000, metavar="N", help="dofs of the largest mesh")
 @click.option("--ranks", type=click.IntRange(1), default=2, metavar="N", help="solve on 1, 2, 4, ... N ranks")
 @_repeats("runs of each case; the median counts", 1)
@@ -102,7 +99,7 @@ def scaling(output: Path, largest: float, ranks: int, repeats: int, quiet: bool)
     """Solve the paper's joint on ever finer meshes, of 1 million dofs at most, and several ranks: time by part and
     memory per rank.
 
-    Writes scaling.csv, scaling.md and scaling.png. Exit code 0 only if every run finishes, with the same force on any
+    Writes scaling.csv and scaling.md. Exit code 0 only if every run finishes, with the same force on any
     number of ranks.
     """
     from archord.benchmarks.cost import scaling as table

@@ -21,7 +21,6 @@ import numpy as np
 from archord.benchmarks.case import paper_joint
 from archord.benchmarks.timing import Process, Timing, time_all
 from archord.output.folder import claim_folder
-from archord.report.figure import new_figure, save
 from archord.report.files import write_report
 from archord.report.table import Table
 from archord.scene.errors import InputError
@@ -167,7 +166,7 @@ def row(cost: Cost, costs: Sequence[Cost]) -> dict[str, object]:
 
 
 def write(costs: Sequence[Cost], folder: Path) -> tuple[str, list[Path]]:
-    """Write scaling.csv, scaling.md and scaling.png into ``folder``, if there is any cost; returns the table, with the
+    """Write scaling.csv and scaling.md into ``folder``, if there is any cost; returns the table, with the
     powers of N with which time and memory grow, and the files."""
     if not costs:
         return "", []
@@ -183,28 +182,4 @@ def write(costs: Sequence[Cost], folder: Path) -> tuple[str, list[Path]]:
             }
             powers = ", ".join(f"{what} N^{exponent(dofs, values):.2f}" for what, values in grown.items())
             text += f"\nLeast squares over {len(same)} sizes on one rank, {material}: {powers}.\n"
-    return text, write_report(folder, "scaling", rows, text, lambda file: draw(costs, file))
-
-
-def draw(costs: Sequence[Cost], file: Path) -> None:
-    """Draw seconds by part and peak memory of the largest rank over the number of dofs, both logarithmic."""
-    figure = new_figure(11, 4.4)
-    time, memory = figure.subplots(1, 2)
-    kinds = sorted({(cost["material"], cost["ranks"]) for cost in costs})
-    for k, (material, ranks) in enumerate(kinds):
-        same, line = series(costs, material, ranks), ("-", "--", ":", "-.")[k % 4]
-        dofs, style = [cost["dofs"] for cost in same], {"color": "black", "marker": "o", "linestyle": line}
-        name = f"{material}, {ranks} rank{'s' * (ranks > 1)}"
-        time.loglog(dofs, [cost["total"] for cost in same], **style, label=f"total, {name}")
-        memory.loglog(dofs, [max(cost["memory"]) / 1e6 for cost in same], **style, label=name)
-        if material == "elastic":
-            for part in (part for part in PARTS if part != "start-up"):
-                seconds, color = [max(cost["parts"][part], 1e-3) for cost in same], f"C{list(PARTS).index(part)}"
-                label = part if ranks == 1 else None
-                time.loglog(dofs, seconds, color=color, marker=".", linestyle=line, label=label)
-    time.set(xlabel="dofs", ylabel="seconds", title="time")
-    memory.set(xlabel="dofs", ylabel="MB", title="peak memory of the largest rank")
-    for axes in (time, memory):
-        axes.grid(alpha=0.3, which="both")
-        axes.legend(frameon=False, fontsize=7)
-    save(figure, file)
+    return text, write_report(folder, "scaling", rows, text)

@@ -7,22 +7,25 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from archord.benchmarks.paper.figures import Part, X, Y, columns
-from archord.benchmarks.paper.first_yield import first_yield
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, PLANES, Runs
 from archord.materials.material import Plane
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.convergence import group
+from archord.postprocess.curve import RunCurve
+from archord.postprocess.fields import BODIES, read_fields
 from archord.postprocess.laws.curve_fit import fit_curve
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.report.table import Table
 
 GOOD, FAIR = 0.05, 0.15
+_CORNER = 85  # degrees from the contact axis beyond which the block is held
 Tables = dict[str, list[Part]]  # of the figures, by name
 Found = tuple[str, dict[str, float]]  # in a plane: what we find, and how far off is what the claim is about
 
@@ -117,6 +120,47 @@ def plastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
     last = [float(columns(tables["fig7"], **where)["P/P(eq. 12)"][-1]) for where in of_pair]
     ratios = [f"{value:.3f} ({dR} %, {sigma} %)" for value, (dR, sigma) in zip(last, pairs, strict=True)]
     return f"P/P(eq. 12) at 2 dR: {', '.join(ratios)}", {"": float(np.abs(1 / np.array(last) - 1).max())}
+
+
+@dataclass(frozen=True)
+class FirstYield:
+    """The first cell to yield: delta/dR, body, depth below the contact over R, angle."""
+
+    delta: float
+    body: str
+    depth: float
+    angle: float  # degrees from the contact axis
+
+    def __str__(self) -> str:
+        """For a table."""
+        return f"δ/ΔR = {self.delta:.3f}, in the {self.body}, {self.depth:.3f} R below the contact at {self.angle:.0f}°"
+
+
+def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.0) -> FirstYield:
+    """From an elastic run: the cell no deeper than ``near_contact`` R whose von Mises stress reaches ``yield_stress``
+    first.
+
+    The stress is the cell's mean, interpolated linearly between the steps. The pressed diameter of the pin and the held
+    corner of the block can yield before the contact does: a depth of less than R leaves them out.
+    """
+    assert elastic.folder is not None
+    fields = [read_fields(elastic.folder, elastic.scene, k + 1) for k in range(len(elastic.delta))]
+    centroid = fields[0].coordinates[fields[0].cells[:, :3]].mean(axis=1)
+    stress = np.array([np.zeros(len(centroid)), *(field.von_mises for field in fields)])
+    delta = np.concatenate([[0.0], elastic.delta])
+    above, cell = stress >= yield_stress, np.arange(len(centroid))
+    step = np.maximum(above.argmax(axis=0), 1)
+    low, high = stress[step - 1, cell], stress[step, cell]
+    share = (yield_stress - low) / np.maximum(high - low, 1e-300)
+    when = np.where(above.any(axis=0), delta[step - 1] + share * (delta[step] - delta[step - 1]), np.inf)
+    pin = fields[0].body == BODIES["pin"]
+    radius = np.linalg.norm(centroid + np.where(pin[:, None], [0.0, elastic.dR], 0.0), axis=1)
+    depth = np.where(pin, elastic.R - radius, radius - elastic.R - elastic.dR) / elastic.R
+    angle = np.degrees(np.arctan2(centroid[:, 0], -centroid[:, 1]))
+    when[(depth > near_contact) | ((angle > _CORNER) & (near_contact < 1))] = np.inf
+    first = int(np.argmin(when))
+    body = "pin" if pin[first] else "block"
+    return FirstYield(float(when[first]) / elastic.dR, body, float(depth[first]), float(angle[first]))
 
 
 def onset(runs: Runs, tables: Tables, plane: Plane) -> Found:

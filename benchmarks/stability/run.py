@@ -1,4 +1,4 @@
-"""The stability benchmark: cases solved within their budgets, side by side, and a verdict on every one."""
+"""The stability benchmark: cases solved within their budgets, side by side, a verdict on every one, and the table."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from archord.benchmarks.stability.cases import FILE, FINE, Values, cases
 from archord.output.history import read_history
 from archord.output.run import Outcome
 from archord.output.step_file import all_arrays
+from archord.report.files import write_report
+from archord.report.table import Table
 from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
@@ -218,3 +220,46 @@ def _compare(case: Case, expected: Expected, results: dict[str, Result], fine: V
     deviation = abs(value / reference - 1) if reference else abs(value)
     fault = f"{expected.quantity} is {value:.6g}, not {reference:.6g} ({expected.source})"
     return Comparison(deviation, expected.tolerance, fault, expected, value, reference)
+
+
+def row(line: Line) -> dict[str, object]:
+    """The entries of a line by heading; what is not there is empty."""
+    case, result, worst = line.case, line.result, line.worst
+    energy = result.energy if result.energy and result.energy.allowed < math.inf else None
+    return {
+        "group": case.group,
+        "case": case.name,
+        "status": result.status,
+        "steps": result.steps,
+        "iterations": result.iterations,
+        "cutbacks": result.cutbacks,
+        "force balance": f"{result.forces.error:.0e}" if result.forces else "",
+        "energy error": f"{energy.error:.0e}" if energy else "",
+        "quantity": worst.expected.quantity if worst else "",
+        "value": f"{worst.value:.8g}" if worst else "",
+        "expected": f"{worst.reference:.8g}" if worst else "",
+        "by": worst.expected.source if worst else "",
+        "deviation": f"{worst.error:.1e}" if worst else "",
+        "seconds": f"{result.seconds:.1f}",
+        "verdict": line.verdict,
+    }
+
+
+def markdown(lines: list[Line]) -> str:
+    """How many are as they should be, the table, and the sentences of the runs that stopped."""
+    converged = sum(line.result.status == "done" for line in lines)
+    solvable = sum(not line.case.stops for line in lines)
+    seconds = sum(line.result.seconds for line in lines)
+    said = "".join(f"- {line.case.name}: {line.result.message}.\n" for line in lines if line.result.message)
+    return (
+        f"{len(lines)} scenes in {seconds:.0f} s: {converged} converged of the {solvable} that have a solution, "
+        f"{len(lines) - solvable} must stop with a sentence; {sum(bool(line.faults) for line in lines)} not as they "
+        f"should be.\n\n{Table.of([*map(row, lines)]).markdown()}"
+        + (f"\nWhat the runs that stopped said:\n\n{said}" if said else "")
+    )
+
+
+def write(lines: list[Line], folder: Path) -> tuple[str, list[Path]]:
+    """Write stability.csv and stability.md into ``folder``; returns the Markdown and the files."""
+    text = markdown(lines)
+    return text, write_report(folder, "stability", [*map(row, lines)], text)

@@ -7,9 +7,8 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.paper import runs as paper_runs
-from archord.benchmarks.paper.claims import CLAIMS, verdict
+from archord.benchmarks.paper.claims import CLAIMS, first_yield, verdict
 from archord.benchmarks.paper.figures import FIGURES, LAYOUTS
-from archord.benchmarks.paper.first_yield import first_yield
 from archord.benchmarks.paper.reproduce import chosen, reproduce
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, PLANES, Runs, case, cases
 
