@@ -21,6 +21,7 @@ Index = npt.NDArray[np.integer]
 _END_MARGIN = 0.05  # a polynomial facet may be continued by this much beyond a free end of its curve
 _CONTINUED = 0.5  # and a facet by this much where points are to stay on theirs
 _NEWTON_STEPS = 30
+_ROUND = 1e-3  # of an arc's size: how far points may be off its circle; and size over radius, below which it is a line
 
 
 class ProjectionError(RuntimeError):
@@ -182,6 +183,19 @@ class Curve:
             raise ProjectionError(f"{n_lost} contact points found no closest point, the first at {at}")
         of_facet = self.connectivity[facet]
         return Projection(found, point, normal, tangent, bend, slides, of_facet, shape, slope, facet, xi)
+
+
+def circle_through(x: Array) -> tuple[Array, float] | None:
+    """Centre and radius of the circle that the points ``x`` ``(n, 2)`` lie on; None if there is none (Kasa 1976)."""
+    shift = x.mean(axis=0)
+    y = x - shift
+    (a, b, c), *_ = np.linalg.lstsq(np.column_stack([2 * y, np.ones(len(y))]), (y**2).sum(axis=1), rcond=None)
+    radius = float(np.sqrt(max(c + a * a + b * b, 0.0)))
+    off = np.abs(np.linalg.norm(y - [a, b], axis=1) - radius).max()
+    size = np.ptp(y, axis=0).max()
+    if len(x) < 4 or off > _ROUND * size or _ROUND * radius > size:
+        return None
+    return shift + np.array([a, b]), radius
 
 
 class RigidCircle:

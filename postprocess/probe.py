@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from archord.postprocess.run import Run
 
 CONTACT = {"pressure": "pressure", "facet_pressure": "pressure", "gap": "gap"}
-_ROUND = 1e-3  # of the radius, by which nodes may miss the circle of an arc
+Points = tuple[Array, Array, Array, Array | None]  # of a `Probe`: x, s, values, angle
+_CLOSED = 0.999  # of a circle's length
 _SMOOTH = 0.9  # cosine of the angle between facets without a corner
 _NOTHING = 1e-9  # of the largest force of a run: round-off
 _SAMPLES = 201  # on a line
@@ -79,10 +80,34 @@ def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
     """A ``quantity`` at the nodes along an ``edge`` of the mesh: its "hoop", "normal" or "shear" stress, or one of
     `at_nodes`; or "pressure" or "gap" at the integration points of a surface, or "facet_pressure", the mean of each
     facet, which scatters less where bodies yield. Raises `InputError`."""
-    head = (edge, quantity, _unit(run, quantity), step, *_driving(run, step))
-    if quantity in CONTACT:
-        return Probe(*head, *_contact(run, edge, quantity, step))
-    from archord.geometry.curve import Curve  # with bases, which most readers of runs do without
+    along = _contact if quantity in CONTACT else _stress
+    x, s, values, angle = along(run, edge, quantity, step)
+    return Probe(edge, quantity, _unit(run, quantity), step, *_driving(run, step), x, s, values, angle)
+
+
+def _contact(run: Run, edge: str, quantity: str, step: int) -> Points:
+    from archord.geometry.curve import circle_through  # with bases, which most readers of runs do without
+
+    arc = run.arc(step, edge)
+    x, s, values = undeformed(arc, edge, run.scene), arc.s, getattr(arc, CONTACT[quantity])
+    circle = circle_through(x.reshape(-1, 2))
+    if quantity == "facet_pressure":
+        share = arc.weight / arc.width[:, None]
+        x, s, values = (np.einsum("fq,fq...->f...", share, array) for array in (x, s, values))
+    x, s, values = x.reshape(-1, 2), s.ravel(), values.ravel()
+    if circle is None:
+        return x, s, values, None
+    centre, radius = circle
+    angle = np.degrees(np.arctan2(*(x - centre).T[::-1])) % 360
+    if arc.width.sum() < _CLOSED * 2 * np.pi * radius:  # from the free end on
+        rising = np.sort(angle)
+        angle[angle < rising[np.argmax(np.diff(rising, prepend=rising[-1] - 360))]] += 360
+    order = np.argsort(angle)
+    return x[order], np.radians(angle[order]) * radius, values[order], angle[order]
+
+
+def _stress(run: Run, edge: str, quantity: str, step: int) -> Points:
+    from archord.geometry.curve import Curve
 
     fields = run.fields(step)
     edges = [name for name, facets in fields.edges.items() if len(facets)]
@@ -91,10 +116,11 @@ def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
     rows, begins, radius = _oriented(fields, edge)
     nodes, index = np.unique(rows, return_inverse=True)
     curve = Curve(fields.coordinates[nodes], 2, index.reshape(rows.shape))
-    s = curve.arc_length(np.array([0.0, 0.5, 1.0]))
-    first = np.maximum.accumulate(np.where(s[:, 0] == 0, np.arange(len(rows)), 0))  # facet of each piece
-    angle = begins[first, None] + np.degrees(s / radius)
-    s = s if radius == np.inf else np.radians(angle) * radius
+    s, angle = curve.arc_length(np.array([0.0, 0.5, 1.0])), None
+    if radius:
+        first = np.maximum.accumulate(np.where(s[:, 0] == 0, np.arange(len(rows)), 0))  # facet of each piece
+        angle = begins[first, None] + np.degrees(s / radius)
+        s = np.radians(angle) * radius
     tangent, joined = _tangents(curve)
     values = {name: whole[rows] for name, whole in at_nodes(fields).items()}
     if fields.stress is not None:
@@ -104,27 +130,8 @@ def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
         values |= {"hoop": hoop, "normal": xx + yy - hoop, "shear": (yy - xx) * c * d + xy * (c**2 - d**2)}
     shown = np.ones(rows.shape, dtype=bool)
     shown[:, 2] = ~joined
-    at = (fields.coordinates[rows], s, _one(values, quantity, run), *([angle] if radius < np.inf else []))
-    return Probe(*head, *(array[shown] for array in at))
-
-
-def _contact(run: Run, edge: str, quantity: str, step: int) -> tuple[Array, Array, Array, Array | None]:
-    """Places, arc lengths, values and angles of the points of a surface, or of the means of its facets."""
-    arc = run.arc(step, edge)
-    x, s, values, share = undeformed(arc, edge, run.scene), arc.s, getattr(arc, CONTACT[quantity]), arc.weight
-    circle = _circle(x.reshape(-1, 2))
-    if quantity == "facet_pressure":
-        share = share / arc.width[:, None]
-        x, s, values = (np.einsum("fq,fq...->f...", share, array) for array in (x, s, values))
-    x, s, values = x.reshape(-1, 2), s.ravel(), values.ravel()
-    if circle is None:
-        return x, s, values, None
-    angle = np.degrees(np.arctan2(*(x - circle[0]).T[::-1])) % 360
-    if arc.width.sum() < 2 * np.pi * circle[1] * (1 - _ROUND):  # not all around: from its free end on
-        rising = np.sort(angle)
-        angle[angle < rising[np.argmax(np.diff(rising, prepend=rising[-1] - 360))]] += 360
-    order = np.argsort(angle)
-    return x[order], np.radians(angle[order]) * circle[1], values[order], angle[order]
+    x, value = fields.coordinates[rows], _one(values, quantity, run)
+    return x[shown], s[shown], value[shown], None if angle is None else angle[shown]
 
 
 def probe_line(run: Run, line: Sequence[float], quantity: str, step: int) -> Probe:
@@ -143,10 +150,8 @@ def probe_line(run: Run, line: Sequence[float], quantity: str, step: int) -> Pro
     inside = ~np.isnan(found)
     if not inside.any():
         raise InputError(f"{run.folder}: no body lies on the line.")
-    s = share * np.linalg.norm(end - start)
-    return Probe(
-        "line", quantity, _unit(run, quantity), step, *_driving(run, step), x[inside], s[inside], found[inside]
-    )
+    points = x[inside], share[inside] * np.linalg.norm(end - start), found[inside]
+    return Probe("line", quantity, _unit(run, quantity), step, *_driving(run, step), *points)
 
 
 def at_nodes(fields: Fields) -> dict[str, Array]:
@@ -162,33 +167,37 @@ def _one(known: dict[str, Array], quantity: str, run: Run) -> Array:
 
 
 def _unit(run: Run, quantity: str) -> str:
-    units = {"ux": run.scene.units.length, "uy": run.scene.units.length, "gap": run.scene.units.length}
-    none = quantity.startswith(("p", "plastic")) and quantity not in ("p1", "p2", "p3", "pressure")
-    return units.get(quantity, "rad" if quantity == "principal_angle" else "" if none else run.scene.units.stress)
+    if quantity in ("ux", "uy", "gap"):
+        return run.scene.units.length
+    if quantity.startswith(("peeq", "plastic")):
+        return ""
+    return "rad" if quantity == "principal_angle" else run.scene.units.stress
 
 
 def _driving(run: Run, step: int) -> tuple[float, str]:
-    """The largest force of the loads at ``step``, per unit thickness, and the name of its load."""
+    """The largest force of the loads at ``step``, per unit thickness, 0 if that is round-off; and its load's name."""
     names = {"P": "P"}
     if not run.is_joint:
         pulls = [load.name for load in run.scene.load if load.pressure is None and load.direction != "rotation"]
         names = {name: f"{name} force" for name in pulls}
     forces = {by: np.array(run.columns[name]) for by, name in names.items()}
     by = max(forces, key=lambda name: abs(forces[name][step - 1]), default="")
-    if not by or abs(forces[by][step - 1]) < _NOTHING * np.abs(forces[by]).max():
-        return 0.0, by
-    return float(forces[by][step - 1]) / run.scene.thickness, by
+    force = forces.get(by, np.zeros(run.steps))
+    counts = abs(force[step - 1]) > _NOTHING * np.abs(force).max()
+    return float(force[step - 1]) / run.scene.thickness if counts else 0.0, by
 
 
 def _oriented(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
     """Nodes ``(k, 3)`` along the facets of an ``edge``, piece by piece, with the body on the left, but on arcs
-    counterclockwise; of an arc also the angle ``(k,)`` at which each facet begins, and the radius (else inf)."""
+    counterclockwise; of an arc also the angle ``(k,)`` at which each facet begins, and the radius (else 0)."""
+    from archord.geometry.curve import circle_through, in_pieces
+
     rows = fields.facets()
     rows = rows[np.isin(rows[:, 1], fields.edges[edge][:, 1])]
     rows = rows[np.unique(rows[:, 1], return_index=True)[1]]
-    x, radius = fields.coordinates, np.inf
+    x, radius = fields.coordinates, 0.0
     height = x[rows[:, 0]] @ [1.0, 1e-3]
-    if (circle := _circle(x[np.unique(rows)])) is not None:
+    if (circle := circle_through(x[np.unique(rows)])) is not None:
         centre, radius = circle
         ray, along = x[rows[:, 1]] - centre, x[rows[:, 2]] - x[rows[:, 0]]
         if (ray[:, 0] * along[:, 1] - ray[:, 1] * along[:, 0]).sum() < 0:
@@ -196,8 +205,6 @@ def _oriented(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
         height = (np.degrees(np.arctan2(*(x[rows[:, 0]] - centre).T[::-1])) + 1e-6) % 360 - 1e-6
     if len(np.unique(rows[:, 0])) < len(rows):
         raise InputError(f"edge {edge!r}: branches, or lies within a body, so that nothing can be said along it.")
-    from archord.geometry.curve import in_pieces
-
     order = in_pieces(rows[:, 0], rows[:, 2], height)
     return rows[order], height[order], radius
 
@@ -209,23 +216,9 @@ def _tangents(curve: Curve) -> tuple[Array, np.ndarray]:
     tangent = np.einsum("qa,fai->fqi", slopes, curve.X[curve.connectivity])
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
     here = np.flatnonzero(curve.after >= 0)
-    smooth = (tangent[here, 2] * tangent[curve.after[here], 0]).sum(axis=1) > _SMOOTH
-    here = here[smooth]
+    here = here[(tangent[here, 2] * tangent[curve.after[here], 0]).sum(axis=1) > _SMOOTH]
     mean = tangent[here, 2] + tangent[curve.after[here], 0]
     tangent[here, 2] = tangent[curve.after[here], 0] = mean / np.linalg.norm(mean, axis=1)[:, None]
     joined = np.zeros(len(tangent), dtype=bool)
     joined[here] = curve.after[here] == here + 1
     return tangent, joined
-
-
-def _circle(x: Array) -> tuple[Array, float] | None:
-    """Centre and radius of the circle through points ``x`` ``(n, 2)``; None if they lie on none."""
-    middle, size = x.mean(axis=0), np.ptp(x, axis=0).max()
-    y = (x - middle) / size
-    if np.linalg.svd(y, compute_uv=False)[-1] < _ROUND * np.sqrt(len(y)):  # straight
-        return None
-    (a, b, c), *_ = np.linalg.lstsq(np.column_stack([2 * y, np.ones(len(y))]), (y**2).sum(axis=1), rcond=None)
-    radius = np.sqrt(c + a**2 + b**2)
-    if np.abs(np.hypot(*(y - [a, b]).T) - radius).max() > _ROUND * radius:
-        return None
-    return middle + size * np.array([a, b]), size * radius

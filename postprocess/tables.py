@@ -18,7 +18,7 @@ from archord.scene.faults import shortened
 _MOST = 40  # rows of a table
 _LAST = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "steps", "iterations", "cutbacks", "seconds")
 _WHOLE = ("iterations", "cutbacks", "seconds")
-_OF_STEPS = ("step", "delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", *_WHOLE)
+_OF_STEPS: tuple[str, ...] = ("step", "delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", *_WHOLE)
 _OF_A_RUN = {  # what a comparison tells of each run
     "status": lambda run: run.status,
     "steps": lambda run: f"{run.steps} of {len(run.scene.targets)}",
@@ -165,7 +165,7 @@ def _differences(comparison: Comparison, quantity: str, names: list[str]) -> Tab
     relative, marks = comparison.relative(quantity), np.where(comparison.interpolated, "~", "")
     for k, load in enumerate(comparison.load):
         pairs = zip(marks[:, k], comparison.values[quantity][:, k], relative[:, k], strict=True)
-        cells = [cell for mark, value, off in pairs for cell in (f"{mark}{value:.6g}", _percent(off))]
+        cells = [cell for mark, value, off in pairs for cell in (f"{mark}{value:.6g}", _percent(float(off)))]
         table.add(f"{load:.6g}", cells[0], *cells[2:])
     largest = np.abs(np.nan_to_num(relative[1:])).max(axis=1)
     table.add("", "largest difference", *(cell for size in largest for cell in ("", _percent(size))))

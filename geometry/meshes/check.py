@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from archord.geometry.basis import Array, bulk_quadrature, cell_kind, tabulate
-from archord.geometry.curve import Curve
+from archord.geometry.curve import Curve, circle_through
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.plane_mesh import PlaneMesh, distinct_edges, outer_sides, sides_of
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
@@ -21,7 +21,6 @@ _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
 _INTO = 0.02, 1e-3  # of a side: how deep bodies may overlap by their sides being straight, or curved
 _PIECES = 8  # of a side, as a polygon
 _AT_ONCE = 2_000_000  # pairs of points and pieces
-_ROUND = 1e-3  # of an arc's size: how far nodes may be off its circle; and size over radius, below which it is a line
 _COARSE = 0.05  # of the clearance: sagitta of straight sides that spoils it
 _MOTIONS = ("x", "y", "rotation")
 _HELD = 1e-8  # singular value over the largest one, below which a motion is free
@@ -196,16 +195,6 @@ def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
     if len(pairs):
         at = _at(mesh.x[nodes[pairs[0, 0]]])
         yield f"the body {body!r} has {len(pairs)} pairs of nodes at the same place, as at {at}: a crack, if not merged"
-
-
-def circle_through(x: Array) -> tuple[Array, float] | None:
-    """Centre and radius of the circle that the points ``x`` ``(n, 2)`` lie on; None if there is none (Kasa 1976)."""
-    shift, size = x.mean(axis=0), np.ptp(x, axis=0).max()
-    y = x - shift
-    (a, b, c), *_ = np.linalg.lstsq(np.column_stack([2 * y, np.ones(len(y))]), (y**2).sum(axis=1), rcond=None)
-    radius = float(np.sqrt(max(c + a * a + b * b, 0.0)))
-    off = np.abs(np.linalg.norm(y - [a, b], axis=1) - radius).max()
-    return None if len(x) < 4 or off > _ROUND * size or _ROUND * radius > size else (shift + np.array([a, b]), radius)
 
 
 def _sagitta(mesh: PlaneMesh, *pair: str | float) -> Iterator[str]:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from archord.geometry.basis import Array, cell_kind
-from archord.geometry.curve import Curve
-from archord.geometry.meshes.check import areas, circle_through, cracks, parts
+from archord.geometry.curve import Curve, circle_through
+from archord.geometry.meshes.check import areas, cracks, parts
 from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_of
 from archord.postprocess.pictures.pictures import save_figure
 from archord.report.figure import new_figure

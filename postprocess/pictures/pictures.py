@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import compress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def draw_run(run: Run, target: Path) -> Path:
     """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``; returns the file. Raises
     `InputError`."""
     run.number(None)
-    draws = [problems.field_panel, problems.contact_panel, problems.load_panel]
+    draws: list[Any] = [problems.field_panel, problems.contact_panel, problems.load_panel]
     if run.is_joint:
         draws = [joint.field_panel, joint.arc_panel, joint.force_panel]
     draws = list(compress(draws, (run.scene.output.fields, run.has_contact, True)))

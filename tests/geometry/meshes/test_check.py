@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.geometry.meshes.check import check_mesh, circle_through, faults, free_motions
+from archord.geometry.curve import circle_through
+from archord.geometry.meshes.check import check_mesh, faults, free_motions
 from archord.geometry.meshes.fenicsx import distribute, gathered
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.refine import Circle, refined
