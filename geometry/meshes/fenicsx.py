@@ -4,7 +4,7 @@ to the process."""
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from tempfile import TemporaryDirectory
@@ -21,6 +21,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array, cell_kind
 from archord.geometry.meshes.mesh_cache import kept_mesh
 from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_of
+from archord.geometry.meshes.refine import Circle, on_circles
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
 try:
@@ -43,7 +44,7 @@ with suppress(TypeError, ValueError):  # a handler of another language, or not t
 def gmsh_to_mesh(
     comm: MPI.Comm,
     build: Callable,
-    adjust: Callable[[Array, int], Array] | None = None,
+    circles: Sequence[Circle] = (),
     *,
     order: int = 2,
     refinements: int = 0,
@@ -54,15 +55,14 @@ def gmsh_to_mesh(
     """Mesh what ``build(gmsh)`` describes, in triangles or ``quads`` of the given ``order``, and distribute it over
     ``comm``.
 
-    The cells are cut in four ``refinements`` times before they get nodes of higher order.
-    ``adjust(x, tag)`` moves the nodes ``x`` ``(n, 2)`` of the physical curve ``tag``; without it, second-order edges
-    are straight. An error on rank 0 is raised on every rank. The sets have the names of gmsh's physical groups.
-    ``partitioner`` replaces `sectors`. A mesh whose ``key`` says all that enters it is kept (`kept_mesh`). What has a
-    mesh already is taken by `read_mesh`.
+    The cells are cut in four ``refinements`` times before they get nodes of higher order. All nodes of ``circles`` are
+    put on them; other second-order edges are straight. An error on rank 0 is raised on every rank. The sets have the
+    names of gmsh's physical groups. ``partitioner`` replaces `sectors`. A mesh whose ``key`` says all that enters it is
+    kept (`kept_mesh`). What has a mesh already is taken by `read_mesh`.
     """
     made, failure = None, None
     if comm.rank == 0:
-        make = partial(_made, build, adjust, order, refinements, quads)
+        make = partial(_made, build, circles, order, refinements, quads)
         try:
             made = kept_mesh((*key, order, refinements, quads), make) if key else make()
         except Exception as error:  # raised on all ranks below
@@ -72,17 +72,12 @@ def gmsh_to_mesh(
     return distribute(comm, made, partitioner)
 
 
-def _made(
-    build: Callable, adjust: Callable[[Array, int], Array] | None, order: int, refinements: int, quads: bool
-) -> PlaneMesh:
+def _made(build: Callable, circles: Sequence[Circle], order: int, refinements: int, quads: bool) -> PlaneMesh:
+    options = {f"MeshSize{name}": 0 for name in ("FromPoints", "FromCurvature", "ExtendFromBoundary")}
+    options |= {"Algorithm": 6, "HighOrderOptimize": 0, "RecombineAll": quads}
     with own_gmsh() as gmsh:
-        for option in ("FromPoints", "FromCurvature", "ExtendFromBoundary"):
-            gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
-        for name, value in (("Mesh.Algorithm", 6), ("Mesh.HighOrderOptimize", 0)):
-            gmsh.option.setNumber(name, value)
-        if quads:
-            gmsh.option.setNumber("Mesh.RecombineAll", 1)
-            gmsh.option.setNumber("Mesh.RecombinationAlgorithm", _ALL_QUADS)
+        for name, value in (options | ({"RecombinationAlgorithm": _ALL_QUADS} if quads else {})).items():
+            gmsh.option.setNumber(f"Mesh.{name}", value)
         build(gmsh)
         gmsh.model.mesh.generate(2)
         for _ in range(refinements):
@@ -90,16 +85,10 @@ def _made(
         if order > 2:
             gmsh.model.mesh.setOrder(order)
         mesh = PlaneMesh.from_gmsh(gmsh)
-        curves = {tag: gmsh.model.getPhysicalName(1, tag) or str(tag) for _, tag in gmsh.model.getPhysicalGroups(1)}
     if order == 2:  # in much less time than gmsh's setOrder
         mesh = mesh.second_order()
-    if adjust is not None:
-        for tag, name in curves.items():
-            nodes = np.unique(mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])])
-            mesh.x[nodes] = adjust(mesh.x[nodes], int(tag))
-        if quads:
-            mesh.centre()
-    return mesh
+    mesh = on_circles(mesh, circles)
+    return mesh.centred() if quads else mesh
 
 
 @contextmanager

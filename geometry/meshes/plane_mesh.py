@@ -109,11 +109,12 @@ class PlaneMesh:
             x, cells = with_middle_nodes(x, cells)
         return replace(self, x=x, cells=cells, edges=np.column_stack([self.edges, of_edges]))
 
-    def centre(self) -> None:
-        """Put the nodes within cells where those on the cells' sides want them."""
-        weights = _within(self.cells.shape[1])
+    def centred(self) -> PlaneMesh:
+        """This mesh with the nodes within cells where those on the cells' sides want them."""
+        weights, x = _within(self.cells.shape[1]), self.x.copy()
         if n := len(weights):
-            self.x[self.cells[:, -n:]] = np.einsum("ib,cbk->cik", weights, self.x[self.cells[:, :-n]])
+            x[self.cells[:, -n:]] = np.einsum("ib,cbk->cik", weights, x[self.cells[:, :-n]])
+        return replace(self, x=x)
 
 
 def with_middle_nodes(x: Array, cells: np.ndarray) -> tuple[Array, np.ndarray]:

@@ -35,36 +35,37 @@ def refined(mesh: PlaneMesh, times: int = 0, order: int | None = None, circles: 
     Raises ValueError if a node is far from its circle.
     """
     for circle in circles:
-        nodes = _nodes_on(mesh, circle)
+        nodes = np.unique(mesh.edges[np.isin(mesh.tags, tags_of("facet", mesh.facet_sets, circle.facets))])
         off = np.abs(np.linalg.norm(mesh.x[nodes] - circle.centre, axis=1) - circle.radius)
         if off.max() > _OFF_CIRCLE * circle.radius:
             x, y = mesh.x[nodes[off.argmax()]]
             said = f"the node ({x:g}, {y:g}) of the facet set {circle.facets!r} is {off.max():.3g} off its circle"
             raise ValueError(f"{said}, whose centre or radius {circle.radius:g} must be wrong")
-    mesh = _on_circles(mesh, circles)
+
+    def settled(mesh: PlaneMesh) -> PlaneMesh:
+        return on_circles(mesh, circles).centred() if circles else mesh
+
+    mesh, own = settled(mesh), cell_kind(mesh.cells.shape[1])[1]
     for _ in range(times):
-        mesh = _on_circles(_cut(mesh), circles)
-    own = cell_kind(mesh.cells.shape[1])[1]
+        mesh = settled(_cut(mesh))
     if order is None or order == own:
         return mesh
     if order < own:
         raise ValueError(f"the mesh is of order {own}, which cannot be lowered to {order}")
-    return _on_circles(_raised(mesh, order), circles)
+    return settled(_raised(mesh, order))
 
 
-def _nodes_on(mesh: PlaneMesh, circle: Circle) -> np.ndarray:
-    return np.unique(mesh.edges[np.isin(mesh.tags, tags_of("facet", mesh.facet_sets, circle.facets))])
+def on_circles(mesh: PlaneMesh, circles: Sequence[Circle]) -> PlaneMesh:
+    """``mesh`` with the nodes of ``circles`` moved onto them along their rays, as far as it has these facet sets.
 
-
-def _on_circles(mesh: PlaneMesh, circles: Sequence[Circle]) -> PlaneMesh:
-    mesh = replace(mesh, x=mesh.x.copy())
+    The clearance is a small difference of large numbers, which the rounding of a mesh generator would spoil.
+    """
+    x = mesh.x.copy()
     for circle in circles:
-        nodes = _nodes_on(mesh, circle)
-        ray = mesh.x[nodes] - circle.centre
-        mesh.x[nodes] = circle.centre + ray * (circle.radius / np.linalg.norm(ray, axis=1))[:, None]
-    if circles:
-        mesh.centre()
-    return mesh
+        nodes = np.unique(mesh.edges[np.isin(mesh.tags, mesh.facet_sets.get(circle.facets, ()))])
+        ray = x[nodes] - circle.centre
+        x[nodes] = circle.centre + ray * (circle.radius / np.linalg.norm(ray, axis=1))[:, None]
+    return replace(mesh, x=x)
 
 
 def _lattice(mesh: PlaneMesh, order: int) -> tuple[PlaneMesh, np.ndarray]:

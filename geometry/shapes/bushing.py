@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from mpi4py import MPI
 
+from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import Drawing, PinPart, Sketch, around, mesh_joint
 
@@ -66,8 +67,8 @@ def bushing(
         parts |= dict.fromkeys(round_lines, math.pi / 2 / size)
         return Drawing(sketch.faces, sizes, sketch.lines, parts, grid)
 
-    circles = {"pin": (shifts[0], 0.0, 1.0)}
+    circles = [Circle("pin", (shifts[0], 0.0), 1.0)]
     for pair, radii, x in zip(sets, rings, shifts[1:], strict=True):
-        circles |= {name: (x, 0.0, r) for name, r in zip(pair, radii, strict=True)}
+        circles += [Circle(name, (x, 0.0), r) for name, r in zip(pair, radii, strict=True)]
     key = ("bushing", rings, size, growth, touching, pin)
     return mesh_joint(comm, draw, circles, key, radius=radius, **options)

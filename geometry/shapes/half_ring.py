@@ -10,8 +10,9 @@ import math
 
 from mpi4py import MPI
 
+from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Drawing, mesh_joint
+from archord.geometry.shapes.joint_mesh import Drawing, Sketch, mesh_joint
 
 
 def half_ring(
@@ -34,31 +35,24 @@ def half_ring(
     hole, outer, size, core = (1 + clearance / radius, *(v / radius for v in (outer_radius, element_size, core_radius)))
 
     def draw(geo) -> Drawing:
-        centre = geo.addPoint(0, 0, 0)
+        sketch = Sketch(geo, ("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry"))
 
-        def half_circle(r: float) -> tuple[int, int, list[int]]:
-            """Bottom and top points and the two arcs from bottom to top."""
-            bottom, side, top = (geo.addPoint(*xy, 0) for xy in ((0, -r), (r, 0), (0, r)))
-            return bottom, top, [geo.addCircleArc(bottom, centre, side), geo.addCircleArc(side, centre, top)]
+        def arcs(body: str, r: float) -> list[int]:
+            return sketch.path(body, (0, -r), (r, 0), (0, r), centre=(0, 0))
 
-        bottom, top, pin_arcs = half_circle(1.0)
-        axis = [geo.addLine(top, centre), geo.addLine(centre, bottom)]
-        pin = geo.addPlaneSurface([geo.addCurveLoop([*pin_arcs, *axis])])
-        bottom, top, hole_arcs = half_circle(hole)
-        low, high, edge = half_circle(outer)
-        below, above = geo.addLine(low, bottom), geo.addLine(top, high)
-        loop = [*hole_arcs, above, *(-arc for arc in reversed(edge)), below]
-        faces = {"pin": [pin], "block": [geo.addPlaneSurface([geo.addCurveLoop(loop)])]}
-        lines = {"pin": pin_arcs, "hole": hole_arcs, "pin top": [], "block held": edge}
-        lines["symmetry"] = [*axis, below, above]
-        arcs = {"pin": size_ratio * size, "hole": size}
+        sketch.point("pin", (0, 0))
+        sketch.face("pin", pin=arcs("pin", 1.0), symmetry=sketch.path("pin", (0, 1.0), (0, 0), (0, -1.0)))
+        round_lines = {"hole": arcs("block", hole), "block held": arcs("block", outer)}
+        below, above = (sketch.path("block", *ends) for ends in (((0, -outer), (0, -hole)), ((0, hole), (0, outer))))
+        sketch.face("block", **round_lines, symmetry=below + above)
+        on_arcs = {"pin": size_ratio * size, "hole": size}
         from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
         from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
-        on_arcs = zip(faces, arcs.values(), strict=True)
-        sizes = {body: f"Min({on_arc!r} + {from_arc}, {from_core})" for body, on_arc in on_arcs}
-        parts = {line: math.pi / 2 / size for arc, size in arcs.items() for line in lines[arc]}
-        return Drawing(faces, sizes, lines, parts)
+        edges = zip(sketch.faces, on_arcs.values(), strict=True)
+        sizes = {body: f"Min({on_arc!r} + {from_arc}, {from_core})" for body, on_arc in edges}
+        parts = {line: math.pi / 2 / size for arc, size in on_arcs.items() for line in sketch.lines[arc]}
+        return Drawing(sketch.faces, sizes, sketch.lines, parts)
 
-    circles = {"pin": (0.0, 0.0, 1.0), "hole": (0.0, 0.0, hole), "block held": (0.0, 0.0, outer)}
+    circles = [Circle(name, (0.0, 0.0), r) for name, r in (("pin", 1.0), ("hole", hole), ("block held", outer))]
     key = ("half ring", hole, outer, size, growth, core, size_ratio)
     return mesh_joint(comm, draw, circles, key, radius=radius, **options)

@@ -13,9 +13,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.basis import Array
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+
+Place = tuple[float, float]
+PinPart = Literal["half", "whole", "none"]
+_CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
 
 
 class Drawing(NamedTuple):
@@ -30,15 +34,10 @@ class Drawing(NamedTuple):
     grid: Mapping[int, list[int]] = MappingProxyType({})
 
 
-Place = tuple[float, float]
-PinPart = Literal["half", "whole", "none"]
-_CUT_ABOVE = 30_000, 100_000  # triangles from which a mesh is made by cutting larger ones, once and twice
-
-
 def mesh_joint(
     comm: MPI.Comm,
     draw: Callable[..., Drawing],
-    circles: Mapping[str, tuple[float, float, float]],
+    circles: Sequence[Circle],
     key: tuple,
     *,
     radius: float,
@@ -48,18 +47,15 @@ def mesh_joint(
 ) -> TaggedMesh:
     """Mesh what ``draw(gmsh.model.geo)`` returns, times ``radius``.
 
-    ``circles`` are the centres (x, y) and the radii of sets of arcs, on which all their nodes are put; that of the set
-    "pin" becomes the point set "centre". ``key`` is all that enters the drawing. The mesh is made with larger elements,
-    which are then cut in four as often as ``refinements`` says: much quicker. ``partitioner`` is a dolfinx cell
-    partitioner (tests cut meshes in unusual ways). Collective over ``comm``; rank 0 meshes.
+    The nodes of sets of arcs are put on their ``circles``; the centre of the first, of the set "pin", becomes the point
+    set "centre". ``key`` is all that enters the drawing. The mesh is made with larger elements, which are then cut in
+    four as often as ``refinements`` says: much quicker. ``partitioner`` is a dolfinx cell partitioner (tests cut meshes
+    in unusual ways). Collective over ``comm``; rank 0 meshes.
     """
-
-    names: list[str] = []
 
     def build(gmsh) -> None:
         drawn, coarser, mesh = draw(gmsh.model.geo), 2.0**refinements, gmsh.model.mesh
         gmsh.model.geo.synchronize()
-        names.extend(drawn.lines)
         for line, parts in drawn.parts.items():
             mesh.setTransfiniteCurve(line, max(2, math.ceil(parts / coarser)) + 1)
         for face, corners in drawn.grid.items():
@@ -84,14 +80,10 @@ def mesh_joint(
         mesh.field.setNumbers(smallest, "FieldsList", fields)
         mesh.field.setAsBackgroundMesh(smallest)
 
-    def exact(x: Array, tag: int) -> Array:
-        *centre, r = circles.get(names[tag - 1], (0.0, 0.0, 0.0))
-        return on_circle(x, centre, r) if r else x
-
     how = {"order": degree, "refinements": refinements, "partitioner": partitioner}
-    joint = gmsh_to_mesh(comm, build, exact, **how, key=key)
+    joint = gmsh_to_mesh(comm, build, circles, **how, key=key)
     joint.mesh.geometry.x[:] *= radius
-    centre = radius * np.array([circles["pin"][:2]])
+    centre = radius * np.array([circles[0].centre])
     return replace(joint, point_sets={"centre": centre} if joint.facet_sets.get("pin") else {})
 
 
@@ -122,11 +114,11 @@ class Sketch:
 
     def face(self, body: str, **paths: list[int]) -> int:
         """A face of ``body`` within ``paths`` that together are closed, in whatever direction each line goes; the lines
-        go to the sets of these names."""
+        go to the sets of these names, where there are such."""
         loop = [line for path in paths.values() for line in path]
         self.faces[body].append(self._geo.addPlaneSurface([self._geo.addCurveLoop(loop, reorient=True)]))
-        for name, path in paths.items():
-            self.lines[name] += [line for line in path if line not in self.lines[name]]
+        for name in paths.keys() & self.lines:
+            self.lines[name] += [line for line in paths[name] if line not in self.lines[name]]
         return self.faces[body][-1]
 
     def pin(self, x: float, up: int, part: PinPart) -> None:
@@ -143,17 +135,6 @@ def around(x: float) -> str:
 
 
 def refinements(cells: float) -> int:
-    """How often a mesh that is to have about so many ``cells`` is made by cutting triangles in four.
-
-    gmsh's time grows faster than the number of triangles, that of the cutting does not.
-    """
+    """How often a mesh that is to have about so many ``cells`` is made by cutting triangles in four: gmsh's time grows
+    faster than the number of triangles, that of the cutting does not."""
     return sum(cells > limit for limit in _CUT_ABOVE)
-
-
-def on_circle(x: Array, centre: Sequence[float], radius: float) -> Array:
-    """Points ``x`` ``(n, 2)`` moved along their rays from the ``centre`` to exact ``radius``.
-
-    The clearance is a small difference of large numbers, which the rounding of a mesh generator would spoil.
-    """
-    ray = x - np.asarray(centre)
-    return ray * (radius / np.linalg.norm(ray, axis=1))[:, None] + centre

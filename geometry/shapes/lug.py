@@ -12,6 +12,7 @@ from typing import Literal
 
 from mpi4py import MPI
 
+from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import Drawing, PinPart, Sketch, around, mesh_joint
 
@@ -61,6 +62,7 @@ def lug(
         parts = {line: math.pi / 2 / size for line in sketch.lines["pin"] + sketch.lines["hole"]}
         return Drawing(sketch.faces, sizes, sketch.lines, parts)
 
-    circles = {"pin": (x, 0.0, 1.0), "hole": (0.0, 0.0, hole)} | ({"end": (tip - side, 0.0, side)} if round_end else {})
+    circles = [Circle("pin", (x, 0.0), 1.0), Circle("hole", (0.0, 0.0), hole)]
+    circles += [Circle("end", (tip - side, 0.0), side)] * round_end
     key = ("lug", hole, side, tip, back, size, growth, end, half, pin)
     return mesh_joint(comm, draw, circles, key, radius=radius, **options)

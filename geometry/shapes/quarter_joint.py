@@ -10,8 +10,9 @@ import math
 
 from mpi4py import MPI
 
+from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Drawing, mesh_joint
+from archord.geometry.shapes.joint_mesh import Drawing, Sketch, mesh_joint
 
 _EDGE_GROWTH = 0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
 
@@ -41,39 +42,32 @@ def quarter_joint(
     on_arc = {"pin": size_ratio * size, "hole": size}
 
     def draw(geo) -> Drawing:
-        def face(*points: tuple[float, float]) -> tuple[int, int, list[int], list[int]]:
-            """The face between an arc, by its centre and ends, and lines by corners or the centre; arc, lines and
-            points."""
-            centre, bottom, side, *corners = ends = [geo.addPoint(x, y, 0) for x, y in points]
-            corners = corners or [centre]
-            arc = geo.addCircleArc(bottom, centre, side)
-            lines = [geo.addLine(a, b) for a, b in zip([side, *corners], [*corners, bottom], strict=True)]
-            return geo.addPlaneSurface([geo.addCurveLoop([arc, *lines])]), arc, lines, ends
-
-        faces: dict[str, list[int]] = {"pin": [], "block": []}
-        lines: dict[str, list[int]] = {name: [] for name in ("pin", "hole", "pin top", "block held", "symmetry")}
-        lines["pin back"] = []
+        sketch = Sketch(geo, ("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry", "pin back"))
+        middle, bottom, side, top = (0, 1 - hole), (0, -hole), (1, 1 - hole), (0, 2 - hole)
         if not rigid_pin:
-            lower, arc, (top, line), (centre, _, side) = face((0, 1 - hole), (0, -hole), (1, 1 - hole))
-            faces["pin"], lines["pin"], lines["pin top"], lines["symmetry"] = [lower], [arc], [top], [line]
+            sketch.point("pin", middle)
+            arc, half = sketch.path("pin", bottom, side, centre=middle), sketch.path("pin", side, middle)
+            sketch.face("pin", **{"pin": arc, "pin top": half}, symmetry=sketch.path("pin", middle, bottom))
             if whole_pin:
-                highest = geo.addPoint(0, 2 - hole, 0)
-                back, line = geo.addCircleArc(side, centre, highest), geo.addLine(highest, centre)
-                faces["pin"].append(geo.addPlaneSurface([geo.addCurveLoop([back, line, -top])]))
-                lines["pin back"], lines["symmetry"] = [back], [*lines["symmetry"], line]
-        corners = (width, 0), (width, -width), (0, -width)
-        block, arc, (held, *_, line), _ = face((0, 0), (0, -hole), (hole, 0), *corners)
-        faces["block"], lines["hole"], lines["block held"] = [block], [arc], [held]
-        lines["symmetry"].append(line)
+                sketch.point("pin", top)
+                back, line = sketch.path("pin", side, top, centre=middle), sketch.path("pin", top, middle)
+                sketch.face("pin", **{"pin back": back, "symmetry": line, "pin top": half})
+        corners = (hole, 0), (width, 0), (width, -width), (0, -width)
+        for place in ((0, 0), bottom, *corners):
+            sketch.point("block", place)
+        arc, (held, *free) = sketch.path("block", bottom, corners[0], centre=(0, 0)), sketch.path("block", *corners)
+        line = sketch.path("block", corners[-1], bottom)
+        sketch.face("block", **{"hole": arc, "block held": [held], "": free, "symmetry": line})
         from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
-        sizes = {body: f"{size!r} + {from_arc}" for body, size in zip(faces, on_arc.values(), strict=True)}
-        if edge is None:
-            return Drawing(faces, sizes, lines, {k: math.pi / 2 / on_arc[arc] for arc in on_arc for k in lines[arc]})
-        x, y = hole * math.sin(edge[0]), hole * math.cos(edge[0])
-        near_edge = f"{edge[1] / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
-        return Drawing(faces, {body: f"Min({value}, {near_edge})" for body, value in sizes.items()}, lines, {})
+        sizes = {body: f"{size!r} + {from_arc}" for body, size in zip(sketch.faces, on_arc.values(), strict=True)}
+        parts = {line: math.pi / 2 / on_arc[arc] for arc in on_arc for line in sketch.lines[arc]}
+        if edge is not None:
+            x, y = hole * math.sin(edge[0]), hole * math.cos(edge[0])
+            near_edge = f"{edge[1] / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
+            sizes, parts = {body: f"Min({value}, {near_edge})" for body, value in sizes.items()}, {}
+        return Drawing(sketch.faces, sizes, sketch.lines, parts)
 
-    circles = {"pin": (0.0, 1 - hole, 1.0), "hole": (0.0, 0.0, hole), "pin back": (0.0, 1 - hole, 1.0)}
+    circles = [Circle(name, (0.0, 1 - hole), 1.0) for name in ("pin", "pin back")] + [Circle("hole", (0.0, 0.0), hole)]
     near = edge and (edge[0], edge[1] / radius)
     key = ("quarter joint", hole, width, size, growth, size_ratio, near, rigid_pin, whole_pin)
     return mesh_joint(comm, draw, circles, key, radius=radius, **options)

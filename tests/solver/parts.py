@@ -15,8 +15,8 @@ from petsc4py import PETSc
 
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.fenicsx import create_vector, gmsh_to_mesh
+from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import on_circle
 from archord.geometry.shapes.quarter_joint import quarter_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
@@ -210,10 +210,7 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float, **options) 
         gmsh.option.setNumber("Mesh.MeshSizeMin", size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
-    radii = {INNER: a, OUTER: b}
-    return gmsh_to_mesh(
-        comm, build, lambda x, tag: on_circle(x, (0.0, 0.0), radii[tag]) if tag in radii else x, **options
-    )
+    return gmsh_to_mesh(comm, build, [Circle("inner", (0.0, 0.0), a), Circle("outer", (0.0, 0.0), b)], **options)
 
 
 def solve(problem: Problem, loads) -> System:

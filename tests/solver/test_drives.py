@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import on_circle
 from archord.materials.elasticity import Elastic
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
 from archord.solver.stepping import StepFailure, StepRules
@@ -245,7 +245,9 @@ def rings(a, b, c, d, size) -> TaggedMesh:
         gmsh.option.setNumber("Mesh.MeshSizeMin", size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
-    return gmsh_to_mesh(MPI.COMM_SELF, build, lambda x, tag: on_circle(x, (0, 0), radii[tag]) if tag in radii else x)
+    names = ("bush inner", "bush outer", "housing inner", "housing outer")
+    circles = [Circle(name, (0.0, 0.0), r) for name, r in zip(names, radii.values(), strict=True)]
+    return gmsh_to_mesh(MPI.COMM_SELF, build, circles)
 
 
 def fitted(interference, overlap, **options) -> System:

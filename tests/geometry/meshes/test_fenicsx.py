@@ -8,6 +8,7 @@ from basix import make_quadrature
 
 from archord.geometry.basis import QUADRILATERAL, cell_basis
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.refine import Circle
 
 
 def square(gmsh):
@@ -37,7 +38,7 @@ def disc(gmsh):
 def test_quads_alone_with_their_middle_nodes_in_place(order, comm):
     """The area of a disc whose curved edges are moved onto its circle converges with the order; no cell is degenerate
     at any point."""
-    tagged = gmsh_to_mesh(comm, disc, lambda x, tag: x / np.linalg.norm(x, axis=1)[:, None], order=order, quads=True)
+    tagged = gmsh_to_mesh(comm, disc, [Circle("circle", (0.0, 0.0), 1.0)], order=order, quads=True)
     mesh = tagged.mesh
     assert mesh.basix_cell() == QUADRILATERAL
     assert mesh.geometry.cmap.degree == order

@@ -9,8 +9,8 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import on_circle
 from archord.solver.problem import Body, Interaction, Problem, Support
 from archord.solver.system import System
 from tests.solver.parts import DR, ELASTIC, R, solve
@@ -58,8 +58,7 @@ def rings(comm: MPI.Comm, quarters: int, gap: bool = False, edges: int = 9, **op
             gmsh.model.addPhysicalGroup(1, lines, tag, [*arcs, "cuts"][tag - 1])
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 1)
 
-    radii = dict(enumerate(RADII.values(), 1))
-    return gmsh_to_mesh(comm, build, lambda x, tag: on_circle(x, 0, radii[tag]) if tag in radii else x, **options)
+    return gmsh_to_mesh(comm, build, [Circle(name, (0.0, 0.0), r) for name, r in RADII.items()], **options)
 
 
 def press(
