@@ -25,15 +25,14 @@ import re
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from archord.postprocess.laws.joint import Array, LawJoint
 
 TABLE = Path(__file__).parent / "calibrated_law.json"
-ROWS = Path(__file__).parent / "calibrated_rows.csv"
-MIDDLE = 0.4  # of s: where x = 0
+_MIDDLE = 0.4  # of s: where x = 0
 SOFT = 0.5  # largest p m: beyond, the pin is soft and hardly compressible, and the pressure no parabola over the chord
 SOFT_WORDS = "(1 - alpha)/2 times the pin's equivalent Poisson's ratio"
 UNFIT = {"pin": "only the pin yields", "unlike": "the bodies have unlike yield stresses"}
@@ -45,10 +44,9 @@ def equivalent_nu(strain: Any, nu: Any) -> Any:
     return np.where(strain, nu / (1 - nu), nu)
 
 
-@dataclass(frozen=True)
-class Points:
-    """The numbers that decide joints, arrays ``(n,)`` or, of one joint, numbers: Dundurs' ``alpha``, ``m`` and ``n`` of
-    pin and block, ``s`` and ``clearance`` dR/R. ``m`` of a rigid pin has no influence."""
+class Points(NamedTuple):
+    """The numbers that decide joints, ``(n,)`` or of one joint: Dundurs' ``alpha``, ``m`` and ``n`` of pin and block,
+    ``s`` and ``clearance`` dR/R; a table of cases has them, too. ``m`` of a rigid pin has no influence."""
 
     alpha: Array
     m: Array
@@ -56,18 +54,14 @@ class Points:
     s: Array
     clearance: Array
 
-    def terms(self, names: list[str]) -> Array:
-        """The products called ``names`` ``(n, terms)``."""
-        factors = {
-            "1": np.ones_like(self.alpha),
-            "p": (1 - self.alpha) / 2,
-            "q": (1 + self.alpha) / 2,
-            "m": self.m,
-            "n": self.n,
-            "x": np.log(np.where(np.isfinite(self.s), self.s, MIDDLE) / MIDDLE),
-            "d": 100 * self.clearance,
-        }
-        return np.stack([np.prod([factors[letter] for letter in name], axis=0) for name in names], axis=-1)
+
+def terms(points: Any, names: list[str]) -> Array:
+    """The products called ``names`` ``(n, terms)`` of the numbers of `Points`."""
+    alpha, m, n, s, clearance = (np.asarray(getattr(points, name)) for name in Points._fields)
+    x = np.log(np.where(np.isfinite(s), s, _MIDDLE) / _MIDDLE)
+    factors = {"1": np.ones_like(alpha), "p": (1 - alpha) / 2, "q": (1 + alpha) / 2, "m": m, "n": n, "x": x,
+               "d": 100 * clearance}  # fmt: skip
+    return np.stack([np.prod([factors[letter] for letter in name], axis=0) for name in names], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -83,22 +77,22 @@ class CalibratedModel:
 
     data: dict[str, Any]
 
-    def elastic_k(self, points: Points) -> Array:
-        """k without yielding ``(n,)``."""
-        return 1 / (points.terms(self.data["form"]["elastic"]) @ np.array(self.data["elastic"]))
+    def elastic_k(self, points: Any) -> Array:
+        """k without yielding ``(n,)`` of `Points`, or of a table of cases."""
+        return 1 / (terms(points, self.data["form"]["elastic"]) @ np.array(self.data["elastic"]))
 
-    def coefficients(self, kind: str, points: Points) -> tuple[Array, Array]:
+    def coefficients(self, kind: str, points: Any) -> tuple[Array, Array]:
         """k and c ``(n,)``; c is infinite where s is. Raises ValueError for a kind that was not fitted."""
         k, (plane, yielding) = self.elastic_k(points), kind.split()
         if yielding == "none":
             return k, np.full(k.shape, np.inf)
         if kind not in self.data["plastic"]:
             raise ValueError(f"calibrated: no joint in plane {plane} of which {yielding} yields was fitted.")
-        found, form = self.data["plastic"][kind], self.data["form"]
-        late = np.exp(-found["rate"] * points.s / k)
-        k = k * np.exp(late * (points.terms(form["late"]) @ np.array(found["late"])))
-        c = np.exp(points.terms(form[plane]) @ np.array(found["threshold"]))
-        return k, np.where(np.isfinite(points.s), c, np.inf)
+        found, form, s = self.data["plastic"][kind], self.data["form"], np.asarray(points.s)
+        late = np.exp(-found["rate"] * s / k)
+        k = k * np.exp(late * (terms(points, form["late"]) @ np.array(found["late"])))
+        c = np.exp(terms(points, form[plane]) @ np.array(found["threshold"]))
+        return k, np.where(np.isfinite(s), c, np.inf)
 
     def to_json(self) -> str:
         """The model as JSON."""
@@ -112,11 +106,11 @@ class CalibratedModel:
             model = cls(json.loads(text))
             for kind in model.data["bounds"]:
                 model.coefficients(kind, Points(*np.full((5, 1), 0.3)))
-            if not {"load_range", "errors", "provenance"} <= model.data.keys():
-                raise KeyError
+            if {"load_range", "errors", "provenance"} <= model.data.keys():
+                return model
         except (ValueError, KeyError, TypeError, AttributeError):
-            raise ValueError("law: is not a calibrated law, as archord fit SWEEP --law writes it.") from None
-        return model
+            pass
+        raise ValueError("law: is not a calibrated law, as archord fit SWEEP --law writes it.")
 
 
 @cache
@@ -138,18 +132,15 @@ class Calibrated:
 
 def calibrated(joint: LawJoint, model: CalibratedModel | None = None) -> Calibrated:
     """k and c of ``joint``, which must tell plane and nu, by ``model`` [that of archord]; outside the range those of
-    the formulas, with the reason.
-
-    Of a joint that no formula is for, "both" stands for bodies with unlike yield stresses, and for the pin alone.
-    """
+    the formulas ("both" for bodies with unlike yield stresses, and for the pin alone), with the reason."""
     model = model or shipped_model()
     assert joint.nu is not None
     elastic = joint.yield_stress is None
     kind = f"{joint.plane} {'none' if elastic else 'block' if joint.yielding == 'block' else 'both'}"
     pin_nu = joint.nu if joint.pin_nu is None else joint.pin_nu
     m, n = equivalent_nu(joint.plane == "strain", np.array([pin_nu, joint.nu]))
-    alpha, onset = np.array(joint.dundurs_alpha), np.array(joint.onset)
-    k, c = model.coefficients(kind, Points(alpha, m, n, onset, np.array(joint.clearance / joint.radius)))
+    points = joint.dundurs_alpha, m, n, joint.onset, joint.clearance / joint.radius
+    k, c = model.coefficients(kind, Points(*map(np.asarray, points)))
     outside = "" if elastic else UNFIT.get(joint.yielding, "")
     errors = model.data["errors"].get("cross-validated", {}).get(kind, {})
     bounds = model.data["bounds"].get(kind)
@@ -161,12 +152,11 @@ def _stray(joint: LawJoint, pin_nu: float, m: float, bounds: dict[str, Any] | No
     if not bounds:
         return "no joint of this plane and kind of yielding was fitted"
     alpha = joint.dundurs_alpha
+    stiffness, *ends = ((1 + a) / (1 - a) if a < 1 else math.inf for a in (alpha, *bounds["alpha"]))
     checks = [("nu of the block", joint.nu, bounds["nu"])]
     if alpha < 1:
         checks += [("nu of the pin", pin_nu, bounds["pin_nu"]), (SOFT_WORDS, (1 - alpha) / 2 * m, (0.0, SOFT))]
-    stiffness = [_stiffness_ratio(end) for end in bounds["alpha"]]
-    checks.append(("E'(pin)/E'(block)", _stiffness_ratio(alpha), stiffness))
-    checks.append(("dR/R", joint.clearance / joint.radius, bounds["clearance"]))
+    checks += [("E'(pin)/E'(block)", stiffness, ends), ("dR/R", joint.clearance / joint.radius, bounds["clearance"])]
     if joint.yield_stress is not None:
         checks.append(("sigY R/(E* dR)", joint.onset, (bounds["s"][0], math.inf)))
     for name, value, (low, high) in checks:
@@ -175,11 +165,6 @@ def _stray(joint: LawJoint, pin_nu: float, m: float, bounds: dict[str, Any] | No
             upper = "and more" if math.isinf(high) else f"to {high:.4g}"
             return f"{name} = {value:.4g} is outside {low:.4g} {upper}"
     return ""
-
-
-def _stiffness_ratio(alpha: float) -> float:
-    """E' of the pin over that of the block, with E' = E/(1 - nu^2) or E by plane."""
-    return math.inf if alpha >= 1 else (1 + alpha) / (1 - alpha)
 
 
 def with_coefficients(joint: LawJoint) -> LawJoint:

@@ -20,17 +20,13 @@ from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.scene.errors import InputError
 
-_CONFIDENCE = 0.95
 _STARTS_OF_C = (0.7, 1.0, 1.5, 2.5)  # one start may miss the best side of the onset
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted parameter.
-
-    ``standard_error`` is that of least squares with ``dof`` degrees of freedom, ``discretisation_error`` that of the
-    mesh (None: unknown, counted as none).
-    """
+    """A fitted parameter, with the standard error of least squares with ``dof`` degrees of freedom, and the error of
+    the mesh (None: unknown, counted as none)."""
 
     value: float
     standard_error: float
@@ -45,7 +41,7 @@ class Estimate:
     @property
     def interval(self) -> tuple[float, float]:
         """The 95 % confidence interval, with Student's t."""
-        half = float(student.ppf((1 + _CONFIDENCE) / 2, self.dof)) * self.error
+        half = float(student.ppf(0.975, self.dof)) * self.error
         return self.value - half, self.value + half
 
 
@@ -87,10 +83,8 @@ class Residual:
 
 @dataclass(frozen=True)
 class CurveFit:
-    """A fit to a curve of one or more runs; ``c`` is None where the curve does not determine it.
-
-    ``orders`` are the orders of convergence taken for the runs that have a second mesh.
-    """
+    """A fit to a curve of one or more runs; ``c`` is None where the curve does not determine it. ``orders`` of
+    convergence are those taken for the runs that have a second mesh."""
 
     k: Estimate
     c: Estimate | None
@@ -139,18 +133,16 @@ def fit_curve(groups: list[Refined], load_range: tuple[float, float] = (0.0, np.
     their data extrapolated to vanishing element size; the change of a parameter is its discretisation error.
     Raises `InputError` where too few steps are in the range, or a run's bodies never touch.
     """
-    runs = [g.run for g in groups]
-    chosen = [_selected(run, load_range) for run in runs]
-    if quantity == "p0" and sum((run.peeq_max[rows] == 0).sum() for run, rows in zip(runs, chosen, strict=True)) < 2:
-        raise InputError(f"{runs[0].name}: p0 says nothing of k past yield, and fewer than two steps are before.")
+    chosen = [(g.run, _selected(g.run, load_range)) for g in groups]
+    if quantity == "p0" and sum((run.peeq_max[rows] == 0).sum() for run, rows in chosen) < 2:
+        raise InputError(f"{groups[0].run.name}: p0 says nothing of k past yield, and fewer than two steps are before.")
     curves = [[getattr(run, quantity) for run in g.runs] for g in groups]
 
     def scaled(data: Iterable[Array]) -> list[Array]:
-        return [y[rows] / _scale(quantity, run) for y, run, rows in zip(data, runs, chosen, strict=True)]
+        return [y[rows] / _scale(quantity, run) for y, (run, rows) in zip(data, chosen, strict=True)]
 
     def law(values: Sequence[float] | Array) -> list[Array]:
-        return [dimensionless_law(quantity, run, run.delta[rows], *map(float, values))
-                for run, rows in zip(runs, chosen, strict=True)]  # fmt: skip
+        return [dimensionless_law(quantity, run, run.delta[rows], *map(float, values)) for run, rows in chosen]
 
     def solve(data: list[Array], free: str) -> tuple[list[float], list[float]]:
         slope = float(np.median([y[0] / unit[0] for y, unit in zip(data, law([1.0]), strict=True)]))
@@ -158,14 +150,14 @@ def fit_curve(groups: list[Refined], load_range: tuple[float, float] = (0.0, np.
         try:
             return fit(lambda values: np.concatenate(law(values)), starts, np.concatenate(data))
         except ValueError as error:
-            names, what = ", ".join(run.name for run in runs), " and ".join(free)
+            names, what = ", ".join(g.run.name for g in groups), " and ".join(free)
             raise InputError(f"{names}: {what} cannot be fitted to {quantity}: {error}; widen --range.") from None
 
     data, free = scaled(y[0] for y in curves), "k"
-    if any(run.sigY for run in runs):
+    if any(run.sigY for run, _ in chosen):
         values, errors = solve(data, "kc")
-        beyond = [rows & (run.peeq_max > 0) & (run.delta > _joint(run, *values).first_yield)
-                  for run, rows in zip(runs, chosen, strict=True)]  # fmt: skip
+        onsets = [_joint(run, *values).first_yield for run, _ in chosen]
+        beyond = [rows & (run.peeq_max > 0) & (run.delta > at) for (run, rows), at in zip(chosen, onsets, strict=True)]
         free = "kc" if np.isfinite(errors).all() and np.concatenate(beyond).sum() >= 2 else "k"
     if free == "k":
         values, errors = solve(data, free)
@@ -174,10 +166,9 @@ def fit_curve(groups: list[Refined], load_range: tuple[float, float] = (0.0, np.
     if orders:
         finer = scaled(y[0] + g.shift(y) if g.coarser else y[0] for g, y in zip(groups, curves, strict=True))
         mesh = [abs(moved - value) for moved, value in zip(solve(finer, free)[0], values, strict=True)]
-    loads = [run.delta[rows] / run.dR for run, rows in zip(runs, chosen, strict=True)]
-    names = [run.name for run in runs]
-    residuals = tuple(Residual(*parts) for parts in zip(names, loads, data, law(values), strict=True))
-    dof = sum(map(len, loads)) - len(free)
+    parts = zip(chosen, data, law(values), strict=True)
+    residuals = tuple(Residual(run.name, run.delta[rows] / run.dR, *both) for (run, rows), *both in parts)
+    dof = sum(map(len, data)) - len(free)
     found = [Estimate(*numbers, dof) for numbers in zip(values, errors, mesh, strict=True)]
     return CurveFit(found[0], found[1] if free == "kc" else None, residuals, orders)
 

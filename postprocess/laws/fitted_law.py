@@ -21,12 +21,12 @@ _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class FittedLaw(BaseModel):
-    """Plastic-Winkler law of one joint (Hu et al., eqs. 9 to 12 with the threshold ``c sigY``).
+    """Plastic-Winkler law of one joint (Hu et al., eqs. 9 to 12 with the threshold ``c sigY``); elastic without ``c``
+    and ``sigY``.
 
-    ``c`` and ``sigY`` are None for an elastic law. ``k_error`` and ``c_error`` are standard errors with the mesh's
-    error in quadrature (``c_error`` may be None). ``fitted_range`` is the range of ``delta/dR`` of the fit; outside it
-    the law extrapolates. Lengths, stresses and forces per unit thickness in the named units. Raises ValueError for
-    values that no joint has.
+    Errors are standard errors with the mesh's in quadrature. ``fitted_range`` is that of ``delta/dR``; outside it the
+    law extrapolates. Lengths, stresses and forces per unit thickness in the named units. Raises ValueError for values
+    that no joint has.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

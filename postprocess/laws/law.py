@@ -91,9 +91,8 @@ class Law:
 
     def _known(self, joint: LawJoint, x: Array) -> LawState:
         """The state at checked points ``x``: nan in, nan out."""
-        valid = x >= 0
-        state = self.state(joint, np.where(valid, x, 0.0))
-        return LawState(*(np.where(valid, getattr(state, each.name), np.nan) for each in fields(LawState)))
+        state = self.state(joint, np.where(x >= 0, x, 0.0))
+        return LawState(*(np.where(x >= 0, getattr(state, each.name), np.nan) for each in fields(LawState)))
 
     def _inside(self, joint: LawJoint, x: npt.ArrayLike, limit: float, what: str, extrapolate: bool) -> Array:
         """``x`` with nan where the law has nothing to say; warns about points outside the range."""
@@ -111,8 +110,8 @@ class Law:
         return np.where(valid, x, np.nan)
 
     def _check(self, joint: LawJoint) -> None:
-        """Refuse a joint that lacks what the law needs; of laws with displacements also a ring, whose P(delta) is
-        another one, and warn where it is softer or stiffer than the law's; of plastic laws warn of hardening."""
+        """Refuse a joint that lacks what the law needs, or whose P(delta) is another one; warn where it is softer or
+        stiffer."""
         for name in self.needs:
             if getattr(joint, name) is None:
                 raise ValueError(f"{self.name}: this law needs {name}.")

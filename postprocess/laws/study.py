@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import least_squares
 
-from archord.postprocess.laws.calibrated import CalibratedModel, calibrated, shipped_model
+from archord.postprocess.laws.calibrated import CalibratedModel, calibrated, shipped_model, terms
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.joint import Array
-from archord.postprocess.laws.study_cases import Cases, joint_of_case, points, split
+from archord.postprocess.laws.study_cases import Cases, joint_of_case, split
 from archord.report.table import Table
 
 Form = dict[str, list[str]]
@@ -23,14 +23,13 @@ KINDS = ("strain none", "strain both", "strain block", "stress none", "stress bo
 FORM: Form = shipped_model().data["form"]  # which products of what decides a joint count, see `CalibratedModel`
 LATE = 0.45  # delta/dR from which errors of P count; the contact is Hertz's before
 FOLDS = 10
-_PLENTY = 2  # cases per coefficient without which nothing is fitted
 
 
 class TooFewError(ValueError):
     """Cases that do not suffice for a model; the message says which."""
 
 
-def fit_model(cases: Cases, form: Form = FORM, plenty: int = _PLENTY) -> CalibratedModel:
+def fit_model(cases: Cases, form: Form = FORM, plenty: int = 2) -> CalibratedModel:
     """Least squares of ln k of the elastic cases, then of ln k and ln c of each kind that yields.
 
     Coefficients have six digits. A kind with less than ``plenty`` cases per coefficient is left out. Raises
@@ -40,9 +39,9 @@ def fit_model(cases: Cases, form: Form = FORM, plenty: int = _PLENTY) -> Calibra
     needed = plenty * len(form["elastic"])
     if len(elastic) < needed:
         raise TooFewError(f"{len(elastic)} elastic cases are too few for a model: it takes {needed}")
-    terms, k = points(elastic).terms(form["elastic"]), elastic.k.to_numpy()
-    start = np.linalg.lstsq(terms, 1 / k, rcond=None)[0]
-    values = _solve(lambda v: -np.log(np.maximum(terms @ v, 1e-9)) - np.log(k), start)
+    shares, k = terms(elastic, form["elastic"]), elastic.k.to_numpy()
+    start = np.linalg.lstsq(shares, 1 / k, rcond=None)[0]
+    values = _solve(lambda v: -np.log(np.maximum(shares @ v, 1e-9)) - np.log(k), start)
     model = CalibratedModel({"form": form, "elastic": values, "plastic": {}, "bounds": {}})
     for kind in KINDS:
         same = cases[cases.kind == kind]
@@ -59,12 +58,12 @@ def _plastic(cases: Cases, kind: str, model: CalibratedModel, plenty: int) -> di
     yielded = cases[cases.clear_c.notna()]
     if len(cases) < plenty * (len(late) + 1) or len(yielded) < plenty * len(threshold):
         return None
-    k, terms = model.elastic_k(points(cases)), points(cases).terms(late)
+    k, shape = model.elastic_k(cases), terms(cases, late)
     ratio, onset = np.log(cases.k.to_numpy() / k), cases.s.to_numpy() / k
-    starts = [np.array([b, *np.linalg.lstsq(np.exp(-b * onset)[:, None] * terms, ratio, rcond=None)[0]])
+    starts = [np.array([b, *np.linalg.lstsq(np.exp(-b * onset)[:, None] * shape, ratio, rcond=None)[0]])
               for b in (2.0, 4.0)]  # fmt: skip
-    rate, *rest = _solve(lambda v: np.exp(-v[0] * onset) * (terms @ v[1:]) - ratio, *starts)
-    found = np.linalg.lstsq(points(yielded).terms(threshold), np.log(yielded.c.to_numpy()), rcond=None)[0]
+    rate, *rest = _solve(lambda v: np.exp(-v[0] * onset) * (shape @ v[1:]) - ratio, *starts)
+    found = np.linalg.lstsq(terms(yielded, threshold), np.log(yielded.c.to_numpy()), rcond=None)[0]
     return {"rate": rate, "late": rest, "threshold": [_digits(value) for value in found],
             "cases": len(cases), "cases_of_c": len(yielded)}  # fmt: skip
 
@@ -96,7 +95,7 @@ def predictions(model: CalibratedModel, cases: Cases) -> tuple[Array, Array]:
     """k and c of ``model`` for ``cases`` ``(n,)``, of whose kinds they must be."""
     found = pd.DataFrame(index=cases.index, columns=["k", "c"], dtype=float)
     for kind, same in cases.groupby("kind"):
-        found.loc[same.index] = np.column_stack(model.coefficients(kind, points(same)))
+        found.loc[same.index] = np.column_stack(model.coefficients(kind, same))
     return found.k.to_numpy(), found.c.to_numpy()
 
 
@@ -114,11 +113,9 @@ def cross_validate(cases: Cases, form: Form = FORM) -> tuple[Array, Array]:
 
 
 def errors(cases: Cases, k: Array, c: Array) -> pd.DataFrame:
-    """What the law with ``k`` and ``c`` ``(n,)`` misses ``cases`` by, relative; elastic where c is not finite.
-
-    A row for each error ``off``, with the ``kind`` of its case and ``what`` it is one of: "k", "c" (nan where there is
-    none), and at each step "P" from `LATE` on, or "P early", before.
-    """
+    """What the law with ``k`` and ``c`` ``(n,)`` misses ``cases`` by, relative; elastic where c is not finite. A row
+    for each error ``off``: the ``kind`` of its case, and ``what`` it is of: "k", "c" (nan where there is none), and at
+    each step "P" from `LATE` on, or "P early", before."""
     kinds = cases[["kind"]]
     parts = [kinds.assign(what="k", off=k / cases.k - 1), kinds.assign(what="c", off=c / cases.clear_c - 1)]
     for case, *own in zip(cases.itertuples(), map(float, k), map(float, c), strict=True):
@@ -146,11 +143,8 @@ def by_kind(cases: Cases, k: Array, c: Array) -> Errors:
 
 
 def study(cases: Cases, form: Form = FORM, provenance: dict[str, Any] | None = None) -> CalibratedModel:
-    """The model of ``cases`` with its errors on those of them that it has not seen, and ``provenance``.
-
-    `HELD_OUT` of the cases are kept out of everything ("held out"), the others predicted by each other
-    ("cross-validated"). Raises `TooFewError`.
-    """
+    """The model of ``cases`` with ``provenance`` and its errors on cases that it has not seen: `HELD_OUT` of them, kept
+    out of everything, and the others, predicted by each other. Raises `TooFewError`."""
     used, held = split(cases)
     model = fit_model(used, form)
     used, held = (part[part.kind.isin(model.data["bounds"])] for part in (used, held))

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from archord.postprocess.convergence import Refined
-from archord.postprocess.laws.calibrated import SOFT, SOFT_WORDS, UNFIT, Points, equivalent_nu
+from archord.postprocess.laws.calibrated import SOFT, SOFT_WORDS, UNFIT, equivalent_nu
 from archord.postprocess.laws.curve_fit import fit_curve
 from archord.postprocess.laws.joint import LawJoint
 from archord.report.table import Table
@@ -165,11 +165,6 @@ def split(cases: Cases) -> tuple[Cases, Cases]:
     held = [index for _, same in groups for index in same.index[: round(HELD_OUT * len(same))]]
     chosen = cases.index.isin(held)
     return cases[~chosen], cases[chosen]
-
-
-def points(cases: Cases) -> Points:
-    """What decides the joints of ``cases``."""
-    return Points(*(cases[name].to_numpy() for name in ("alpha", "m", "n", "s", "clearance")))
 
 
 def joint_of_case(case: Any, k: float, c: float) -> LawJoint:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from archord.postprocess.laws.calibrated import ROWS, Calibrated, calibrated, shipped_model
+from archord.postprocess.laws.calibrated import TABLE, Calibrated, calibrated, shipped_model
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.law import LawRangeWarning
@@ -19,6 +19,7 @@ from archord.scene.file import load_scene
 from archord.studies.cases import read_sweep
 
 SCENES = Path(__file__).parents[3] / "scenes"
+ROWS = TABLE.with_name("calibrated_rows.csv")
 CASES, NOTES = read_cases(ROWS)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from archord.cli import run
-from archord.postprocess.laws.calibrated import ROWS, TABLE, CalibratedModel
+from archord.postprocess.laws.calibrated import TABLE, CalibratedModel
 from archord.postprocess.laws.calibration import calibrate
 from archord.postprocess.laws.study_cases import as_csv, read_cases
 from archord.postprocess.run import Run
@@ -27,6 +27,8 @@ pin = { E = 2.0, nu = 0.3 }
 block = { E = 1.0, nu = 0.3 }
 load = { displacement = 2.0, steps = 4 }
 """
+
+ROWS = TABLE.with_name("calibrated_rows.csv")
 
 
 @pytest.fixture(scope="module")

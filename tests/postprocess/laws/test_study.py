@@ -9,7 +9,7 @@ from archord.postprocess.laws import study_cases
 from archord.postprocess.laws.calibrated import CalibratedModel
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.study import TooFewError, cross_validate, errors, fit_model, predictions, study, summary
-from archord.postprocess.laws.study_cases import joint_of_case, points, read_cases, split, table_of, usable
+from archord.postprocess.laws.study_cases import joint_of_case, read_cases, split, table_of, usable
 from archord.scene.errors import InputError
 
 LOAD = np.linspace(0.2, 2.0, 10)
@@ -120,7 +120,7 @@ def test_plane_stress_is_plane_strain_with_other_constants():
     """nu in plane stress is nu/(1 + nu) in plane strain."""
     changes = [{"nu": nu, "pin_nu": nu} for nu in (0.4 / 1.4, 0.4)]
     cases = joints(*changes, changes[1] | {"plane": "stress"})
-    strain, other, stress = fit_model(synthetic(), SMALL).elastic_k(points(cases))
+    strain, other, stress = fit_model(synthetic(), SMALL).elastic_k(cases)
     assert stress == pytest.approx(strain, rel=1e-12)
     assert stress != pytest.approx(other, rel=1e-3)
 
@@ -131,7 +131,7 @@ def test_too_few_cases_are_refused_and_kinds_without_cases_left_out():
     model = fit_model(synthetic(), SMALL)
     assert [*model.data["plastic"]] == ["strain both"]
     with pytest.raises(ValueError, match="no joint in plane stress of which both yields was fitted"):
-        model.coefficients("stress both", points(synthetic(2)))
+        model.coefficients("stress both", synthetic(2))
 
 
 def test_what_no_model_is_for_is_left_out():
