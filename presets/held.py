@@ -50,13 +50,15 @@ def _loose(
     held: dict[str, list[tuple[Array, Array]]] = {body: [] for body in cells}
     given: list[tuple[str, str]] = [(s.on, freedom) for s in scene.support for freedom in s.fixed]
     given += [(load.on, load.direction or "") for load in scene.load if load.displacement is not None]
+    hinges = {c.name: np.array([c.point]) for c in scene.coupling if (c.name, "rotation") not in given}
     inside = {body: _nodes(whole, name, of_cells=True) for body, name in cells.items()}
     for on, freedom in given:
         nodes = _nodes(whole, facets.get(on, on))
         for body, of_body in inside.items():
             here = np.intersect1d(nodes, of_body)
             if len(here) and freedom in _ALONG:
-                held[body].append((whole.x[here], np.tile(_ALONG[freedom], (len(here), 1))))
+                places = hinges.get(on, whole.x[here])
+                held[body].append((places, np.tile(_ALONG[freedom], (len(places), 1))))
     links = []
     for part in scene.interaction:
         edges = whole.x[whole.edges[np.isin(whole.tags, whole.facet_sets[part.surfaces[-1]])][:, :2]]

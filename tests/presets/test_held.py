@@ -73,6 +73,21 @@ def test_a_fault_is_said(squares, changes, said):
     assert len(str(fault.value).splitlines()) == 1
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_hinge_does_not_hold_a_rotation(squares, turned):
+    """A reference point that is held turns its body, unless something else keeps it, or it is itself turned."""
+    hinge = {"name": "hinge", "facets": "lower b", "point": [5.0, 0.0]}
+    supports = [{"name": "h", "on": "hinge", "fixed": ["x", "y"]}, {"name": "u", "on": "upper b", "fixed": ["x", "y"]}]
+    turn = {"displacement": 0.01} if turned else {"force": 10.0}
+    load = [{"name": "turn", "on": "hinge", "direction": "rotation"} | turn]
+    given = {"interaction": [], "coupling": [hinge], "support": supports, "load": load}
+    if turned:
+        assert account(squares, **given).warnings() == []
+    else:
+        with pytest.raises(InputError, match="nothing holds the body 'lower': it is free in rotation"):
+            account(squares, **given)
+
+
 def test_a_file_that_is_not_there():
     with pytest.raises(InputError, match=r"nowhere.msh: No such file"):
         account("nowhere.msh")
