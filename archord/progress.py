@@ -137,7 +137,7 @@ def solve_and_report(
 
     scene, new = agreed(comm, claimed)
     from archord.report.timer import Timer
-    from archord.studies.accuracy import solve_as_asked  # with all of dolfinx: bad input is told before
+    from archord.studies.accuracy import solve_to_accuracy  # with all of dolfinx: bad input is told before
 
     report = Progress(scene, silent or comm.rank != 0)
     if report.by_mesh:
@@ -146,7 +146,7 @@ def solve_and_report(
         options["timer"] = Timer({"start-up": perf_counter() - begun})
     options |= {"on_start": report.start, "on_step": report.step}
     try:
-        outcome = solve_as_asked(scene, folder, comm, start=start, **options)
+        outcome = solve_to_accuracy(scene, folder, comm, start=start, **options)
     except InputError:  # found by the mesh: nothing is left of a scene that is refused
         if new and comm.rank == 0:
             with suppress(OSError):

@@ -66,35 +66,30 @@ class Accuracy:
     levels: tuple[Level, ...]
 
 
-def solve_as_asked(
-    scene: AnyScene, folder: Path, comm: MPI.Comm, *, start: Start | None = None, **options: Any
-) -> Outcome:
-    """`solve_to_accuracy` where ``scene`` asks for an accuracy and no run goes on, else `solve_scene`. Collective."""
-    if scene.analysis.accuracy is None or start is not None:
-        return solve_scene(scene, folder, comm, start=start, **options)
-    return solve_to_accuracy(scene, folder, comm, **options)
-
-
 def solve_to_accuracy(
     scene: AnyScene,
     folder: Path,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
+    start: Start | None = None,
     interrupt: Interrupt | None = None,
     on_start: Callable[[System], None] = lambda system: None,
     on_level: Callable[[Level], None] = lambda level: None,
     **options: Any,
 ) -> Outcome:
-    """Solve ``scene``, which has an ``analysis.accuracy``, into ``folder``; the other arguments are those of
-    `solve_scene`. Collective.
+    """Solve ``scene`` to its ``analysis.accuracy`` into ``folder``; as `solve_scene`, whose arguments the others are,
+    where it has none or a run goes on from ``start``. Collective.
 
     The run that stays has the finest mesh; its scene.toml holds that mesh and the length of its steps, its run.json the
     `Accuracy`, which the outcome has, too. ``on_level`` reports every mesh on every rank. If the finest mesh or the
     shortest steps allowed do not do, a warning says so. A mesh on which the scene cannot be solved ends everything, as
     does an interrupt. Raises what `solve_scene` raises.
     """
+    if scene.analysis.accuracy is None or start is not None:
+        return solve_scene(scene, folder, comm, start=start, interrupt=interrupt, on_start=on_start, **options)
     with nullcontext(interrupt) if interrupt else Interrupt() as interrupt:
-        search = _Search(scene, folder, comm, on_start, on_level, {**options, "interrupt": interrupt})
+        asked, options = scene.analysis.accuracy, options | {"interrupt": interrupt}
+        search = _Search(scene, asked, folder, comm, on_start, on_level, options)
         with suppress(_End):
             search.refine()
         return search.finish()
@@ -109,6 +104,7 @@ class _Search:
     """The way to the accuracy, the same on all ranks."""
 
     scene: AnyScene
+    asked: float
     folder: Path
     comm: MPI.Comm
     on_start: Callable[[System], None]
@@ -116,9 +112,6 @@ class _Search:
     options: dict[str, Any]
 
     def __post_init__(self) -> None:
-        if self.scene.analysis.accuracy is None:
-            raise InputError("analysis.accuracy is missing.")
-        self.asked: float = self.scene.analysis.accuracy
         self.family: MeshFamily | ProblemFamily
         if isinstance(self.scene, Scene):
             self.family = MeshFamily(self.scene, self.asked / 2 if self.scene.plastic else self.asked)

@@ -22,6 +22,7 @@ from archord.studies.sweep_file import ABSENT, LatinHypercube, Overrides, SweepF
 MOST_CASES = 100_000
 _MOST_SENTENCES = 20
 _DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm
+Factor = tuple[str, list[Overrides]]  # of the product: its source in the sweep file, and its choices
 
 
 @dataclass(frozen=True)
@@ -56,19 +57,6 @@ class Sweep:
         return list({case.run: case for case in reversed(self.cases)}.values())[::-1]
 
 
-@dataclass(frozen=True)
-class Factor:
-    """One factor of the product: ``choices`` of overrides, and their ``source`` in the sweep file."""
-
-    source: str
-    choices: list[Overrides]
-
-    @property
-    def keys(self) -> list[str]:
-        """All dotted keys that it varies."""
-        return list(dict.fromkeys(key for choice in self.choices for key in choice))
-
-
 def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
     """Read the sweep file ``path``, with ``overrides`` of its base, and check the scene of every case.
 
@@ -79,7 +67,7 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
     varied = factors(file)
     given = {override.partition("=")[0].strip(): None for override in overrides}
     try:
-        _check_keys([*varied, Factor("--set", [given])])
+        keys = _checked_keys([*varied, ("--set", [given])])
         rows = combinations(varied)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -94,31 +82,26 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
         else:
             cases.append(Case(number, row, scene, run_name(scene)))
     if faults:
-        told = [f"{path}: {_which(numbers, len(rows))}: {sentence}" for sentence, numbers in faults.items()]
+        told = []
+        for sentence, numbers in faults.items():
+            more = f" and {len(numbers) - 1} more" if len(numbers) > 1 else ""
+            which = "every case" if len(numbers) == len(rows) else f"case {numbers[0]}{more}"
+            told.append(f"{path}: {which}: {sentence}")
         if len(told) > _MOST_SENTENCES:
             told[_MOST_SENTENCES:] = [f"{path}: has {len(told) - _MOST_SENTENCES} more faults."]
         raise InputError("\n".join(told))
-    return Sweep(path, file, list(dict.fromkeys(key for factor in varied for key in factor.keys)), cases)
-
-
-def _which(numbers: list[int], total: int) -> str:
-    if len(numbers) == total:
-        return "every case"
-    return f"case {numbers[0]}" + (f" and {len(numbers) - 1} more" if len(numbers) > 1 else "")
+    return Sweep(path, file, [key for key in keys if key not in given], cases)
 
 
 def factors(sweep: SweepFile) -> list[Factor]:
     """What is multiplied, the slowest first: list, zip, each key of the grid, Latin hypercube."""
-    found = []
-    if sweep.list_:
-        found.append(Factor("[[list]]", sweep.list_))
+    found: list[Factor] = [("[[list]]", sweep.list_)] if sweep.list_ else []
     if sweep.zip:
         rows = zip(*sweep.zip.values(), strict=True)
-        found.append(Factor("[zip]", [flattened(dict(zip(sweep.zip, row, strict=True))) for row in rows]))
-    for key, values in sweep.grid.items():
-        found.append(Factor("[grid]", [flattened({key: value}) for value in values]))
+        found.append(("[zip]", [flattened(dict(zip(sweep.zip, row, strict=True))) for row in rows]))
+    found += [("[grid]", [flattened({key: value}) for value in values]) for key, values in sweep.grid.items()]
     if sweep.latin_hypercube is not None:
-        found.append(Factor("[latin_hypercube]", samples(sweep.latin_hypercube)))
+        found.append(("[latin_hypercube]", samples(sweep.latin_hypercube)))
     return found
 
 
@@ -146,30 +129,34 @@ def combinations(found: list[Factor]) -> list[Overrides]:
 
     Raises `InputError` if there are too many.
     """
-    number = math.prod(len(factor.choices) for factor in found)
+    number = math.prod(len(choices) for _, choices in found)
     if number > MOST_CASES:
         raise InputError(f"has {number} cases; {MOST_CASES} are allowed.")
-    rows = itertools.product(*(factor.choices for factor in found))
+    rows = itertools.product(*(choices for _, choices in found))
     return [dict(itertools.chain.from_iterable(choice.items() for choice in row)) for row in rows]
 
 
-def _check_keys(found: list[Factor]) -> None:
-    """Raise `InputError` for a key that no scene has or that cannot vary, and for a quantity that two factors give."""
-    source: dict[tuple[str, str], str] = {}
-    for factor in found:
+def _checked_keys(found: list[Factor]) -> list[str]:
+    """All dotted keys that vary. Raises `InputError` for one that no scene has or that cannot vary, and for a quantity
+    that two factors give."""
+    keys: list[str] = []
+    given: dict[tuple[str, str], str] = {}
+    for source, choices in found:
         own: dict[tuple[str, str], str] = {}
-        for key in factor.keys:
+        for key in dict.fromkeys(key for choice in choices for key in choice):
             section, _, name = key.partition(".")
             if not name or "." in name:
-                raise InputError(f"{factor.source} {key}: must read section.key, like joint.clearance.")
-            if section == "units" and factor.source != "--set":
-                raise InputError(f"{factor.source} {key}: cannot vary; all cases of a table have the same units.")
+                raise InputError(f"{source} {key}: must read section.key, like joint.clearance.")
+            if section == "units" and source != "--set":
+                raise InputError(f"{source} {key}: cannot vary; all cases of a table have the same units.")
             # of alternative keys a scene holds one
             first = next((names[0] for names in ALTERNATIVES.get(section, []) if name in names), name)
-            if (section, first) in source:
-                raise InputError(f"{factor.source} {key}: is varied by {source[section, first]} already.")
-            own[section, first] = f"{factor.source} {key}"
-        source |= own
+            if (section, first) in given:
+                raise InputError(f"{source} {key}: is varied by {given[section, first]} already.")
+            own[section, first] = f"{source} {key}"
+            keys.append(key)
+        given |= own
+    return keys
 
 
 def run_name(scene: Scene) -> str:

@@ -27,7 +27,7 @@ from archord.output.ranks import arrived_before
 from archord.output.restart import plan_restart
 from archord.scene.errors import InputError
 from archord.solver.interrupt import Interrupt
-from archord.studies.accuracy import solve_as_asked
+from archord.studies.accuracy import solve_to_accuracy
 from archord.studies.cases import Case
 from archord.studies.tables import FAILURE, Result, of_case
 
@@ -117,7 +117,7 @@ def _solved(case: Case, run: Path) -> Result:
             if plan is not None and plan.finished:
                 return Result(case.run, "done", steps=len(case.scene.targets))
             start = plan.start if plan else None
-            outcome = solve_as_asked(case.scene, run, MPI.COMM_SELF, start=start, interrupt=_interrupt)
+            outcome = solve_to_accuracy(case.scene, run, MPI.COMM_SELF, start=start, interrupt=_interrupt)
             return Result(case.run, outcome.status, outcome.message, len(outcome.steps))
         except InputError as error:
             if "another archord" in str(error):

@@ -85,9 +85,10 @@ def write(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> dict[st
         with alone(folder):
             found = {case.run: result_of(case, folder) for case in sweep.distinct}
             found |= {run: own[run] for run, result in found.items() if result.status == "open" and run in own}
-            steps, cases = _rows(sweep, folder, found)
-            replace_file(folder / "sweep.csv", _csv(steps))
-            replace_file(folder / "cases.csv", _csv(cases))
+            for name, rows in zip(("sweep.csv", "cases.csv"), _rows(sweep, folder, found), strict=True):
+                text = io.StringIO(newline="")
+                csv.writer(text).writerows(rows)
+                replace_file(folder / name, text.getvalue())
             (folder / "sweep.h5").unlink(missing_ok=True)  # version 0.1 had a third table: it would be out of date
     except OSError as error:
         raise InputError(f"{error.filename} cannot be written: {error.strerror}.") from None
@@ -105,8 +106,12 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
         result, rows = found[case.run], histories[case.run][1:]
         first = [str(case.number), case.run, result.status, *(shown(case.value(key)) for key in sweep.keys)]
         steps += [[*first, *row] for row in rows]
+        report = report_of(of_case(case, folder))
+        totals, mesh, seconds = (report.get(name, {}) for name in ("totals", "mesh", "seconds"))
+        costs = [result.steps, seconds.get("total"), totals.get("newton_iterations"), totals.get("cutbacks")]
+        costs += [mesh.get("cells"), mesh.get("dofs")]
         final = [rows[-1][i] if rows else "" for i in last]
-        cases.append([*first, *_cost(result, report_of(of_case(case, folder))), *final])
+        cases.append([*first, result.message, *map(shown, costs), *final])
     return steps, cases
 
 
@@ -117,13 +122,6 @@ def _history(run: Path) -> list[Row]:
     except OSError:
         return []
     return list(csv.reader(io.StringIO(text[: text.rfind("\n") + 1], newline="")))
-
-
-def _cost(result: Result, report: dict[str, Any]) -> Row:
-    totals, mesh = report.get("totals", {}), report.get("mesh", {})
-    counts = [totals.get("newton_iterations"), totals.get("cutbacks"), mesh.get("cells"), mesh.get("dofs")]
-    seconds = report.get("seconds", {}).get("total")
-    return [result.message, *map(shown, (result.steps, seconds, *counts))]
 
 
 def heading(key: str, scene: Scene) -> str:
@@ -144,12 +142,6 @@ def shown(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.12g}"
     return value if isinstance(value, str) else toml_value(value)
-
-
-def _csv(rows: list[Row]) -> str:
-    text = io.StringIO(newline="")
-    csv.writer(text).writerows(rows)
-    return text.getvalue()
 
 
 @contextmanager

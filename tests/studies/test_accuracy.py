@@ -227,11 +227,9 @@ def test_meshes_are_bounded_by_the_keys():
 
 
 def test_a_scene_without_a_mesh_is_not_solved_as_it_is(tmp_path):
-    """By functions that need one; and there must be an accuracy where one is needed."""
+    """By a function that needs one."""
     with pytest.raises(InputError, match=r"accuracy = 0\.001: leaves the mesh open"):
         solve_scene(open_scene(1e-3), tmp_path, MPI.COMM_SELF)
-    with pytest.raises(InputError, match=r"analysis\.accuracy is missing"):
-        accurate(paper_joint(), tmp_path)
     assert not any(tmp_path.iterdir())
 
 
