@@ -89,8 +89,8 @@ class Refined:
         return Order(value, f"{value:.2g} (from three meshes)")
 
     def shift(self, curves: Sequence[Array]) -> Array:
-        """What refinement still adds to the finest of ``curves`` ``(n,)``, by `richardson` from the next coarser run
-        with the order of `order`. Steps that run does not have get the relative shift of its last one."""
+        """What refinement still adds to the finest of ``curves`` ``(n,)``, by `richardson` from the next coarser run;
+        steps that run does not have get the relative shift of its last one."""
         fine, coarse = curves[:2]
         ratio = self.coarser[0].scene.joint.h / self.run.scene.joint.h
         n = min(len(fine), len(coarse))
@@ -100,10 +100,8 @@ class Refined:
 
 
 def group(runs: list[RunCurve]) -> list[Refined]:
-    """Runs of one scene that differ only in element size, together; in the order of the first of each.
-
-    Raises `InputError` for two runs of the same scene on the same mesh.
-    """
+    """Runs of one scene that differ only in element size, together; in the order of the first of each. Raises
+    `InputError` for two runs of the same scene on the same mesh."""
     scenes: dict[tuple, list[RunCurve]] = {}
     for run in runs:
         scenes.setdefault(_without_mesh(run.scene), []).append(run)

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _KNOWN = {"status", "message", "warnings", "versions", "seconds", "totals", "steps"}  # keys of a run.json
-_NEEDED = ("step", "iterations", "cutbacks", "seconds")
-_OF_A_JOINT = (*CURVES, "delta/dR", "P/(E* R)", "p0/E*")
 _WHOLE = ("step", "iterations", "cutbacks")  # columns of whole numbers
+_NEEDED = (*_WHOLE, "seconds")
+_OF_A_JOINT = (*_NEEDED, *CURVES, "delta/dR", "P/(E* R)", "p0/E*")
 
 
 class Run:
@@ -45,12 +45,13 @@ class Run:
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
+        if is_sweep(self.folder):
+            raise InputError(
+                f"{self.folder}: is a sweep, not a run; its runs are the folders in {self.folder / 'cases'}."
+            )
         for name in ("scene.toml", "history.csv", "run.json"):
             if not (self.folder / name).is_file():
-                is_no_run = f"is not a run folder: {name} is missing"
-                if is_sweep(self.folder):
-                    is_no_run = f"is a sweep, not a run; its runs are the folders in {self.folder / 'cases'}"
-                raise InputError(f"{self.folder}: {is_no_run}.")
+                raise InputError(f"{self.folder}: is not a run folder: {name} is missing.")
         self.scene: Any = load_scene(self.folder / "scene.toml")
         self.is_joint = isinstance(self.scene, Scene)
         self.columns, self.units = self._read_history()
@@ -73,10 +74,8 @@ class Run:
 
     @cached_property
     def curve(self) -> RunCurve:
-        """P (per unit thickness), p0 and eps over delta as arrays, for laws and fits.
-
-        Raises `InputError` without an accepted step, and of a run that is not of a joint.
-        """
+        """P (per unit thickness), p0 and eps over delta as arrays, for laws and fits. Raises `InputError` without an
+        accepted step, and of a run that is not of a joint."""
         if not self.is_joint:
             raise InputError(f"{self.folder}: is the run of a general scene; this is for those of a [joint].")
         self.number(None)
@@ -138,8 +137,8 @@ class Run:
         return read_points(self.folder, self.scene, self.number(step))
 
     def probe(self, edge: str = "", quantity: str = "", step: int | None = None, line: Sequence[float] = ()) -> Probe:
-        """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1 (von Mises') at ``step`` (the
-        last): see `probe_edge` and `probe_line`. Raises `InputError`."""
+        """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1 (von Mises'): see
+        `probe_edge` and `probe_line`. Raises `InputError`."""
         if bool(edge) == bool(line):
             raise InputError("probe: give an edge or a line.")
         if line:
@@ -161,8 +160,7 @@ class Run:
         try:
             columns = read_history(path)
             headings = next(csv.reader([path.read_text(encoding="utf-8").partition("\n")[0]]))
-            needed = (*_NEEDED, *(_OF_A_JOINT if self.is_joint else ()))
-            if not np.isfinite([columns[name] for name in needed]).all():
+            if not np.isfinite([columns[name] for name in (_OF_A_JOINT if self.is_joint else _NEEDED)]).all():
                 raise ValueError("numbers that are not finite")
         except (ValueError, IndexError, KeyError, OSError):
             raise InputError(f"{path}: cannot be read as the history of a run.") from None

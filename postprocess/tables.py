@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -43,20 +44,17 @@ def run_text(run: Run) -> str:
 def sweep_text(sweep: Sweep) -> str:
     """Cases of a sweep by status, what was varied, where they ended, and why some did not."""
     lines = [f"{sweep.folder}: {len(sweep)} case{'s' if len(sweep) != 1 else ''}: {sweep.states}"]
-    cases, units = sweep.cases, sweep.cases.attrs["units"]
+    cases = sweep.cases
     if same := [f"{key} = {_cell(cases[key].iloc[0])}" for key in sweep.keys if key not in sweep.moving]:
         lines += [f"in all cases: {', '.join(same)}"]
     names = ["case", "run", *sweep.moving, "status", *(name for name in _LAST if name in cases)]
-    table = Table(*(f"{name} [{units[name]}]" if name in units else name for name in names))
-    for row in cases[names].itertuples(index=False):
-        table.add(*map(_cell, row))
-    lines += ["", _thinned(table, sweep.folder / "cases.csv")]
+    lines += ["", _thinned(_table_of(cases[names]), sweep.folder / "cases.csv")]
     said = zip(cases["case"], cases["message"], strict=True)
     return "\n".join([*lines, *(f"case {case}: {message}" for case, message in said if message)])
 
 
 def comparison_text(comparison: Comparison) -> str:
-    """Each quantity of all runs at common loads, the keys in which the scenes differ, and how the runs went."""
+    """Quantities of all runs at common loads, the keys in which the scenes differ, and how the runs went."""
     names = names_of(comparison.runs)
     parts = [_thinned(_differences(comparison, name, names), "history.csv") for name in comparison.values]
     rows = differing_keys([run.scene for run in comparison.runs])
@@ -67,15 +65,10 @@ def comparison_text(comparison: Comparison) -> str:
 
 def probe_text(probe: Probe, angles: Iterable[float]) -> str:
     """A quantity along an edge or a line, its largest value and where that is, and its values at ``angles``."""
-    frame = probe.frame()
-    units = frame.attrs["units"]
-    table = Table(*(f"{name} [{units[name]}]" if name in units else name for name in frame))
-    for row in frame.itertuples(index=False):
-        table.add(*(f"{value:.6g}" for value in row))
     k, unit = probe.largest, f" {probe.unit}".rstrip()
     where = "" if probe.angle is None else f" at {probe.angle[k]:.4g}°"
     force = f"step {probe.step}, {probe.by or 'force'} = {probe.force:.6g} per unit thickness"
-    lines = [_thinned(table, "-o FILE.csv"), "", f"{probe.quantity} along {probe.place}, {force}"]
+    lines = [_thinned(_table_of(probe.frame()), "-o FILE.csv"), "", f"{probe.quantity} along {probe.place}, {force}"]
     lines += [f"largest: {probe.values[k]:.6g}{unit}{where}, x = {probe.x[k, 0]:.6g}, y = {probe.x[k, 1]:.6g}"]
     return "\n".join([*lines, *(f"at {angle:g}°: {probe.at(angle):.6g}{unit}" for angle in angles)])
 
@@ -92,6 +85,12 @@ def first_of_each_kind(warnings: list[str]) -> list[str]:
     for warning in warnings:
         first.setdefault(re.sub(r"[0-9.e+-]+", "#", warning.partition(": ")[2]), warning)
     return list(first.values())
+
+
+def _table_of(frame: Any) -> Table:
+    from archord.postprocess.frames import with_headings  # with pandas
+
+    return Table(*with_headings(frame), rows=(map(_cell, row) for row in frame.itertuples(index=False)))
 
 
 def _thinned(table: Table, whole: object) -> str:
@@ -149,8 +148,8 @@ def _peaks(run: Run) -> str:
 def _cost(run: Run) -> Iterable[tuple[str, str]]:
     """Iterations, errors, seconds by part, memory, versions, warnings."""
     for name in ("totals", "error_estimates", "seconds"):
-        values = {key.replace("_", " "): value for key, value in run.summary.get(name, {}).items() if value is not None}
-        yield name.replace("_", " "), ", ".join(f"{key} {value:.3g}" for key, value in values.items())
+        values = (f"{key} {value:.3g}" for key, value in run.summary.get(name, {}).items() if value is not None)
+        yield name.replace("_", " "), ", ".join(values).replace("_", " ")
     yield "memory", f"{max(run.summary.get('peak_memory') or [0]) / 1e6:.0f} MB at most on a rank"
     yield "versions", ", ".join(f"{key} {value}" for key, value in run.summary["versions"].items())
     for warning in first_of_each_kind(run.warnings):

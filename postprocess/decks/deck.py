@@ -91,17 +91,16 @@ def moved_sets(system: System, mesh: DeckMesh) -> list[Moved]:
             out[s.facets, s.axis] = Moved(s.facets, s.axis, nodes[own], rates, bool(own.all()))
     for i in system.problem.interactions:
         if isinstance(disc := i.surfaces[0], Rigid):
-            name = surface_name(i, 0)
+            name, moved = surface_name(i, 0), disc.moved_by()
             nodes = mesh.node_sets[name]
             for axis in (0, 1):
-                rates = {drive: np.full(len(nodes), rate[axis]) for drive, rate in disc.moved_by().items()}
-                out[name, axis] = Moved(name, axis, nodes, {d: r for d, r in rates.items() if r.any()}, True)
+                rates = {drive: np.full(len(nodes), rate[axis]) for drive, rate in moved.items() if rate[axis]}
+                out[name, axis] = Moved(name, axis, nodes, rates, True)
     return list(out.values())
 
 
 def deck(system: System, mesh: DeckMesh, targets: Sequence[float], heading: str = "") -> str:
-    """The input deck of the problem of ``system`` on ``mesh`` with a step to each of the ``targets``, load factors on
-    the path.
+    """The input deck of the problem of ``system`` on ``mesh`` with a step to each of the ``targets`` on the path.
 
     Raises ValueError for what a deck cannot say.
     """
@@ -174,24 +173,20 @@ class _Writer:
         """Materials, sections, interactions, and what is held in all steps."""
         problem = self.problem
         materials = {body.name: body.material for body in problem.bodies}
-        for i in problem.interactions:
-            if isinstance(i.surfaces[0], Rigid):
-                m = problem.body_of(i.surfaces[1]).material
-                materials[surface_name(i, 0)] = Elastic(m.E, m.nu, m.plane)
+        for i in (i for i in problem.interactions if isinstance(i.surfaces[0], Rigid)):
+            m = problem.body_of(i.surfaces[1]).material
+            materials[surface_name(i, 0)] = Elastic(m.E, m.nu, m.plane)
         for name, material in materials.items():
             yield from _material(name, material)
             yield from (f"*SOLID SECTION, ELSET={label(name)}, MATERIAL={label(name)}", number(self.thick))
         for i in problem.interactions:
-            pair = ", ".join(f"{label(surface_name(i, side))}_SURFACE" for side in (0, 1))
-            law = LAWS[i.law] if isinstance(i.law, str) else i.law
+            law, name = LAWS[i.law] if isinstance(i.law, str) else i.law, label(i.name)
             if isinstance(law, Tied):
-                yield from (f"*TIE, NAME={label(i.name)}, ADJUST=NO", pair)
+                yield from (f"*TIE, NAME={name}, ADJUST=NO", _pair(i))
             elif isinstance(law, Frictionless):
-                yield f"*SURFACE INTERACTION, NAME={label(i.name)}_LAW"
-                yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
+                yield from (f"*SURFACE INTERACTION, NAME={name}_LAW", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR")
                 yield number(contact_stiffness(problem, self.mesh, i))
-                yield f"*CONTACT PAIR, INTERACTION={label(i.name)}_LAW, TYPE=SURFACE TO SURFACE"
-                yield pair
+                yield from (f"*CONTACT PAIR, INTERACTION={name}_LAW, TYPE=SURFACE TO SURFACE", _pair(i))
             else:
                 raise ValueError(f"the law of {i.name!r} cannot be exported; frictionless and tied contact can")
         yield from self._spring_lines()
@@ -223,10 +218,8 @@ class _Writer:
         for k, target in enumerate(targets, 1):
             values = {drive.name: drive.value(target) for drive in self.problem.all_drives}
             yield from ("*STEP, INC=1000", "*STATIC", "1., 1.")
-            if k == 1 and self.problem.fit:
-                for i in self.problem.interactions:
-                    pair = ", ".join(f"{label(surface_name(i, side))}_SURFACE" for side in (0, 1))
-                    yield from ("** Abaqus alone, without the stars: *CONTACT INTERFERENCE, SHRINK", f"** {pair}")
+            for i in self.problem.interactions if k == 1 and self.problem.fit else ():
+                yield from ("** Abaqus alone, without the stars: *CONTACT INTERFERENCE, SHRINK", f"** {_pair(i)}")
             rows = [row for m in self.held if m.rates for row in m.boundary(values)]
             rows += [f"{n}, 1, 1, {number(values[d])}" for d, n in self.own.items() if d not in self.pulled]
             yield from ["*BOUNDARY", *rows] if rows else []
@@ -245,6 +238,10 @@ class _Writer:
                 for body in self.problem.bodies if plastic else ():
                     yield from (f"*EL PRINT, ELSET={label(body.name)}", "PEEQ")
             yield "*END STEP"
+
+
+def _pair(interaction: Interaction) -> str:
+    return ", ".join(f"{label(surface_name(interaction, side))}_SURFACE" for side in (0, 1))
 
 
 def _material(name: str, material: Any) -> Iterator[str]:
