@@ -115,8 +115,9 @@ def _facts(run: Run) -> Iterable[tuple[str, str]]:
         kinds = ("body", "interaction", "coupling", "support", "load")
         parts = [(f"{kind} {part.name}", part) for kind in kinds for part in getattr(scene, kind)]
     for name, part in parts:
-        said = part.model_dump(exclude_none=True, exclude={"name"}).items()
-        yield name, shortened(", ".join(f"{key} = {value}" for key, value in said if value not in ("", [])))
+        keys = part.model_dump(exclude_none=True, exclude={"name"}).items()
+        given = (f"{key} = {value}" for key, value in keys if value is not False and value not in ("", []))
+        yield name, shortened(", ".join(given))
     counts = f"{mesh.get('cells', '?')} {mesh.get('kind', 'cells')} of degree {scene.analysis.degree}"
     yield "mesh", f"{counts}, {mesh.get('dofs', '?')} dofs; ranks: {run.summary.get('ranks', '?')}"
 
@@ -137,7 +138,7 @@ def _peaks(run: Run) -> str:
     h, said = run.columns, []
     names = (*COMPARED, "peeq_max") if run.is_joint else tuple(name for name in h if name.endswith(COMMON))
     for name in names:
-        k = int(np.argmax(h[name]))
+        k = int(np.argmax(np.abs(h[name])))
         said.append(f"{name} = {h[name][k]:.6g} {run.units.get(name, '')}".rstrip() + f" at step {h['step'][k]:g}")
     yields = np.any([h[name] for name in names if name.endswith("peeq_max")] or [[0.0]], axis=0)
     if yields.any():
@@ -163,15 +164,15 @@ def _differences(comparison: Comparison, quantity: str, names: list[str]) -> Tab
     table = Table(comparison.labels["load"], f"{comparison.labels[quantity]}: {names[0]}", *others)
     relative, marks = comparison.relative(quantity), np.where(comparison.interpolated, "~", "")
     for k, load in enumerate(comparison.load):
-        pairs = zip(marks[:, k], comparison.values[quantity][:, k], relative[:, k], strict=True)
-        cells = [cell for mark, value, off in pairs for cell in (f"{mark}{value:.6g}", _percent(float(off)))]
+        pairs = zip(marks[:, k], comparison.values[quantity][:, k], relative[:, k].tolist(), strict=True)
+        cells = [cell for mark, value, off in pairs for cell in (f"{mark}{value:.6g}", _percent(off))]
         table.add(f"{load:.6g}", cells[0], *cells[2:])
-    largest = np.abs(np.nan_to_num(relative[1:])).max(axis=1)
+    largest = np.abs(np.nan_to_num(relative[1:])).max(axis=1).tolist()
     table.add("", "largest difference", *(cell for size in largest for cell in ("", _percent(size))))
     return table
 
 
-def _percent(relative: float) -> str:
+def _percent(relative: Any) -> str:
     """A relative difference in percent, with three digits; "-" where there is none."""
     return "-" if np.isnan(relative) else f"{100 * relative:.3g} %"
 

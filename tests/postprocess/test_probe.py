@@ -9,6 +9,7 @@ import pytest
 import archord
 from archord.cli import run as command
 from archord.postprocess.export import export_csv, export_vtk
+from archord.postprocess.tables import run_text
 
 # Hoop stress at the hole's edge over P/(40 - 20): at 90 degrees and the largest, of two codes, one of them CalculiX
 # 2.20 (elements of order two), each refined until the digits stood.
@@ -223,3 +224,11 @@ def test_a_plate_without_contact_is_shown_and_exported_too(tmp_path, capsys):
     with pytest.raises(archord.InputError, match="has no contact"):
         run.pressure()
     assert "pull force [N/mm]" in capsys.readouterr().out
+
+
+def test_the_largest_force_is_that_of_the_largest_size(tmp_path):
+    """Of a load in a negative direction, too."""
+    run = solved(tmp_path / "run", 2.0, [0.02, 0.1])
+    run.columns["pull force"] = [-force for force in run.columns["pull force"]]
+    text = run_text(run)
+    assert f"pull force = {run.columns['pull force'][1]:.6g} N/mm at step 2" in text
