@@ -39,4 +39,4 @@ def toml_value(value: Any) -> str:
 class Section(BaseModel):
     """A section of a scene: no unknown keys, no conversions, no numbers that are not finite, not to be changed."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True)
