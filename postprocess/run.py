@@ -92,7 +92,7 @@ class Run:
         return read_arcs(self.curve, step) if self.is_joint else read_surfaces(self.folder, step)
 
     def arc(self, step: int | None = None, side: str | None = None) -> Any:
-        """One ``side`` of `contact` (the hole, if both are there). Raises `InputError` without such a step or side."""
+        """One ``side`` of `contact` (the last one: the hole). Raises `InputError` without such a step or side."""
         arcs = self.contact(step)
         if side is not None and side not in arcs:
             raise InputError(f"{self.folder}: has no side {side!r}; its sides are {', '.join(arcs)}.")

@@ -164,7 +164,7 @@ def _differences(comparison: Comparison, quantity: str, names: list[str]) -> Tab
     table = Table(comparison.labels["load"], f"{comparison.labels[quantity]}: {names[0]}", *others)
     relative, marks = comparison.relative(quantity), np.where(comparison.interpolated, "~", "")
     for k, load in enumerate(comparison.load):
-        pairs = zip(marks[:, k], comparison.values[quantity][:, k], relative[:, k].tolist(), strict=True)
+        pairs = zip(marks[:, k], comparison.values[quantity][:, k], relative[:, k], strict=True)
         cells = [cell for mark, value, off in pairs for cell in (f"{mark}{value:.6g}", _percent(off))]
         table.add(f"{load:.6g}", cells[0], *cells[2:])
     largest = np.abs(np.nan_to_num(relative[1:])).max(axis=1).tolist()

@@ -17,12 +17,10 @@ _BEFORE: dict[str, Any] = {"color": "0.35", "lw": 0.9, "ls": (0, (4, 3))}
 
 
 def _load(scene: Scene, delta: float) -> str:
-    """A displacement over the clearance, in words."""
     return f"δ = {delta / abs(scene.joint.dR):.4g} {gap_name(scene.joint.dR, 'ΔR')}"
 
 
-def _over(divisor: float) -> dict[str, Any]:
-    """The functions of a second axis with the first one's numbers over ``divisor``."""
+def _over(divisor: float) -> dict[str, Any]:  # a second axis with the numbers of the first over the divisor
     return {"functions": (lambda value: np.asarray(value) / divisor, lambda value: np.asarray(value) * divisor)}
 
 
