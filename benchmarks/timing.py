@@ -17,6 +17,7 @@ import statistics
 import subprocess
 import sys
 from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -146,20 +147,18 @@ def main(limit: float, command: list[str]) -> None:
         raise TimeoutError
 
     signal.signal(signal.SIGALRM, stop)
-    late = False
     environment = os.environ | dict.fromkeys(THREADS, "1") | {"ARCHORD_KEEP_MESHES": "0"}  # each makes its own
     with open("stdout.txt", "w") as out, open("stderr.txt", "w") as err:
         start = perf_counter()
         process = subprocess.Popen(command, stdout=out, stderr=err, env=environment, start_new_session=True)
         signal.setitimer(signal.ITIMER_REAL, limit)
         try:
-            process.wait()
-            signal.setitimer(signal.ITIMER_REAL, 0)
-        except TimeoutError:
-            late = True
+            with suppress(TimeoutError):
+                process.wait()
+                signal.setitimer(signal.ITIMER_REAL, 0)
         finally:
-            seconds = perf_counter() - start
-            if process.poll() is None:
+            seconds, late = perf_counter() - start, process.poll() is None
+            if late:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
     used = resource.getrusage(resource.RUSAGE_CHILDREN)

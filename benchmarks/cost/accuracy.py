@@ -8,21 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.benchmarks.case import Case, E, paper_joint, slug, varied
-from archord.output.folder import claim_folder
+from archord.benchmarks.case import Case, E, paper_joint, varied
 from archord.output.run import Outcome
 from archord.postprocess.convergence import difference
 from archord.report.files import write_report
 from archord.report.table import Table
 from archord.scene.scene import Scene
-from archord.studies.accuracy import solve_to_accuracy
 from archord.studies.mesh_family import RATIO, MeshFamily
 
 ELASTIC = 1e-2, 3e-3, 1e-3, 3e-4, 1e-4
 PLASTIC = 1e-2, 3e-3, 1e-3
 _FINE = 6  # meshes finer than the coarsest
 _STEPS = 8  # of a plastic joint an output step
-Said = Callable[[str], None]
 
 
 def open_joint(name: str, steps: int = 4, yield_stress: float | None = None, **sections: dict) -> Case:
@@ -46,12 +43,9 @@ CASES = (
 
 
 def run(
-    folder: Path,
-    cases: Sequence[Case] = CASES,
-    said: Said = lambda sentence: None,
-    asked: Sequence[float] | None = None,
+    folder: Path, cases: Sequence[Case], said: Callable[[str], None], asked: Sequence[float] = ()
 ) -> tuple[list[dict[str, object]], list[str]]:
-    """Solve ``cases`` below ``folder`` to the accuracies ``asked``, those of their material if absent, references
+    """Solve ``cases`` below ``folder`` to the accuracies ``asked``, or those of their material, references
     first; ``said`` follows each run.
 
     Returns the entries of each accuracy by heading, with the true error of the curve, over its largest value, and a
@@ -62,14 +56,9 @@ def run(
     for case in cases:
         known = reference(case, folder, said)
         for wanted in asked or (PLASTIC if case.scene.plastic else ELASTIC):
-            run_folder = folder / slug(f"{case.name} {wanted:g}")
-            claim_folder(run_folder, force=True)
-            outcome = solve_to_accuracy(varied(case.scene, analysis={"accuracy": wanted}), run_folder)
-            if outcome.status == "interrupted":
-                raise KeyboardInterrupt
+            scene = varied(case.scene, analysis={"accuracy": wanted})
+            outcome = Case(f"{case.name} {wanted:g}", scene).solve(folder)
             found = outcome.accuracy
-            if outcome.status != "done" or found is None:
-                raise RuntimeError(f"{run_folder.name}: {outcome.message}")
             error = difference(_curve(case.scene, outcome), known, float(np.abs(known).max()))
             said(f"{case.name}: {wanted:g}: {found.estimated} estimated, {error:.1e} true")
             if found.estimated is None or found.estimated > wanted:
@@ -94,12 +83,9 @@ def run(
     return rows, faults
 
 
-def reference(case: Case, folder: Path, said: Said) -> np.ndarray:
-    """The curve on a much finer mesh, extrapolated with order 3 from it and the one before.
-
-    Of a plastic joint in steps that are an eighth as long; what their error is, is extrapolated with order 1 from steps
-    twice as long on the mesh before.
-    """
+def reference(case: Case, folder: Path, said: Callable[[str], None]) -> np.ndarray:
+    """The curve on a much finer mesh, extrapolated with order 3 from it and the one before; of a plastic joint in steps
+    an eighth as long, whose error is extrapolated with order 1 from steps twice as long on the mesh before."""
     family = MeshFamily(case.scene, 1.0)
 
     def curve(mesh: int, substeps: int) -> np.ndarray:

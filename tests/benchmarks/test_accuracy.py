@@ -5,7 +5,7 @@ from archord.benchmarks.cost.accuracy import CASES, open_joint, run, write
 
 def test_a_case_is_solved_and_judged(tmp_path):
     """One coarse accuracy of the paper's joint: the true error lies between nothing and the estimate."""
-    (row,), faults = run(tmp_path / "runs", [open_joint("quick", 2)], asked=[0.01])
+    (row,), faults = run(tmp_path / "runs", [open_joint("quick", 2)], print, [0.01])
     assert 0 < float(row["true"]) < float(row["estimated"]) <= 0.01
     assert faults == []
     text, files = write([row], tmp_path)
