@@ -76,8 +76,7 @@ def benchmark() -> None:
 def stability(output: Path, only: str | None, quiet: bool) -> int:
     """Solve a table of extreme scenes, each within a budget, and hold every line against what it must give.
 
-    Writes stability.csv and stability.md. Under mpirun the ranks solve different scenes side by side.
-    Exit code 0 only if every scene is as it should be.
+    Under mpirun the ranks solve different scenes side by side. Exit code 0 only if every scene is as it should be.
     """
     from mpi4py import MPI
 
@@ -96,11 +95,9 @@ def stability(output: Path, only: str | None, quiet: bool) -> int:
 @_repeats("runs of each case; the median counts", 1)
 @quiet("what is wrong")
 def scaling(output: Path, largest: float, ranks: int, repeats: int, quiet: bool) -> int:
-    """Solve the paper's joint on ever finer meshes, of 1 million dofs at most, and several ranks: time by part and
-    memory per rank.
+    """Solve the paper's joint on ever finer meshes and several ranks: time by part and memory per rank.
 
-    Writes scaling.csv and scaling.md. Exit code 0 only if every run finishes, with the same force on any
-    number of ranks.
+    Exit code 0 only if every run finishes, with the same force on any number of ranks.
     """
     from archord.benchmarks.cost import scaling as table
 
@@ -117,7 +114,7 @@ def variants(group: str, output: Path, repeats: int, quiet: bool) -> int:
     """Solve scenes with one thing switched, by turns, and tell what each variant loads, needs and writes.
 
     GROUP is joint (one scene in variants), sweep (on two ranks and on one) or strategies (without each linear strategy,
-    for hours). Writes variants.csv and variants.md. Exit code 0 only if none loads what it does not use.
+    for hours). Exit code 0 only if none loads what it does not use.
     """
     from archord.benchmarks.cost import variants as table
 
@@ -132,7 +129,7 @@ def variants(group: str, output: Path, repeats: int, quiet: bool) -> int:
 def accuracy(output: Path, only: str, quiet: bool) -> int:
     """Solve several joints to several accuracies, and compare what was asked, estimated and true.
 
-    Writes accuracy.csv and accuracy.md. Exit code 0 only if all errors are below what was asked.
+    Exit code 0 only if all errors are below what was asked.
     """
     from archord.benchmarks.case import matches
     from archord.benchmarks.cost import accuracy as table
@@ -153,8 +150,8 @@ def accuracy(output: Path, only: str, quiet: bool) -> int:
 def work_precision(output: Path, only: tuple[str, ...], repeats: int, limit: float, quiet: bool) -> int:
     """Time series of meshes, elastic and elasto-plastic, archord's and other codes', and set error against time.
 
-    Writes work_precision_CASE.csv, .md and a diagram for each case. Every point is a whole process with one thread, the
-    median of all repeats. Exit code 0 if all of archord's points were solved.
+    Every point is a whole process with one thread, the median of all repeats. Exit code 0 if all of archord's points
+    were solved.
     """
     from archord.benchmarks.cost import work_precision as table
 

@@ -1,7 +1,6 @@
-"""The command line: the file of each command, and the exit code of each error.
+"""The command line: the file of each command, and the exit code of each error, told by rank 0.
 
-A command imports the rooms that it needs when it is called. Bad input ends with exit code 2 and one sentence, which
-rank 0 says.
+A command imports the rooms that it needs when it is called.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from archord.benchmarks.case import paper_joint
-from archord.benchmarks.timing import Process, Timing, time_all
+from archord.benchmarks.timing import Process, Said, Timing, time_all
 from archord.output.folder import claim_folder
 from archord.report.files import write_report
 from archord.report.table import Table
@@ -95,20 +95,16 @@ def settings(largest: float, ranks: int) -> list[Setting]:
     return sorted((s for s in (*elastic, *plastic) if s.dofs <= largest), key=lambda setting: setting.dofs)
 
 
-def run(
-    chosen: Sequence[Setting], folder: Path, repeats: int, said: Callable[[str], None] = lambda sentence: None
-) -> tuple[list[Cost], list[str]]:
-    """Solve the ``chosen`` settings ``repeats`` times, in turn, below ``folder``, after the smallest mesh of either
-    material once, which compiles; ``said`` follows each run.
+def run(chosen: Sequence[Setting], folder: Path, repeats: int, said: Said) -> tuple[list[Cost], list[str]]:
+    """Solve the ``chosen`` settings ``repeats`` times below ``folder`` (see `time_all`).
 
     Returns the costs of those that finish, and a sentence for every one that does not, and for every force that depends
     on the number of ranks. Raises `InputError`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     timings = time_all([setting.process(folder) for setting in chosen], repeats, said)
-    pairs = list(zip(chosen, timings, strict=True))
-    costs = [cost_of(setting, timing) for setting, timing in pairs if not timing.failure]
-    return costs, [f"{setting.name}: {timing.failure}" for setting, timing in pairs if timing.failure] + unlike(costs)
+    costs = [cost_of(*pair) for pair in zip(chosen, timings, strict=True) if not pair[1].failure]
+    return costs, [f"{t.process.name}: {t.failure}" for t in timings if t.failure] + unlike(costs)
 
 
 def cost_of(setting: Setting, timing: Timing) -> Cost:

@@ -10,15 +10,15 @@ from __future__ import annotations
 import json
 import sys
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 
 from archord.benchmarks.case import paper_joint, slug
 from archord.benchmarks.cost.scaling import launcher
-from archord.benchmarks.timing import Process, Timing, time_all
-from archord.report.files import write_report
+from archord.benchmarks.timing import Process, Said, Timing, time_all
+from archord.report.files import Row, write_report
 from archord.report.table import Table
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
@@ -108,39 +108,37 @@ def variants(group: str) -> list[Variant]:
     return found
 
 
-def run(
-    chosen: Sequence[Variant], folder: Path, repeats: int, said: Callable[[str], None] = lambda sentence: None
-) -> tuple[list[dict[str, object]], list[str]]:
-    """Run the ``chosen`` variants ``repeats`` times, in turn, below ``folder``, each once more before, uncounted;
-    ``said`` follows each run.
+def run(chosen: Sequence[Variant], folder: Path, repeats: int, said: Said) -> tuple[list[Row], list[str]]:
+    """Run the ``chosen`` variants ``repeats`` times below ``folder`` (see `time_all`), each once before, uncounted.
 
     Returns a row of entries for each, whose ratios are to the first of its set, run by run, the median; and a sentence
     for every failure and for everything loaded that is not used. Raises `InputError`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     processes = [variant.process(folder.resolve()) for variant in chosen]
-    rows: list[dict[str, object]] = []
+    rows: list[Row] = []
     faults: list[str] = []
     firsts: dict[str, Timing] = {}
     for variant, timing in zip(chosen, time_all(processes, repeats, said), strict=True):
         first = firsts.setdefault(variant.case, timing)
         if failure := timing.failure or first.failure:
-            faults.append(f"{variant.case}, {variant.name}: {failure}")
+            faults.append(f"{timing.process.name}: {failure}")
             continue
         loaded = timing.middle.result
         files = [file for file in variant.folder(folder).rglob("*") if file.is_file()]
-        entries: dict[str, object] = {
-            "case": variant.case,
-            "variant": variant.name,
-            "seconds": f"{timing.median:.2f}",
-            "times as long": f"{ratio(timing, first, 'seconds'):.2f}",
-            "CPU [s]": f"{median(run.cpu for run in timing.runs):.2f}",
-            "times the CPU": f"{ratio(timing, first, 'cpu'):.2f}",
-            "peak memory [MB]": f"{timing.middle.memory / 1e6:.0f}",
-            "written [kB]": f"{sum(file.stat().st_size for file in files) / 1e3:.0f}",
-            "loads": ", ".join(name for name in WATCHED if name in loaded),
-        }
-        rows.append(entries)
+        rows.append(
+            {
+                "case": variant.case,
+                "variant": variant.name,
+                "seconds": f"{timing.median:.2f}",
+                "times as long": f"{ratio(timing, first, 'seconds'):.2f}",
+                "CPU [s]": f"{median(run.cpu for run in timing.runs):.2f}",
+                "times the CPU": f"{ratio(timing, first, 'cpu'):.2f}",
+                "peak memory [MB]": f"{timing.middle.memory / 1e6:.0f}",
+                "written [kB]": f"{sum(file.stat().st_size for file in files) / 1e3:.0f}",
+                "loads": ", ".join(name for name in WATCHED if name in loaded),
+            }
+        )
         faults += variant.faults(loaded)
     return rows, faults
 
@@ -150,7 +148,7 @@ def ratio(one: Timing, other: Timing, what: str) -> float:
     return median(getattr(a, what) / getattr(b, what) for a, b in zip(one.runs, other.runs, strict=False))
 
 
-def write(rows: Sequence[dict[str, object]], folder: Path) -> tuple[str, list[Path]]:
+def write(rows: Sequence[Row], folder: Path) -> tuple[str, list[Path]]:
     """Write variants.csv and variants.md into ``folder``, if there is any row; returns the table and the files."""
     if not rows:
         return "", []

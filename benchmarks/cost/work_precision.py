@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, OURS, Point, points
-from archord.benchmarks.timing import Timing, time_all
+from archord.benchmarks.timing import Said, Timing, time_all
 from archord.geometry.basis import Array
 from archord.report.figure import new_figure, save
 from archord.report.files import write_report
@@ -47,9 +47,7 @@ class Line:
         return errors
 
 
-def run(
-    folder: Path, only: Sequence[str], repeats: int, limit: float, said: Callable[[str], None] = lambda sentence: None
-) -> list[Line]:
+def run(folder: Path, only: Sequence[str], repeats: int, limit: float, said: Said) -> list[Line]:
     """Time the points that fit ``only``, each ``repeats`` times and for ``limit`` seconds at most, in turn, below
     ``folder``; ``said`` follows each run. Raises `InputError`."""
     chosen = points(only)

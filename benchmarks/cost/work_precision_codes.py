@@ -27,7 +27,6 @@ from archord.benchmarks.peers import calculix
 from archord.benchmarks.peers.installed import Peer, installed
 from archord.benchmarks.timing import Failure, Process
 from archord.geometry.basis import Array
-from archord.output.history import read_history
 from archord.postprocess.run import Run
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
@@ -107,18 +106,17 @@ def profile(angle: Array, pressure: Array) -> Array:
 
 def _archord(scene: Scene, folder: Path) -> Process:
     (folder / "input.toml").write_text(resolved(scene), encoding="utf-8")
-    run = folder / "run"
 
     def read() -> dict[str, Any]:
-        report, history = json.loads((run / "run.json").read_text(encoding="utf-8")), read_history(run / "history.csv")
+        run = Run(folder / "run")
         # the unbiased contact integrates one half of the pressure on either side
-        sides = Run(run).contact().values()
+        sides = [profile(arc.angle.ravel(), arc.pressure.ravel()) for arc in run.contact().values()]
         return {
-            **{name: history[column][-1] for name, column in _COLUMNS.items()},
-            "profile": np.mean([profile(arc.angle.ravel(), arc.pressure.ravel()) for arc in sides], axis=0),
-            "dofs": report["mesh"]["dofs"],
-            "iterations": round(sum(history["iterations"])),
-            "factorisations": report["totals"]["factorisations"],
+            **{name: run.columns[column][-1] for name, column in _COLUMNS.items()},
+            "profile": np.mean(sides, axis=0),
+            "dofs": run.summary["mesh"]["dofs"],
+            "iterations": round(sum(run.columns["iterations"])),
+            "factorisations": run.summary["totals"]["factorisations"],
         }
 
     command = (sys.executable, "-m", "archord", "solve", "input.toml", "-o", "run", "--force", "--quiet")

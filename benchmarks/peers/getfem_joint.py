@@ -4,10 +4,9 @@ Needs Debian's python3-getfem and python3-gmsh, and nothing of archord but `join
 
 - Bodies: curved second-order triangles (gmsh's, nodes on the circles), P2 displacements.
 - Contact: kinematics "current", GetFEM's integral large sliding contact brick with raytracing from the pin's deformed
-  arc to the hole's, without friction: augmented Lagrangian, P1 multipliers on the pin's arc, augmentation E*/h
-  (Poulios and Renard 2015).
+  arc: augmented Lagrangian, P1 multipliers there, augmentation E*/h (Poulios and Renard 2015).
 - Plasticity: GetFEM's brick "plane strain Prandtl Reuss" (J2, perfect, backward Euler, return mapping).
-- GetFEM's Newton solver with its sequential MUMPS; where it fails, the step is cut.
+- GetFEM's Newton solver with its sequential MUMPS.
 """
 
 from __future__ import annotations

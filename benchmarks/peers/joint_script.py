@@ -1,14 +1,13 @@
 """What the scripts ``*_joint.py`` share: the paper's quarter joint, its mesh by gmsh, the load path, the command line.
 
-They need nothing of archord, and start with ``python3 skfem_joint.py --case plastic --steps 20 --output r.json``.
 Units: R = 1, E* = 1. Plane strain, small strains; perfect J2 plasticity. Elements have the size h on the arcs and grow
-by 0.25 times the distance from there, below h = 0.04 by 6.25 h times.
+by 0.25 times the distance from there, below h = 0.04 by 6.25 h times. A step without equilibrium is cut.
 
 Each has a class ``Joint(size, growth, order, plastic)``: half of the joint below the pin's diameter, discretised, with
 ``dofs``, the unloaded state ``zero`` (a state holds all displacements, and can be added and multiplied by numbers) and
 
 - ``elastic(delta)``: the state with the pin's top at ``-delta`` of bodies that do not yield; from then on they do,
-- ``solve(guess, delta)``: state and iterations from a state that has its prescribed displacements, or RuntimeError,
+- ``solve(guess, delta)``: state and iterations from a state with its prescribed displacements, or RuntimeError,
 - ``commit()``: take over the plastic strain of the state that was solved last,
 - ``results()``: P of the whole joint in that state and, where the code tells, p0.
 """

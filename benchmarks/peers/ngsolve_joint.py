@@ -8,10 +8,8 @@ Needs NGSolve (of PyPI) and nothing of archord but `joint_script` beside it.
   along the pin's normal, and the energy k/2 <-g>^2 with k = 1e5 E*/R (penalty).
 - Plasticity: J2, perfect, backward Euler. A step minimises the incremental energy, which for the elastic trial
   deviator e is mu |e|^2 up to |e| = r/(2 mu), r = sqrt(2/3) sigY, and r |e| - r^2/(4 mu) beyond (the radial return;
-  Simo and Hughes 1998, box 3.2, integrated); NGSolve differentiates it. The plastic strain lives in the integration
-  points.
-- Newton's method with full steps, inner unknowns condensed, NGSolve's sparse Cholesky; where it fails, the step is
-  cut. Residual: 1e-8 of the reaction.
+  Simo and Hughes 1998, box 3.2, integrated); NGSolve differentiates it.
+- Newton's method with inner unknowns condensed, NGSolve's sparse Cholesky.
 """
 
 from __future__ import annotations

@@ -3,12 +3,10 @@
 Needs scikit-fem, gmsh and pypardiso (all of PyPI), and nothing of archord but `joint_script` beside it.
 
 - Bodies: MeshTri2 (gmsh's second-order triangles, nodes on the circles), P2 displacements, three points a triangle.
-- Contact: kinematics "reference". A point x of the pin's arc, with its normal n, faces the point y of the hole on
-  that normal in the touching configuration; the gap g = (y - x) . n - (u(x) - u(y)) . n is linear and the pressure is
-  k <-g>, k = 1e5 E*/R (penalty). Two Gauss points a facet, as many as it has own nodes.
+- Contact: kinematics "reference". A point x of the pin's arc faces the point y of the hole on its normal n in the
+  touching configuration; the pressure is 1e5 E*/R (penalty) times -g, the gap g = (y - x) . n - (u(x) - u(y)) . n.
 - Plasticity: J2, perfect, radial return with its consistent tangent (Simo and Hughes 1998, box 3.2).
-- Newton's method with full steps; where it fails, the step is cut. Residual: 1e-8 of the reaction. All element
-  matrices at once by numpy, their sum by slots of the sparse matrix found once; MKL's PARDISO.
+- Newton's method; element matrices at once by numpy, summed into slots that are found once; MKL's PARDISO.
 """
 
 from __future__ import annotations

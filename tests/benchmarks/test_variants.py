@@ -26,7 +26,7 @@ def coarse(variant):
 def test_what_is_used_is_loaded_and_nothing_else(tmp_path):
     """That something is loaded where it is used makes its absence elsewhere say something."""
     chosen = [coarse(v) for v in variants("joint") if (v.case, v.name) in CHOSEN]
-    rows, faults = run(chosen, tmp_path / "runs", 1)
+    rows, faults = run(chosen, tmp_path / "runs", 1, print)
     assert not faults
     rigid, bare, plastic, drawn = rows
     used = {"archord.materials.j2", "archord.output.fields", "kernel radial_return", "kernel closest_point", "dolfinx"}
@@ -72,11 +72,13 @@ def test_a_sweep_is_solved_on_each_number_of_ranks(tmp_path, monkeypatch):
     (tmp_path / "elastic_pin.toml").write_text((scenes / "elastic_pin.toml").read_text())
     monkeypatch.setattr(module, "_SCENES", tmp_path)
     chosen = [replace(variant, sweep="few.sweep.toml") for variant in variants("sweep")]
-    rows, _ = run(chosen, tmp_path / "runs", 1)
+    rows, _ = run(chosen, tmp_path / "runs", 1, print)
     assert rows[0]["times as long"] == "1.00"
     assert float(rows[1]["CPU [s]"]) < 2 * float(rows[0]["CPU [s]"])
     assert all(float(row["written [kB]"]) > 10 for row in rows)
-    rows, faults = run([Variant("a", "b", sweep="none.sweep.toml"), replace(chosen[1], case="a")], tmp_path / "runs", 1)
+    rows, faults = run(
+        [Variant("a", "b", sweep="none.sweep.toml"), replace(chosen[1], case="a")], tmp_path / "runs", 1, print
+    )
     assert rows == []
     assert [fault.partition(":")[0] for fault in faults] == ["a, b", "a, 1 rank"]
     assert "none.sweep.toml" in faults[0]
