@@ -16,7 +16,7 @@ from archord.output.folder import claim_folder
 from archord.output.run import Outcome
 from archord.scene.file import AnyScene, parse_scene, resolved
 from archord.scene.scene import Scene
-from archord.studies.accuracy import solve_as_asked
+from archord.studies.accuracy import solve_to_accuracy
 
 E = 2 * (1 - 0.3**2)  # E* = 1 for two like bodies in plane strain
 Item = TypeVar("Item")
@@ -72,7 +72,7 @@ class Case:
         Raises KeyboardInterrupt if a signal interrupted the run, and `InputError` if the folder cannot be written.
         """
         claim_folder(self.folder(parent), force=True)
-        outcome = solve_as_asked(self.scene, self.folder(parent), MPI.COMM_SELF, **hooks)
+        outcome = solve_to_accuracy(self.scene, self.folder(parent), MPI.COMM_SELF, **hooks)
         if outcome.status == "interrupted":
             raise KeyboardInterrupt
         return outcome
