@@ -50,7 +50,6 @@ def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarra
 
 
 def _along(edges: np.ndarray) -> np.ndarray:
-    """The nodes of ``edges`` from end to end."""
     return edges[:, [0, *range(2, edges.shape[1]), 1]]
 
 
