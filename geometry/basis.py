@@ -81,10 +81,9 @@ def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
 
     Plastic flow in plane strain keeps the volume at every point, which must be fewer conditions than a mesh has dofs
     (Nagtegaal, Parks and Rice 1974). A quadrilateral of degree p adds ``2 p^2`` dofs; the divergence on a parallelogram
-    spans ``(p + 1)^2 - 1`` functions, just 8 for p = 2, as many conditions at the ``(p + 1)^2`` points of Gauss here.
-    With ``p^2`` points it is freer, but the strains of three deformations vanish at all of them. Distorted second-order
-    quadrilaterals have 9 conditions, and are somewhat stiff where they are large: meshed by gmsh, they put the collapse
-    pressure of a thick cylinder 0.1 % too high with 1300 dofs, triangles 0.01 %; both converge.
+    spans ``(p + 1)^2 - 1`` functions, just 8 for p = 2. At ``p^2`` points the strains of three deformations would
+    vanish. Distorted, second-order ones have 9 conditions and are somewhat stiff where they are large: 1300 dofs put
+    the collapse pressure of a thick cylinder 0.1 % too high, triangles 0.01 %; both converge.
     """
     return 2 * degree - 2 if cell == TRIANGLE else 2 * degree
 

@@ -30,8 +30,7 @@ class PatchRecovery:
     def __init__(
         self, nodes: Array, cells: np.ndarray, between: Sequence[np.ndarray], points: Array, degree: int
     ) -> None:
-        n_vertices = len(nodes) - sum(map(len, between))
-        around = _Lists.of_pairs(cells.ravel(), np.repeat(np.arange(len(cells)), cells.shape[1]), n_vertices)
+        n_vertices, (n_cells, k) = len(nodes) - sum(map(len, between)), cells.shape
         sides = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
         number, count = np.unique(sides[:, 0] * n_vertices + sides[:, 1], return_counts=True)
         edges = np.column_stack(np.divmod(number, n_vertices))
@@ -43,14 +42,13 @@ class PatchRecovery:
         alone[inward[:, 0]] = False
         own = np.flatnonzero(~outside | alone)
         wanted, source = np.concatenate([inward, np.column_stack([own, own])]).T
-        sources = _Lists.of_pairs(wanted, source, n_vertices)
 
-        vertex, cell = around.pairs()
-        wide = alone[vertex]
-        corners = _Lists(np.arange(len(cells) + 1) * cells.shape[1], cells.ravel())
-        wider = around.of(*corners.of(vertex[wide], cell[wide]))
-        keep = ~outside[vertex]
-        vertex, self._cell = (np.append(a[keep], b) for a, b in zip((vertex, cell), wider, strict=True))
+        around = np.argsort(cells.ravel(), kind="stable")
+        vertex, cell = cells.ravel()[around], around // k
+        wide, keep = np.repeat(alone[vertex], k), ~outside[vertex]
+        place, wider = _joined(cells[cell].ravel()[wide], vertex, cell)
+        wider = np.unique(np.repeat(vertex, k)[wide][place] * n_cells + wider)
+        vertex, self._cell = np.append(vertex[keep], wider // n_cells), np.append(cell[keep], wider % n_cells)
         self._first = np.flatnonzero(np.diff(vertex, prepend=-1))
         self._patch = np.zeros(n_vertices, dtype=np.int64)
         self._patch[vertex[self._first]] = np.arange(len(self._first))
@@ -70,11 +68,11 @@ class PatchRecovery:
         groups = [np.arange(n_vertices)[:, None], *between]
         end, n_ends = np.concatenate([g.ravel() for g in groups]), [np.full(len(g), g.shape[1]) for g in groups]
         count = np.concatenate(n_ends)
-        place, source = sources.each(end)
+        place, source = _joined(end, wanted, source)
         node = np.repeat(np.arange(len(nodes)), count)[place]
         self._start, self._source = np.flatnonzero(np.diff(node, prepend=-1)), self._patch[source]
         value = self._monomials((nodes[node] - nodes[source]) / scale[self._source][:, None])
-        self._value = value / (count[node] * sources.count[end[place]])[:, None]
+        self._value = value / (count[node] * np.bincount(wanted)[end[place]])[:, None]
 
     def _monomials(self, y: Array) -> Array:
         powers = np.ones((self._powers.max() + 1, *y.shape))
@@ -88,32 +86,9 @@ class PatchRecovery:
         return np.add.reduceat(parts[:, 0], self._start)
 
 
-class _Lists:
-    """Lists of numbers, one for each of ``0 .. n - 1``: ``items[start[i] : start[i + 1]]``."""
-
-    def __init__(self, start: np.ndarray, items: np.ndarray) -> None:
-        self.start, self.items, self.count = start, items, np.diff(start)
-
-    @classmethod
-    def of_pairs(cls, keys: np.ndarray, values: np.ndarray, n: int) -> _Lists:
-        """Of each key its values, in order."""
-        count = np.bincount(keys, minlength=n)
-        return cls(np.append(0, np.cumsum(count)), values[np.argsort(keys, kind="stable")])
-
-    def pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Number and item of all lists."""
-        return np.repeat(np.arange(len(self.count)), self.count), self.items
-
-    def each(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """All items of the lists ``numbers`` one after the other, and each one's place in ``numbers``."""
-        count = self.count[numbers]
-        place = np.repeat(np.arange(len(numbers)), count)
-        skipped = np.repeat(self.start[numbers] - np.cumsum(count) + count, count)
-        return place, self.items[np.arange(len(place)) + skipped]
-
-    def of(self, keys: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Each key with the items of its ``numbers``, none twice, in order."""
-        place, item = self.each(numbers)
-        n = self.items.max(initial=0) + 1
-        key, found = np.divmod(np.unique(keys[place] * n + item), n)
-        return key, found
+def _joined(keys: np.ndarray, of: np.ndarray, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All ``items`` ``of`` each of ``keys``, in turn, and the place in ``keys`` of each."""
+    order = np.argsort(of, kind="stable")
+    first, end = np.searchsorted(of[order], keys), np.searchsorted(of[order], keys, "right")
+    place = np.repeat(np.arange(len(keys)), end - first)
+    return place, items[order[np.arange(len(place)) + (end - np.cumsum(end - first))[place]]]

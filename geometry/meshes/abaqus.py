@@ -65,18 +65,19 @@ class _Model:
         self.x: np.ndarray = np.zeros((0, 3))
         self.elements: dict[int, np.ndarray] = {}
         self.lines: np.ndarray = np.zeros((0, 3), dtype=np.int64)
-        self.sets: dict[tuple[str, str], np.ndarray] = {}
+        self.sets: dict[str, dict[str, np.ndarray]] = {"NSET": {}, "ELSET": {}}
         self.surfaces: dict[str, list[tuple[np.ndarray, str]]] = defaultdict(list)
         self.spelling: dict[str, str] = {}
         take = {"NODE": self._node, "ELEMENT": self._element, "SURFACE": self._surface}
+        take |= dict.fromkeys(self.sets, self._set)
         for block in _blocks(path):
             if block.keyword in _UNREAD or block.options.get("SYSTEM", "R").upper() != "R":
                 raise ValueError(
                     f"*{block.keyword} is not read as it stands; write all nodes and elements out, in rectangular "
                     "coordinates and without parts and instances (noPartsInputFile=ON)"
                 )
-            if block.keyword in take | {"NSET": None, "ELSET": None}:
-                take.get(block.keyword, self._set)(block)
+            if block.keyword in take:
+                take[block.keyword](block)
 
     def _node(self, block: _Block) -> None:
         rows = np.array([[*row, "0", "0"][:4] for row in block.rows], dtype=float).reshape(-1, 4)
@@ -122,17 +123,16 @@ class _Model:
 
     def _add(self, kind: str, name: str | None, numbers: np.ndarray) -> None:
         if name:
-            key = kind, name.upper()
-            self.spelling.setdefault(key[1], name)
-            self.sets[key] = np.append(self.sets.get(key, np.zeros(0, dtype=np.int64)), numbers.astype(np.int64))
+            known, name = self.sets[kind], self.spelling.setdefault(name.upper(), name)
+            known[name.upper()] = np.append(known.get(name.upper(), numbers[:0]), numbers).astype(np.int64)
 
     def _chosen(self, kind: str, items: list[str]) -> np.ndarray:
         """The numbers among ``items``, and those in the sets named there."""
-        names = {item for item in items if not item.isdecimal()}
-        if lost := [name for name in names if (kind, name) not in self.sets]:
+        names = sorted({item for item in items if not item.isdecimal()})
+        if lost := [name for name in names if name not in self.sets[kind]]:
             raise ValueError(f"there is no *{kind} {lost[0]!r}")
         numbers = np.array([item for item in items if item.isdecimal()], dtype=np.int64)
-        return np.concatenate([numbers, *(self.sets[kind, name] for name in sorted(names))])
+        return np.concatenate([numbers, *(self.sets[kind][name] for name in names)])
 
 
 def read_abaqus(path: Path) -> PlaneMesh:
@@ -146,14 +146,13 @@ def read_abaqus(path: Path) -> PlaneMesh:
             raise ValueError(f"the {what} {number[count > 1][0]} is there twice")
     corners = _places(model.nodes, rows[:, 1:], "node")
     cell_sets, facet_sets, point_sets = {}, defaultdict[str, list[np.ndarray]](list), {}
-    for (kind, key), numbers in model.sets.items():
+    for key, numbers in model.sets["ELSET"].items():
         name, named = model.spelling[key], np.isin(lines[:, 0], numbers)
-        if kind == "ELSET":
-            members = np.setdiff1d(numbers, lines[:, 0])
-            if len(members) or not named.any():
-                cell_sets[name] = _places(rows[:, 0], members, f"element of the set {name!r}")
-            if named.any():
-                facet_sets[name].append(_places(model.nodes, lines[named, 1:], "node"))
+        members = np.setdiff1d(numbers, lines[:, 0])
+        if len(members) or not named.any():
+            cell_sets[name] = _places(rows[:, 0], members, f"element of the set {name!r}")
+        if named.any():
+            facet_sets[name].append(_places(model.nodes, lines[named, 1:], "node"))
     sides = 3 if corners.shape[1] in (3, 6) else 4
     faces = {f"S{k}": [k - 1, k % sides] for k in range(1, sides + 1)}
     for name, parts in model.surfaces.items():
@@ -164,9 +163,8 @@ def read_abaqus(path: Path) -> PlaneMesh:
             facet_sets[name].append(corners[places][:, faces[face]])
     x, cells = in_basix_order(model.x, corners, perm_gmsh)
     boundary, _ = outer_sides(cells)
-    for (kind, key), numbers in model.sets.items():
-        name = model.spelling[key]
-        if kind == "NSET" and name not in facet_sets:
+    for key, numbers in model.sets["NSET"].items():
+        if (name := model.spelling[key]) not in facet_sets:
             nodes = _places(model.nodes, np.unique(numbers), f"node of the set {name!r}")
             edges = boundary[np.isin(boundary, nodes).all(axis=1)]
             if len(edges):

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import basix
 import numpy as np
@@ -45,23 +44,20 @@ class PlaneMesh:
         """What gmsh's model has in physical groups. Raises ValueError if that is not one kind of cells."""
         numbers, x, _ = gmsh.model.mesh.getNodes()
         points, edges, faces = (_groups(gmsh, dim) for dim in range(3))
-        kind = one_kind({group.nodes.shape[1] for group in faces.values() if len(group.nodes)})
-        of_groups = np.concatenate([group.nodes.reshape(-1, kind) for group in faces.values()])
-        alike = of_groups.view(f"V{of_groups.dtype.itemsize * kind}").ravel()  # whole rows
-        _, first, which = np.unique(alike, return_index=True, return_inverse=True)
-        cells, place_of = of_groups[np.sort(first)], np.argsort(np.argsort(first))[which]
-        parts = np.split(place_of, np.cumsum([len(group.nodes) for group in faces.values()])[:-1])
-        order = np.argsort(numbers)
+        kind = one_kind({nodes.shape[1] for _, nodes in faces.values() if len(nodes)})
+        cells = np.concatenate([nodes.reshape(-1, kind) for _, nodes in faces.values()])
+        _, first, which = np.unique(cells, axis=0, return_index=True, return_inverse=True)  # old files repeat them
+        place_of, order = np.argsort(np.argsort(first))[which.ravel()], np.argsort(numbers)
 
         def place(found: np.ndarray) -> np.ndarray:
             return np.searchsorted(numbers[order], found)
 
         return cls.of_sets(
-            *in_basix_order(x.reshape(-1, 3)[order], place(cells), perm_gmsh),
-            dict(zip(faces, parts, strict=True)),
-            {name: place(group.nodes[:, :2]) for name, group in edges.items()},
-            {name: place(group.nodes[:, 0]) for name, group in points.items()},
-            ({name: group.tag for name, group in faces.items()}, {name: group.tag for name, group in edges.items()}),
+            *in_basix_order(x.reshape(-1, 3)[order], place(cells[np.sort(first)]), perm_gmsh),
+            dict(zip(faces, np.split(place_of, np.cumsum([len(nodes) for _, nodes in faces.values()])), strict=False)),
+            {name: place(nodes[:, :2]) for name, (_, nodes) in edges.items()},
+            {name: place(nodes[:, 0]) for name, (_, nodes) in points.items()},
+            ({name: tag for name, (tag, _) in faces.items()}, {name: tag for name, (tag, _) in edges.items()}),
         )
 
     @classmethod
@@ -85,17 +81,16 @@ class PlaneMesh:
         x, cells, bodies = flat(x[used]), of_cells.reshape(cells.shape), np.zeros(len(cells), dtype=np.int32)
         cell_sets = cell_sets or {"all": np.arange(len(cells))}
         numbers = tags or [{name: k for k, name in enumerate(sets, 1)} for sets in (cell_sets, facet_sets)]
-        cell, tag = _members(cell_sets, numbers[0], ())
-        first, one, named_cells = one_tag_each(cell, tag, numbers[0])
-        bodies[cell[first]] = one
-        sides, (ends, tag) = sides_of(cells), _members(facet_sets, numbers[1], (2,))
-        side = sides_between(cells, new[ends])
-        for name, number in numbers[1].items():
-            if lost := (side[tag == number] >= len(sides)).sum():
+        members, one, named_cells = _one_tag_each(cell_sets, numbers[0])
+        bodies[members] = one
+        sides = sides_of(cells)
+        facets = {name: sides_between(cells, new[ends]) for name, ends in facet_sets.items()}
+        for name, found in facets.items():
+            if lost := (found >= len(sides)).sum():
                 raise ValueError(f"{lost} of the edges of the facet set {name!r} are not edges of cells")
-        first, one, named_facets = one_tag_each(side, tag, numbers[1])
+        members, one, named_facets = _one_tag_each(facets, numbers[1])
         points = {name: new[nodes][new[nodes] >= 0] for name, nodes in point_sets.items()}
-        return cls(x, cells, bodies, sides[side[first]], one, named_cells, named_facets, points)
+        return cls(x, cells, bodies, sides[members], one, named_cells, named_facets, points)
 
     def second_order(self) -> PlaneMesh:
         """This mesh of straight cells with nodes on the middles of edges and of quadrilaterals, behind the others."""
@@ -118,8 +113,7 @@ class PlaneMesh:
 
 
 def with_middle_nodes(x: Array, cells: np.ndarray) -> tuple[Array, np.ndarray]:
-    """Nodes and cells ``(m, 9)`` of quadrilaterals ``cells`` ``(m, 8)``, four vertices before the middles of four edges
-    in any order, with nodes ``x`` ``(n, 2)``: a middle node each, behind the others, where its 8 nodes interpolate."""
+    """Nodes and ``cells`` with a ninth, where the 8 interpolate: four vertices, then four middles in any order."""
     middle = len(x) + np.arange(len(cells))
     return np.concatenate([x, np.einsum("b,cbk->ck", _within(9)[0], x[cells])]), np.column_stack([cells, middle])
 
@@ -146,35 +140,31 @@ def distinct_edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, which
 
 
-def one_tag_each(
-    entity: np.ndarray, tags: np.ndarray, names: Mapping[str, int]
+def _one_tag_each(
+    sets: Mapping[str, np.ndarray], numbers: Mapping[str, int]
 ) -> tuple[np.ndarray, np.ndarray, dict[str, tuple[int, ...]]]:
-    """Where each ``entity`` ``(k,)`` comes first, its tag, and all tags of the sets with these ``names``.
+    """The members ``(k,)`` of all ``sets`` as they first come, a tag of each, and all tags of every set.
 
-    An entity with one of the ``tags`` ``(k,)`` keeps it; those of the same several sets share a new one.
+    A member of one set has the set's number; those of the same several sets share a new one.
     """
-    _, first, which = np.unique(entity, return_index=True, return_inverse=True)
-    groups, group = np.unique(tags, return_inverse=True)
-    member = np.zeros((len(first), len(groups)), dtype=bool)
-    member[which, group] = True
-    one, several = tags[first].astype(np.int32), member.sum(axis=1) > 1
-    together, combination = np.unique(member[several], axis=0, return_inverse=True)
-    new = groups.max(initial=0) + 1 + np.arange(len(together))
-    one[several] = new[combination.ravel()]
-    tags_of = {int(tag): new[column].tolist() for tag, column in zip(groups, together.T, strict=True)}
-    alone = set(map(int, one))
-    sets = {name: tuple([tag] * (tag in alone) + tags_of.get(tag, [])) for name, tag in names.items()}
+    members = np.concatenate([np.zeros(0, dtype=np.int64), *sets.values()]).astype(np.int64)
+    of_set = np.repeat(np.arange(len(sets)), [len(found) for found in sets.values()])
+    _, first, which = np.unique(members, return_index=True, return_inverse=True)
+    within = np.zeros((len(first), len(sets)), dtype=bool)
+    within[which, of_set] = True
+    given = np.array([numbers[name] for name in sets], dtype=np.int32)
+    tag, several = given[of_set[first]], within.sum(axis=1) > 1
+    together, combination = np.unique(within[several], axis=0, return_inverse=True)
+    new = given.max(initial=0) + 1 + np.arange(len(together), dtype=np.int32)
+    tag[several] = new[combination.ravel()]
+    tags = {name: tuple(np.unique(tag[column]).tolist()) for name, column in zip(sets, within.T, strict=True)}
     order = np.argsort(first)
-    return first[order], one[order], sets
+    return members[first[order]], tag[order], tags
 
 
-class _Group(NamedTuple):
-    tag: int
-    nodes: np.ndarray  # (k, a) gmsh's numbers
-
-
-def _groups(gmsh, dim: int) -> dict[str, _Group]:
-    """gmsh's physical groups of dimension ``dim`` by their names, by their tags where they have none."""
+def _groups(gmsh, dim: int) -> dict[str, tuple[int, np.ndarray]]:
+    """gmsh's physical groups of dimension ``dim`` by their names, by their tags where they have none: the tag, and
+    gmsh's numbers ``(k, a)`` of the nodes of its elements."""
     groups = {}
     for _, tag in gmsh.model.getPhysicalGroups(dim):
         nodes = []
@@ -184,17 +174,8 @@ def _groups(gmsh, dim: int) -> dict[str, _Group]:
         if nodes:
             one_kind({part.shape[1] for part in nodes})
         name = gmsh.model.getPhysicalName(dim, tag) or str(tag)
-        groups[name] = _Group(tag, np.concatenate(nodes or [np.zeros((0, dim + 1), dtype=np.uint64)]))
+        groups[name] = tag, np.concatenate(nodes or [np.zeros((0, dim + 1), dtype=np.uint64)])
     return groups
-
-
-def _members(
-    sets: Mapping[str, np.ndarray], numbers: Mapping[str, int], shape: tuple[int, ...]
-) -> tuple[np.ndarray, np.ndarray]:
-    """The members of all ``sets``, of this ``shape`` each, and the number of the set of each."""
-    members = [np.zeros((0, *shape), dtype=np.int64), *sets.values()]
-    repeated = np.repeat([0, *(numbers[name] for name in sets)], [len(found) for found in members])
-    return np.concatenate(members).astype(np.int64), repeated.astype(np.int32)
 
 
 def flat(x: Array) -> Array:
@@ -218,8 +199,7 @@ def one_kind(nodes: set[int]) -> int:
 def in_basix_order(
     x: Array, cells: np.ndarray, order: Callable[[CellType, int], list[int]]
 ) -> tuple[Array, np.ndarray]:
-    """Nodes and ``cells`` ``(m, a)`` whose nodes come in the ``order`` of another program, with middle nodes in
-    quadrilaterals of 8 nodes."""
+    """Nodes and ``cells`` ``(m, a)`` with nodes in the ``order`` of another program; 8 in a quadrilateral become 9."""
     if cells.shape[1] == 8:
         x, cells = with_middle_nodes(x, cells)
     return x, cells[:, order(to_type(cell_kind(cells.shape[1])[0].name), cells.shape[1])]

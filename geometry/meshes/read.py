@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import pickle
 import signal
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -51,12 +52,10 @@ def read_mesh(
                 made = _read(source, order or 2)
             made = refined(replace(made, x=made.x * scale), refine, order, circles)
             failure = next(iter(faults(made)), "")
-        except ValueError as error:
-            failure = str(error) or "cannot be read as a mesh"
-        except OSError as error:
-            failure = error.strerror or str(error)
         except Exception as error:  # whatever a damaged file makes of it, raised on all ranks below
-            failure = f"cannot be read as a mesh: {str(error) or type(error).__name__}"
+            failure = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            if not isinstance(error, ValueError | OSError):
+                failure = f"cannot be read as a mesh: {failure}"
         failure = failure and f"{name}: {failure}"
     if failure := comm.bcast(failure):
         raise ValueError(failure)
@@ -105,27 +104,19 @@ def _read(source: str | Path | ModuleType, order: int) -> PlaneMesh:
 
 def _read_gmsh(path: Path) -> PlaneMesh:
     """What gmsh reads in a process of its own, as it ends the process on some damaged files."""
-    reader, writer = os.pipe()
-    child = os.fork()
-    if not child:
-        for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT):
-            signal.signal(number, signal.SIG_DFL)  # PETSc's handler would end all ranks
-        found: PlaneMesh | ValueError = ValueError("gmsh cannot read this file")
+    with ProcessPoolExecutor(1, get_context("fork")) as pool:
         try:
-            with own_gmsh() as gmsh:
-                gmsh.merge(str(path))
-                found = PlaneMesh.from_gmsh(gmsh)
-        except Exception as error:
-            found = ValueError(str(error)) if str(error) else found
-        finally:
-            with os.fdopen(writer, "wb") as pipe:
-                pickle.dump(found, pipe)
-            os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, "rb") as end:
-        sent = end.read()
-    os.waitpid(child, 0)
-    found = pickle.loads(sent) if sent else ValueError("gmsh fails on this file, which must be damaged")
-    if isinstance(found, ValueError):
-        raise found
-    return found
+            return pool.submit(_merged, path).result()
+        except BrokenProcessPool:
+            raise ValueError("gmsh fails on this file, which must be damaged") from None
+
+
+def _merged(path: Path) -> PlaneMesh:
+    for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT):
+        signal.signal(number, signal.SIG_DFL)  # PETSc's handler would end all ranks
+    try:
+        with own_gmsh() as gmsh:
+            gmsh.merge(str(path))
+            return PlaneMesh.from_gmsh(gmsh)
+    except Exception as error:  # of gmsh
+        raise ValueError(str(error) or "gmsh cannot read this file") from None
