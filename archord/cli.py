@@ -52,7 +52,12 @@ def run(arguments: list[str], begun: float | None = None) -> int:
     """Run the command line ``arguments``, ``begun`` at that time of `perf_counter`; returns the exit code. Only rank 0
     prints."""
     since = perf_counter() if begun is None else begun
-    return run_on_ranks(arguments[0] if arguments else "", lambda: _run(arguments, since))
+    return run_on_ranks(_command(arguments), lambda: _run(arguments, since))
+
+
+def _command(arguments: list[str]) -> str:
+    """The command of a command line, with that of a group behind it."""
+    return " ".join(arguments[: 2 if arguments[:1] == ["benchmark"] else 1])
 
 
 def _run(arguments: list[str], begun: float) -> int:
@@ -67,7 +72,7 @@ def _run(arguments: list[str], begun: float) -> int:
         return error.exit_code
     except (BrokenPipeError, SystemExit):  # the reader, like head, has seen enough; click makes one of the other
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 128 + signal.SIGPIPE if arguments and arguments[0] in COLLECTIVE else 0  # what solves is not done
+        return 128 + signal.SIGPIPE if _command(arguments) in COLLECTIVE else 0  # what solves is not done
     except (KeyboardInterrupt, click.exceptions.Abort):
         _say("archord: interrupted.")
         return 130

@@ -9,7 +9,8 @@ import os
 import sys
 from collections.abc import Callable
 
-COLLECTIVE = ("solve", "reproduce", "sweep")  # commands that all ranks work on; all others are rank 0's alone
+# commands that all ranks work on; all others are rank 0's alone
+COLLECTIVE = ("solve", "reproduce", "sweep", "benchmark stability")
 _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 _SIZE = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
 _LAUNCHER = ("OMPI_COMM_WORLD_", "PMIX_", "PMI_", "SLURM_")  # how their variables begin

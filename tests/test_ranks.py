@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from archord import ranks
+from archord import cli, ranks
 from tests.test_cli import archord
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")
@@ -47,6 +47,15 @@ def test_two_ranks_say_and_write_what_one_does(runs, tmp_path, arguments, writte
 def test_launchers_are_known_by_their_variables(monkeypatch, variables, rank, others):
     monkeypatch.setattr(os, "environ", variables)
     assert (ranks.launcher_rank(), ranks.launched_with_others()) == (rank, others)
+
+
+def test_ranks_take_turns_in_the_stability_benchmark(tmp_path):
+    """All ranks work on it, and on no other benchmark; one table comes of it."""
+    commands = [cli._command(words) for words in (["benchmark", "stability"], ["benchmark", "scaling", "-q"], [])]
+    assert [command in ranks.COLLECTIVE for command in commands] == [True, False, False]
+    result = archord("benchmark", "stability", "--only", "zero*", "-o", str(tmp_path), cwd=tmp_path, ranks=2)
+    assert result.stdout.count("2 scenes in") == 1
+    assert result.stderr.count("done, 4 steps") == 2
 
 
 @pytest.mark.parametrize("rank", ["0", "1"])
