@@ -47,11 +47,9 @@ class Calibration:
 
 
 def calibrate(runs: list[RunCurve], load_range: tuple[float, float] = (0.0, np.inf)) -> Calibration:
-    """Fit the law to each of ``runs`` and to all scenes together, over ``load_range`` of ``delta/dR``.
-
-    Runs of one scene on several meshes give the error of the mesh; the finest of them enters the joint fit. Raises
-    `InputError` where the range, the steps or the runs do not allow a fit.
-    """
+    """Fit the law to each of ``runs`` and to all scenes together, over ``load_range`` of ``delta/dR``; of runs of one
+    scene on several meshes, which give the error of the mesh, the finest. Raises `InputError` where the range, the
+    steps or the runs do not allow a fit."""
     low, high = load_range
     if not 0 <= low < high:
         raise InputError(f"--range {low:g} {high:g}: must be two displacements in clearances, 0 or more and rising.")

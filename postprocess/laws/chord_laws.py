@@ -52,7 +52,7 @@ def liu(joint: LawJoint, delta: Array) -> LawState:
     """An ellipse over the chord (Liu, Zhang and Yang 2007): ``P = (pi/2) E* delta sqrt(delta/(2 (dR + delta)))``,
     ``p0 = E* delta/(2 R)``."""
     alike = parabola(replace(joint, k=_LIU_K), delta)
-    return replace(alike, peak_pressure=joint.E_star * delta / (2 * joint.radius))
+    return alike._replace(peak_pressure=joint.E_star * delta / (2 * joint.radius))
 
 
 def winkler(joint: LawJoint, delta: Array) -> LawState:

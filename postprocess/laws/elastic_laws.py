@@ -18,13 +18,13 @@ P/R is the same for every alpha, and alpha moves only the load at which an angle
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import lambertw
 
 from archord.postprocess.laws.joint import Array, LawJoint
-from archord.postprocess.laws.law import ROUND_OFF, LawState, rising_root
+from archord.postprocess.laws.law import NOTHING, ROUND_OFF, LawState, rising_root
 
 PRINTED_WIDTH = 1.6  # Radzimovsky's d over (R* P/E*)^(1/2): Hu et al., eq. 18
 ROARK_WIDTH = 1.6 * math.sqrt(2)  # Roark's 1.60 goes with K_D = D1 D2/(D1 - D2) = 2 R*
@@ -35,8 +35,7 @@ def hertz(joint: LawJoint, P: Array) -> LawState:
     """Line contact of half-width ``a = 2 sqrt(P R*/(pi E*))``: peak pressure ``p0 = sqrt(P E*/(pi R*))`` and semi-angle
     ``a/R1`` (Johnson 1985, eqs 4.43 and 4.45)."""
     root = np.sqrt(P / (math.pi * joint.E_star * joint.relative_radius))
-    nothing = np.full(np.shape(P), np.nan)
-    return LawState(nothing, P, nothing, joint.E_star * root, 2 * joint.relative_radius * root / joint.radius)
+    return LawState(NOTHING, P, NOTHING, joint.E_star * root, 2 * joint.relative_radius * root / joint.radius)
 
 
 def hertz_load_limit(joint: LawJoint) -> float:
@@ -45,12 +44,8 @@ def hertz_load_limit(joint: LawJoint) -> float:
 
 
 def lankarani_nikravesh(joint: LawJoint, delta: Array) -> LawState:
-    """Static part of Lankarani and Nikravesh: ``P = (4/3) E* sqrt(R*) delta^(3/2) / L``.
-
-    Hertz's ball in a socket (Lankarani and Nikravesh 1990, 1994, without damping), as multibody codes use it for pins,
-    the force divided by the length of the joint; its peak pressure is ``p0 = (2/pi) E* sqrt(delta/R*)`` (Johnson 1985,
-    eq. 4.24).
-    """
+    """Hertz's ball in a socket (Lankarani and Nikravesh 1990, 1994, without damping), as multibody codes use it for
+    pins: ``P = (4/3) E* sqrt(R*) delta^(3/2)/L``, ``p0 = (2/pi) E* sqrt(delta/R*)`` (Johnson 1985, eq. 4.24)."""
     assert joint.length is not None
     root, size = np.sqrt(delta), math.sqrt(joint.relative_radius)
     spring = 4 / 3 * joint.E_star * size / joint.length
@@ -62,8 +57,7 @@ def lankarani_nikravesh_limit(joint: LawJoint) -> float:
     return (joint.radius / 2) ** 2 / joint.relative_radius
 
 
-@dataclass(frozen=True)
-class Logarithm:
+class Logarithm(NamedTuple):
     """The law ``delta = P/(pi E*) [ ln(A/P) + q ]`` of one joint; P per unit length."""
 
     E_star: float
@@ -83,8 +77,7 @@ class Logarithm:
         """The rising branch: ``P = pi E* delta / y``, ``dP/d(delta) = pi E* / (y - 1)``, where the bracket in the law,
         ``y = -W_-1(-delta/(e delta_limit))``, is 1 at the limit and infinite for no displacement; nan beyond."""
         spring, argument = math.pi * self.E_star, -delta / (math.e * self.delta_limit)
-        # at the very limit round-off would give a complex W, or none
-        turning = argument <= -(1 - 1e-15) / math.e
+        turning = argument <= -(1 - 1e-15) / math.e  # where round-off would give a complex W, or none
         y = np.maximum(-lambertw(np.where(turning, -0.1, argument), -1).real, 1.0)
         y = np.where(turning, 1.0, np.where(delta > 0, y, np.inf))
         y = np.where(delta > self.delta_limit * (1 + ROUND_OFF), np.nan, y)
@@ -150,5 +143,4 @@ def persson(joint: LawJoint, P: Array) -> LawState:
     half = rising_root(lambda b: persson_load(joint, 2 * np.arctan(b)), P, 1.0)
     eps = 2 * np.arctan(half)
     p0 = persson_pressure(joint, P, np.where(P > 0, eps, 1.0), np.zeros_like(eps))
-    nothing = np.full_like(eps, np.nan)
-    return LawState(nothing, P, nothing, p0, eps)
+    return LawState(NOTHING, P, NOTHING, p0, eps)

@@ -65,10 +65,8 @@ class FittedLaw(BaseModel):
         return plastic_winkler(self.joint, np.maximum(delta, 0.0)).stiffness
 
     def displacement(self, force: ArrayLike) -> Array:
-        """The inverse of `force` (any shape): 0 where ``force <= 0``, nan where no displacement brings so much.
-
-        The plastic law's force stays below ``2 sqrt(2) c sigY R``, twice the threshold on the longest chord.
-        """
+        """The inverse of `force` (any shape): 0 where ``force <= 0``, nan where no displacement brings so much: the
+        plastic law's force stays below ``2 sqrt(2) c sigY R``."""
         return rising_root(self.force, np.asarray(force, float), self.dR)
 
     @classmethod

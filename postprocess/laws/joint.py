@@ -60,8 +60,7 @@ class LawJoint:
         for name, most in (("dundurs_alpha", 1), ("dundurs_beta", 0.5)):
             if not abs(getattr(self, name)) <= most:
                 raise ValueError(f"{name} = {getattr(self, name):g} must be between {-most:g} and {most:g}.")
-        for name in ("nu", "pin_nu"):
-            value = getattr(self, name)
+        for name, value in (("nu", self.nu), ("pin_nu", self.pin_nu)):
             if value is not None and not -1 < value < 0.5:
                 raise ValueError(f"{name} = {value:g} must be between -1 and 0.5.")
         for name, known in (("plane", (None, "strain", "stress")), ("yielding", YIELDING)):
@@ -87,7 +86,7 @@ class LawJoint:
             dundurs_beta=((1 + alpha) * second - (1 - alpha) * first) / 2,
             plane=plane,
             nu=block.nu,
-            pin_nu=None if pin is None else pin.nu,
+            pin_nu=scene.pin.nu,
             yielding=_yielding(*yields),
             ring=not scene.joint.is_block,
             block_size=scene.joint.W,
@@ -107,11 +106,9 @@ class LawJoint:
 
     @property
     def softer(self) -> tuple[float, float]:
-        """By what share of itself P(delta) is about smaller in this block than in one of `LARGE` R, and at most.
-
-        Widths of 2.5 to 50 R were solved, up to delta = 2 dR: the difference goes with ``(R/W)^2``, times 1.2 to 1.4
-        for like elastic bodies, to 2 for a rigid pin, to 2.4 beyond yield.
-        """
+        """By what share of itself P(delta) is about smaller in this block than in one of `LARGE` R, and at most: from
+        widths of 2.5 to 50 R, solved up to delta = 2 dR. The factor of ``(R/W)^2`` is 1.2 to 1.4 for like elastic
+        bodies, to 2 for a rigid pin, to 2.4 beyond yield."""
         narrow = 0.0 if self.block_size is None else (self.radius / self.block_size) ** 2
         return _SOFTER * narrow, _SOFTEST * narrow
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,15 +21,17 @@ class LawRangeWarning(UserWarning):
     """A law was asked outside its range; the message tells the range."""
 
 
-@dataclass(frozen=True)
-class LawState:
+NOTHING: Array = np.array(np.nan)  # of a quantity that a law says nothing of
+
+
+class LawState(NamedTuple):
     """What a law says at several points; nan where it is outside its range, or says nothing of that quantity."""
 
     delta: Array
     load: Array
     stiffness: Array
-    peak_pressure: Array = field(default_factory=lambda: np.array(np.nan))
-    angle: Array = field(default_factory=lambda: np.array(np.nan))
+    peak_pressure: Array = NOTHING
+    angle: Array = NOTHING
 
 
 @dataclass(frozen=True)
@@ -87,12 +90,12 @@ class Law:
             return self._known(joint, self._inside(joint, load, limit, "P", extrapolate))
         P = self._inside(joint, load, float(self.state(joint, np.array(limit)).load), "P", extrapolate)
         delta = rising_root(lambda x: self.state(joint, x).load, P, limit)
-        return replace(self._known(joint, delta), load=P)
+        return self._known(joint, delta)._replace(load=P)
 
     def _known(self, joint: LawJoint, x: Array) -> LawState:
         """The state at checked points ``x``: nan in, nan out."""
         state = self.state(joint, np.where(x >= 0, x, 0.0))
-        return LawState(*(np.where(x >= 0, getattr(state, each.name), np.nan) for each in fields(LawState)))
+        return LawState(*(np.where(x >= 0, values, np.nan) for values in state))
 
     def _inside(self, joint: LawJoint, x: npt.ArrayLike, limit: float, what: str, extrapolate: bool) -> Array:
         """``x`` with nan where the law has nothing to say; warns about points outside the range."""

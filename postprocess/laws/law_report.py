@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +24,8 @@ def sample(law: Law, joint: LawJoint, by_load: bool, to: float, points: int, ext
     steps = np.arange(1, points + 1) * (to / points) * joint.clearance
     if by_load:
         load = steps * joint.E_star
-        return replace(law.at_load(joint, load, extrapolate), load=load)
-    return replace(law.at_displacement(joint, steps, extrapolate), delta=steps)
+        return law.at_load(joint, load, extrapolate)._replace(load=load)
+    return law.at_displacement(joint, steps, extrapolate)._replace(delta=steps)
 
 
 def law_table(

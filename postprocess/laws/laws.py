@@ -7,7 +7,6 @@ import difflib
 import math
 import tomllib
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +47,7 @@ def _logarithmic(make: Callable[..., elastic.Logarithm], *width: float, hertz: b
             return found
         small = np.where(elastic.hertz_load_limit(joint) >= found.load, found.load, np.nan)
         pressed = elastic.hertz(joint, small)
-        return replace(found, peak_pressure=pressed.peak_pressure, angle=pressed.angle)
+        return found._replace(peak_pressure=pressed.peak_pressure, angle=pressed.angle)
 
     gives = {} if hertz else {"gives": ("displacement",)}
     return {"state": state, "limit": lambda joint: make(joint, *width).delta_limit, **gives}
@@ -96,6 +95,5 @@ def find_law(name: str) -> Law:
     """The law called ``name``; raises ValueError that names the nearest one and all."""
     if name in LAWS:
         return LAWS[name]
-    near = difflib.get_close_matches(name, LAWS, 1)
-    hint = f"did you mean {near[0]}? " if near else ""
+    hint = "".join(f"did you mean {near}? " for near in difflib.get_close_matches(name, LAWS, 1))
     raise ValueError(f"{name}: is not a known law; {hint}Laws are {', '.join(LAWS)}.")
