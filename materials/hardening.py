@@ -84,11 +84,8 @@ class TabularHardening(Hardening):
 
     @classmethod
     def from_engineering(cls, points: Sequence[Sequence[float]], E: float) -> TabularHardening:
-        """From points (engineering strain, engineering stress) of a tension test, the first at first yield.
-
-        The true stress is ``s (1 + e)``, PEEQ is ``ln(1 + e) - s (1 + e) / E``, the logarithmic strain less the
-        elastic one, and 0 at the first point. Raises ValueError.
-        """
+        """From points (engineering strain, engineering stress) of a tension test, the first at first yield: true
+        stress ``s (1 + e)``, PEEQ ``ln(1 + e) - s (1 + e) / E``, but 0 at the first. Raises ValueError."""
         e, s = np.array(points, dtype=float).T
         true = s * (1 + e)
         peeq = np.log1p(e) - true / E

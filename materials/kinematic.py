@@ -36,10 +36,8 @@ class KinematicState(PlasticState):
 @dataclass(frozen=True)
 class KinematicMaterial(J2Material):
     """Elastic-plastic solid with isotropic ``hardening`` and ``back_stresses`` ``(C, gamma)``, moduli and rates of
-    recovery; ``gamma = 0`` is Prager's linear kinematic hardening. With recovery its tangent is not symmetric.
-
-    Raises ValueError unless C is positive and gamma is not negative.
-    """
+    recovery; ``gamma = 0`` is Prager's linear kinematic hardening. With recovery its tangent is not symmetric. Raises
+    ValueError unless C is positive and gamma is not negative."""
 
     back_stresses: tuple[tuple[float, float], ...]
 
@@ -47,6 +45,11 @@ class KinematicMaterial(J2Material):
         """Check the back stresses."""
         if not all(C > 0 and gamma >= 0 for C, gamma in self.back_stresses):
             raise ValueError("moduli of back stresses must be positive, rates of recovery must not be negative")
+
+    @property
+    def _moduli(self) -> Array:
+        """C and gamma ``(2, m)``."""
+        return np.array(self.back_stresses, dtype=float).reshape(-1, 2).T
 
     def state(self, n: int) -> KinematicState:
         """``n`` points that never yielded."""
@@ -99,18 +102,12 @@ class KinematicMaterial(J2Material):
         n = eta / length[:, None]
         flow = np.sqrt(1.5) * d_peeq[:, None] * n
         stress[p] -= 2 * mu * flow
-        modulus = np.array([C for C, _ in self.back_stresses])[:, None]
-        recovery = np.array([gamma for _, gamma in self.back_stresses])
-        before = old.back_stress[p]
-        back = theta[:, :, None] * (before + 2 / 3 * modulus * flow[:, None, :])
+        before, after, (C, gamma) = old.back_stress[p], old.peeq[p] + d_peeq, self._moduli
+        back = theta[:, :, None] * (before + 2 / 3 * C[:, None] * flow[:, None, :])
 
         # stress . d eps_p = yield stress d_peeq + sum of d(a . a) 3 / (4 C) + gamma a . a 3 / (2 C) d_peeq
-        now, between, then = (
-            (a * b) @ _TWICE / modulus[:, 0] for a, b in ((back, back), (back, before), (before, before))
-        )
-        kept = 0.75 * (now - then).sum(axis=1)
-        lost = 0.75 * d_peeq * ((now + between) @ recovery)
-        after = old.peeq[p] + d_peeq
+        now, between, then = (_dot(a, b) / C for a, b in ((back, back), (back, before), (before, before)))
+        kept, lost = 0.75 * (now - then).sum(axis=1), 0.75 * d_peeq * ((now + between) @ gamma)
         isotropic = self.hardening.work(after) - self.hardening.work(old.peeq[p])
         new = KinematicState(*(a.copy() for a in (old.plastic_strain, old.peeq, old.back_stress, old.work)))
         new.plastic_strain[p] += flow
@@ -128,8 +125,7 @@ class KinematicMaterial(J2Material):
         """The increment of PEEQ at which ``sqrt(1.5) |eta| = (3 mu + sum of theta C) d_peeq + yield stress``, with
         ``theta = 1 / (1 + gamma d_peeq)`` and ``eta = trial - sum of theta a``; how fast the difference falls, with
         ``theta``, ``eta`` and its derivative."""
-        _, mu = self.lame
-        C, gamma = np.array(self.back_stresses, dtype=float).reshape(-1, 2).T
+        (_, mu), (C, gamma) = self.lame, self._moduli
         high = np.sqrt(1.5) * (_norm(trial) + _norm(back).sum(axis=1)) / (3 * mu)
         close, start = 1e-14 * high, np.zeros(len(trial))
 

@@ -67,9 +67,8 @@ class Material(Protocol):
 class Points:
     """``n`` points of a ``material``: the committed ``state``, and ``trial``, which belongs to the last strain seen.
 
-    A contact law is a material too, of traction, derivative and state, whose strain are gap, slip and trial traction.
-
-    ``yields`` tells whether they can; with ``elastic_only`` set `update` answers as if they could not (any further).
+    ``yields`` tells whether they can; with ``elastic_only`` set `update` answers as if they could not (any further). A
+    contact law is a material too, of traction, derivative and state, whose strain are gap, slip and trial traction.
     """
 
     def __init__(self, material: Any, n: int) -> None:

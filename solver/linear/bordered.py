@@ -27,11 +27,10 @@ def why_not(facts: Facts) -> str | None:
 
 class Bordered(Strategy):
     """Python context of the bordered matrix and of its preconditioner, which solves with the last one that was
-    factorised.
+    factorised. Collective.
 
     The ``m`` levels are the last entries of rank 0. ``stiffness`` scales what counts as resistance; ``factoriser``
-    gives the strategy for ``A``. ``singular`` numbers the level that a force moves most which nothing resists, None
-    without one. Collective.
+    gives the strategy for ``A``. ``singular`` numbers the level that a force moves most which nothing resists, or None.
     """
 
     def __init__(

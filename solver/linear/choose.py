@@ -12,12 +12,7 @@ from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Strategy
 
 # Every strategy beside MUMPS on the whole matrix, which always goes: None, or why it does not fit the facts.
-RULES = {
-    "bordered": bordered.why_not,
-    "condensed": condensed.why_not,
-    "substructured": substructured.why_not,
-    "lagged": lagged.why_not,
-}
+RULES = {module.__name__.rpartition(".")[2]: module.why_not for module in (bordered, condensed, substructured, lagged)}
 INSTEAD = ("condensed", "substructured")  # of MUMPS on the whole matrix: the first that fits
 LEFT_OUT: set[str] = set()  # strategies to do without; benchmarks and tests set it
 
