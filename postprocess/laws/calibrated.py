@@ -70,9 +70,8 @@ class CalibratedModel:
     "stress both" or "strain block".
 
     ``form`` has the terms of 1/k_e ("elastic"), of A ("late"), and of C in plane "strain" and "stress"; ``elastic`` the
-    coefficients of 1/k_e; ``plastic``, by kind, ``rate`` b, those of A ("late") and C ("threshold"), and from how many
-    cases they are; ``bounds``, by kind, the range of the joints (None: infinite); ``load_range`` is delta/dR of the
-    steps fitted; ``errors`` say how good the model is, ``provenance`` where it is from.
+    coefficients of 1/k_e; ``plastic``, by kind, ``rate`` b, those of A ("late") and C ("threshold"), and their numbers
+    of cases; ``bounds``, by kind, the range of the joints (None: infinite); ``load_range`` is delta/dR of the steps.
     """
 
     data: dict[str, Any]

@@ -49,11 +49,10 @@ def fit(
     predict: Callable[[Array], Array], starts: Sequence[Sequence[float]], data: Array
 ) -> tuple[list[float], list[float]]:
     """Positive parameters that minimise ``sum (predict(parameters) - data)^2``, the best of several ``starts``, and
-    their standard errors.
+    their standard errors, infinite for one without influence.
 
-    The covariance is ``s^2 (J^T J)^-1`` with ``s^2 = sum r^2/(n - m)`` (Seber and Wild 2003, section 2.1). It takes the
-    residuals as independent. A parameter without influence on any prediction gets an infinite error. Raises ValueError
-    unless there are more data than parameters, or where they determine only combinations of parameters.
+    The covariance is ``s^2 (J^T J)^-1`` with ``s^2 = sum r^2/(n - m)`` (Seber and Wild 2003, section 2.1), for
+    independent residuals. Raises ValueError where the data do not determine the parameters and their errors.
     """
     m, n = len(starts[0]), len(data)
     if n <= m:
@@ -126,12 +125,11 @@ class CurveFit:
 
 
 def fit_curve(groups: list[Refined], load_range: tuple[float, float] = (0.0, np.inf), quantity: str = "P") -> CurveFit:
-    """Fit the law to the curve "P" or "p0" of all ``groups``.
+    """Fit the law to the curve "P" or "p0" of all ``groups``: ``c``, too, where two steps or more past the onset of the
+    plateau have yielded indeed, as the slope of an elastic p0(delta) falls, too.
 
-    ``c`` is fitted where two steps or more past the onset of the plateau have yielded indeed: a falling slope alone is
-    no plateau, that of an elastic p0(delta) falls too. Where some scenes have a second mesh, the fit is repeated with
-    their data extrapolated to vanishing element size; the change of a parameter is its discretisation error.
-    Raises `InputError` where too few steps are in the range, or a run's bodies never touch.
+    Where scenes have a second mesh, the fit is repeated with data extrapolated to vanishing element size; the change of
+    a parameter is its discretisation error. Raises `InputError` where the range has too few steps with contact.
     """
     chosen = [(g.run, _selected(g.run, load_range)) for g in groups]
     if quantity == "p0" and sum((run.peeq_max[rows] == 0).sum() for run, rows in chosen) < 2:

@@ -23,8 +23,7 @@ def parameters(calibration: Calibration) -> list[dict[str, Any]]:
     quality of the fit."""
     rows: list[dict[str, Any]] = []
     named = [(fit.residuals[0].name, fit) for fit in calibration.each]
-    if len(calibration.scenes) > 1:
-        named.append(("all together", calibration.joint))
+    named += [("all together", calibration.joint)] if len(calibration.scenes) > 1 else []
     for run, fit in named:
         quality = (fit.r2, fit.rms, fit.largest, len(fit.relative))
         for name, found in fit.estimates.items():
@@ -51,9 +50,8 @@ def notes(calibration: Calibration) -> list[str]:
         said.append(f"mesh: {len(joint.orders)} of {len(scenes)} scenes were given on a second mesh; the joint fit "
                     "counts no other.")  # fmt: skip
     said += [f"mesh: order of convergence of {name}: {order.words}." for name, order in joint.orders]
-    for scene in scenes:
-        said += [f"mesh: {run.name} serves to estimate the discretisation error of {scene.run.name}."
-                 for run in scene.coarser]  # fmt: skip
+    said += [f"mesh: {run.name} serves to estimate the discretisation error of {scene.run.name}."
+             for scene in scenes for run in scene.coarser]  # fmt: skip
     if joint.serial_correlation > _BENT:
         said.append(
             f"s.e.: residuals of neighbouring steps are correlated ({joint.serial_correlation:.2f}): the law's shape "
@@ -71,8 +69,7 @@ def notes(calibration: Calibration) -> list[str]:
 
 def as_json(calibration: Calibration) -> str:
     """The law (see `FittedLaw.from_json`), all fitted parameters, and notes as JSON."""
-    law, fits = calibration.law().model_dump(), parameters(calibration)
-    data = {"law": law, "fits": fits, "notes": notes(calibration)}
+    data = {"law": calibration.law().model_dump(), "fits": parameters(calibration), "notes": notes(calibration)}
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 

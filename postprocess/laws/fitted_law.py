@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.joint import Array, LawJoint
-from archord.postprocess.laws.law import rising_root
+from archord.postprocess.laws.law import LawState, rising_root
 
 _TEMPLATE = Path(__file__).with_suffix(".toml")
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -51,18 +51,17 @@ class FittedLaw(BaseModel):
             raise ValueError("c and sigY belong together; give both or none")
         return self
 
-    @property
-    def joint(self) -> LawJoint:
-        """The joint with the law's coefficients, as the closed-form laws take it."""
-        return LawJoint(self.R, self.dR, self.E_star, self.sigY, k=self.k, c=self.c or 1.0)
+    def _state(self, delta: ArrayLike) -> LawState:
+        joint = LawJoint(self.R, self.dR, self.E_star, self.sigY, k=self.k, c=self.c or 1.0)
+        return plastic_winkler(joint, np.maximum(delta, 0.0))
 
     def force(self, delta: ArrayLike) -> Array:
         """Force per unit thickness of the whole joint at ``delta`` (any shape); 0 where ``delta <= 0``."""
-        return plastic_winkler(self.joint, np.maximum(delta, 0.0)).load
+        return self._state(delta).load
 
     def stiffness(self, delta: ArrayLike) -> Array:
         """``dP/d(delta)`` of `force` (any shape); 0 where ``delta <= 0``."""
-        return plastic_winkler(self.joint, np.maximum(delta, 0.0)).stiffness
+        return self._state(delta).stiffness
 
     def displacement(self, force: ArrayLike) -> Array:
         """The inverse of `force` (any shape): 0 where ``force <= 0``, nan where no displacement brings so much: the

@@ -74,8 +74,8 @@ def _solve(residuals: Callable[[Array], Array], *starts: Array) -> list[float]:
 
 
 def _bounds(cases: Cases, kind: str) -> dict[str, Any]:
-    """The range of a kind. One design covers all kinds, so Poisson's ratios, clearance and the softest pin are from all
-    cases together, the smallest s from those in the plane that yield; the stiffest pin is the kind's own."""
+    """The range of a kind. One design covers all kinds: Poisson's ratios, clearance and the softest pin are those of
+    all cases, the smallest s that of the plane; the stiffest pin is the kind's own."""
     found = {name: _span(cases[name].dropna()) for name in ("nu", "pin_nu", "clearance")}
     same = cases[(cases.plane == kind.split()[0]) & np.isfinite(cases.s)]
     stiffest = cases.alpha[cases.kind == kind].max()
@@ -93,10 +93,10 @@ def _digits(value: float) -> float:
 
 def predictions(model: CalibratedModel, cases: Cases) -> tuple[Array, Array]:
     """k and c of ``model`` for ``cases`` ``(n,)``, of whose kinds they must be."""
-    found = pd.DataFrame(index=cases.index, columns=["k", "c"], dtype=float)
+    found = np.empty((2, len(cases)))
     for kind, same in cases.groupby("kind"):
-        found.loc[same.index] = np.column_stack(model.coefficients(kind, same))
-    return found.k.to_numpy(), found.c.to_numpy()
+        found[:, cases.kind == kind] = model.coefficients(kind, same)
+    return found[0], found[1]
 
 
 def cross_validate(cases: Cases, form: Form = FORM) -> tuple[Array, Array]:
@@ -105,11 +105,10 @@ def cross_validate(cases: Cases, form: Form = FORM) -> tuple[Array, Array]:
     order = np.argsort((cases.kind + cases.digest).to_numpy())
     fold = np.empty(len(cases), int)
     fold[order] = np.arange(len(cases)) % FOLDS
-    k, c = np.empty(len(cases)), np.empty(len(cases))
+    found = np.empty((2, len(cases)))
     for f in range(min(FOLDS, len(cases))):
-        out = fold == f
-        k[out], c[out] = predictions(fit_model(cases[~out], form, plenty=1), cases[out])
-    return k, c
+        found[:, fold == f] = predictions(fit_model(cases[fold != f], form, plenty=1), cases[fold == f])
+    return found[0], found[1]
 
 
 def errors(cases: Cases, k: Array, c: Array) -> pd.DataFrame:
@@ -159,16 +158,15 @@ def shipped_errors(cases: Cases) -> Errors:
     """`by_kind` of the law that comes with archord, of those of ``cases`` that are inside its range."""
     found = [calibrated(joint_of_case(case, 1.0, 1.0)) for case in cases.itertuples()]
     inside = np.array([not law.outside for law in found], bool)
-    k, c = (np.array([getattr(law, name) for law in found])[inside] for name in "kc")
+    k, c = np.array([(law.k, law.c) for law in found if not law.outside]).reshape(-1, 2).T
     return by_kind(cases[inside], k, c) if inside.any() else {}
 
 
 def error_table(found: dict[str, Errors]) -> Table:
     """A row for each kind of joint in ``found``, by what they are the errors of."""
-    shown = [(name, what) for name in ("k", "c", "P") for what in ("rms", "largest")]
-    shown += [("P own", "rms"), ("P early", "rms")]
-    names = {"P own": "own k, c: P"}
-    table = Table("law", "plane", "yields", "cases", *(f"{names.get(name, name)} {what}" for name, what in shown))
+    shown = [*((name, what) for name in "kcP" for what in ("rms", "largest")), ("P own", "rms"), ("P early", "rms")]
+    headings = [f"{name.replace('P own', 'own k, c: P')} {what}" for name, what in shown]
+    table = Table("law", "plane", "yields", "cases", *headings)
     words, forms = {"none": "none (elastic)", "block": "block alone"}, {"rms": ".1%", "largest": "+.1%"}
     for law, kinds in found.items():
         for kind, numbers in kinds.items():

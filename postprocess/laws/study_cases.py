@@ -85,11 +85,8 @@ def fit_case(refined: Refined, load_range: tuple[float, float], name: str) -> di
 def table_of(cases: Iterable[dict[str, Any]]) -> Cases:
     """The table of ``cases``, with what follows from their numbers: ``kind``, Dundurs' ``alpha``, ``m`` and ``n`` of
     pin and block, ``s = sigY R/(E* dR)``, a ``digest``, the same for a joint wherever it stands and random otherwise,
-    and ``clear_c``.
-
-    The last is c where the plateau fills the last third of the range or more, else nan: one that begins later hardly
-    shows in P, and the fit then takes c to mend the shape of the curve.
-    """
+    and ``clear_c``: c where the plateau fills the last third of the range or more, else nan, as one that begins later
+    hardly shows in P, and the fit then takes c to mend the shape of the curve."""
     found = pd.DataFrame(cases, columns=list(COLUMNS)).astype(_TYPES)
     found["kind"] = found.plane + " " + found.yielding
     strain, pin_nu = found.plane == "strain", found.pin_nu.fillna(found.nu)
@@ -146,21 +143,19 @@ def usable(cases: Cases) -> tuple[Cases, list[tuple[str, str]]]:
     """The cases that a model can be fitted to, and the runs of the others with the reason."""
     longest, out = max(load[-1] for load in cases.load), {}
     for case in cases.itertuples():
-        softness = (1 - case.alpha) / 2 * case.m
+        softness, end = (1 - case.alpha) / 2 * case.m, case.load[-1]
         if case.yielding in UNFIT:
             out[case.Index] = UNFIT[case.yielding]
         elif softness > SOFT + 1e-3:
             out[case.Index] = f"{SOFT_WORDS} = {softness:.3g} is more than {SOFT:g}: a soft pin, hardly compressible"
-        elif case.load[-1] < _SHORT * longest:
-            out[case.Index] = f"ends at {case.load[-1]:.3g} dR, others at {longest:.3g}"
+        elif end < _SHORT * longest:
+            out[case.Index] = f"ends at {end:.3g} dR, others at {longest:.3g}"
     return cases.drop(index=list(out)), [(cases.run[index], reason) for index, reason in out.items()]
 
 
 def split(cases: Cases) -> tuple[Cases, Cases]:
-    """Cases to fit and to choose a form with, and `HELD_OUT` of each kind to judge the result by at the end.
-
-    Chosen by the numbers of the joint themselves: always the same ones, however the cases are ordered.
-    """
+    """Cases to fit and to choose a form with, and `HELD_OUT` of each kind to judge the result by at the end: always
+    the same ones, by the numbers of the joint themselves."""
     groups = cases.sort_values("digest").groupby("kind")
     held = [index for _, same in groups for index in same.index[: round(HELD_OUT * len(same))]]
     chosen = cases.index.isin(held)

@@ -47,6 +47,5 @@ class Lagged:
         the active set since the last matrix, or it is ``renewed``."""
         self._changes += changes
         factorise = renewed or iterations > _MANY_SOLVES or self._changes > _MANY_CHANGES
-        if factorise:
-            self._changes = 0
+        self._changes = 0 if factorise else self._changes
         return factorise
