@@ -89,11 +89,9 @@ def return_map(strain: Array, old: PlasticState, m: Elastic, hardening: Hardenin
 def plastic_multiplier(
     a: Array, weights: Array, compliance: Array, hardening: Hardening, peeq: Array
 ) -> tuple[Array, Array]:
-    """``zeta`` and von Mises stress ``q``, ``(n,)`` each, of points that yield.
-
-    With components ``a`` ``(n, k)`` of the trial stress, ``q^2 = sum_k weights_k (a_k / (1 + zeta compliance_k))^2``,
-    and ``d_peeq = 2/3 zeta q`` from the old ``peeq``: the zero of ``1/q - 1/stress(PEEQ)``, which increases.
-    """
+    """``zeta`` and von Mises stress ``q``, ``(n,)`` each, of points that yield: the zero of ``1/q - 1/stress(PEEQ)``,
+    which increases. ``q^2 = sum_k weights_k (a_k / (1 + zeta compliance_k))^2`` with components ``a`` ``(n, k)`` of the
+    trial stress, and ``d_peeq = 2/3 zeta q`` from the old ``peeq``."""
 
     def off(zeta: Array) -> tuple[Array, Array, Array]:
         shrink = 1 + zeta[:, None] * compliance
@@ -111,11 +109,8 @@ def plastic_multiplier(
 
 def bracketed_newton(f: Callable[[Array], tuple], x: Array, low: Array, high: Array) -> tuple[Array, tuple]:
     """Zeros ``(n,)`` of functions that increase, from ``x``, and what ``f`` gives there; not a number where it does not
-    converge.
-
-    ``f(x)`` begins with values, slopes, and how short Newton's step from a zero is. Steps that leave what is known to
-    bracket a zero, as they can where a hardening law is not concave, are halved intervals instead.
-    """
+    converge. ``f(x)`` begins with values, slopes, and how short Newton's step from a zero is. Steps that leave what is
+    known to bracket a zero, as they can where a hardening law is not concave, are halved intervals instead."""
     for _ in range(_ITERATIONS):
         found = off, slope, close, *_ = f(x)
         low, high = np.where(off < 0, x, low), np.where(off > 0, x, high)

@@ -127,11 +127,8 @@ def persson_pressure(joint: LawJoint, P: Array, eps: Array, phi: Array) -> Array
 
 def persson_load(joint: LawJoint, eps: Array) -> Array:
     """Load at which the contact has the semi-angle ``eps``; infinite from the angle on that closes any clearance, 84.83
-    degrees for like bodies.
-
-    ``E* dR/P = [ 2 - (1 + alpha) (ln(1 + b^2) + 2 b^4) ] / [ 2 pi b^2 (1 + b^2) ]`` (Ciavarella and Decuzzi 2001), with
-    alpha positive for the stiffer pin.
-    """
+    degrees for like bodies. ``E* dR/P = [ 2 - (1 + alpha) (ln(1 + b^2) + 2 b^4) ] / [ 2 pi b^2 (1 + b^2) ]``, with
+    alpha positive for the stiffer pin (Ciavarella and Decuzzi 2001)."""
     b2 = np.tan(eps / 2) ** 2
     left = 2 - (1 + joint.dundurs_alpha) * (np.log1p(b2) + 2 * b2**2)
     with np.errstate(divide="ignore"):

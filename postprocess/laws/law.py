@@ -139,11 +139,9 @@ class Law:
 
 
 def rising_root(f: Callable[[Array], Array], target: Array, start: float) -> Array:
-    """Solve ``f(x) = target`` for ``x >= 0`` with ``f`` rising from ``f(0) <= target``; nan where f stays below it.
-
-    Halves brackets until no number is left between their ends; ``start`` is a first guess of the size of x, and f may
-    be nan above some x. Targets that are not positive or nan give 0 and nan. Shapes ``(...)`` in and out.
-    """
+    """Solve ``f(x) = target`` ``(...)`` for ``x >= 0`` with ``f`` rising, until no number is left between the ends of
+    brackets; nan where f stays below it. ``start`` is a first guess of the size of x; f may be nan above some x.
+    Targets that are not positive or nan give 0 and nan."""
     target = np.asarray(target, dtype=float)
     low, high = np.zeros_like(target), np.full_like(target, start)
     while (short := (f(high) < target) & (high < _FAR)).any():

@@ -17,10 +17,8 @@ _POINTS = 400  # of a line of the picture
 
 
 def sample(law: Law, joint: LawJoint, by_load: bool, to: float, points: int, extrapolate: bool) -> LawState:
-    """``points`` states of ``law`` in equal steps up to delta = ``to`` clearances, or P = ``to`` E* dR (``by_load``).
-
-    Outside the range the steps themselves remain, all that the law would say of them is nan.
-    """
+    """``points`` states of ``law`` in equal steps up to delta = ``to`` clearances, or P = ``to`` E* dR (``by_load``);
+    outside the range nan but for the steps themselves."""
     steps = np.arange(1, points + 1) * (to / points) * joint.clearance
     if by_load:
         load = steps * joint.E_star
@@ -61,11 +59,8 @@ def law_table(
 def draw_laws(
     laws: Sequence[Law], joint: LawJoint, target: Path, by_load: bool, to: float, extrapolate: bool = False
 ) -> Path:
-    """Draw force, peak pressure and contact angle of ``laws`` as ``target``; returns the file.
-
-    ``by_load`` displacement, pressure and angle are drawn over the force. Raises `InputError` if ``target`` cannot be
-    written.
-    """
+    """Draw force, peak pressure and contact angle of ``laws``, ``by_load`` displacement, pressure and angle over the
+    force, as ``target``; returns the file. Raises `InputError` if it cannot be written."""
     figure = new_figure(14, 4.4)
     axes = figure.subplots(1, 3)
     for law in laws:

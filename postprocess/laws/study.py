@@ -30,11 +30,8 @@ class TooFewError(ValueError):
 
 
 def fit_model(cases: Cases, form: Form = FORM, plenty: int = 2) -> CalibratedModel:
-    """Least squares of ln k of the elastic cases, then of ln k and ln c of each kind that yields.
-
-    Coefficients have six digits. A kind with less than ``plenty`` cases per coefficient is left out. Raises
-    `TooFewError` where the elastic ones are too few.
-    """
+    """Least squares of ln k of the elastic cases, then of ln k and ln c of each kind that yields, in six digits; no
+    kind of less than ``plenty`` cases per coefficient. Raises `TooFewError` where the elastic ones are too few."""
     elastic = cases[cases.yielding == "none"]
     needed = plenty * len(form["elastic"])
     if len(elastic) < needed:

@@ -39,8 +39,7 @@ class Choice:
     def words(self) -> dict[str, str | dict[str, str]]:
         """The choice for run.json: ``strategy`` names what is used, ``not_used`` has the reasons."""
         used = [name for name, reason in self.why_not.items() if reason is None]
-        if not {*INSTEAD} & {*used}:
-            used.append("direct")
+        used += [] if {*INSTEAD} & {*used} else ["direct"]
         return {"strategy": " + ".join(used), "not_used": {n: r for n, r in self.why_not.items() if r is not None}}
 
 

@@ -49,10 +49,9 @@ class Condensed(Strategy):
     """Python context of the matrix ``K + E D`` and of its preconditioner, which solves with it. Collective.
 
     ``K`` ``(n, n)`` is symmetric and positive definite; ``nodes`` ``(m,)``, sorted, are the block dofs that may get
-    forces, and ``near`` ``(k,)`` those on which they depend, the same on every rank, as is all that is as small as the
-    contact. ``revise(increment)`` goes over to the points that are closed after an increment ``(k, 2)`` of the solution
-    at ``near``, calls `update`, and returns what that adds to the residual at the nodes ``(m, 2)``, or None where
-    nothing changes.
+    forces, ``near`` ``(k,)`` those on which they depend: the same on every rank, as all that is as small as contact.
+    ``revise(increment)`` goes over to the points that are closed after an increment ``(k, 2)`` of the solution at
+    ``near``, calls `update`, and returns what that adds to the residual at the nodes ``(m, 2)``; None for no change.
     """
 
     def __init__(self, K: PETSc.Mat, nodes: np.ndarray, revise: Callable[[Array], Array | None]) -> None:

@@ -47,10 +47,8 @@ def corners(V: fem.FunctionSpace) -> np.ndarray:
 
 def before_corners(n: int, rows: np.ndarray, columns: np.ndarray, corner: np.ndarray) -> np.ndarray:
     """As `nested_dissection`, quicker: only unknowns at corners are ordered by METIS, the others come right before the
-    first one of their corners ``(n, k)``, -1 where that is none of the unknowns.
-
-    That keeps what separates parts: of the nodes of an edge or a cell none is in a part without its corners.
-    """
+    first one of their corners ``(n, k)``, -1 where that is none of the unknowns. That keeps what separates parts: of
+    the nodes of an edge or a cell none is in a part without its corners."""
     alone = corner[:, 0] == np.arange(n)
     number = np.cumsum(alone) - 1
     both = alone[rows] & alone[columns]

@@ -167,10 +167,8 @@ def _places(
     rows: np.ndarray, columns: np.ndarray, last: np.ndarray, corner: np.ndarray, start: int, size: int
 ) -> np.ndarray:
     """Places ``(n,)`` of the dofs in the order of elimination, those that come ``last`` ``(n,)`` behind the others.
-
     Entries are at ``rows`` and ``columns``, in blocks of ``size``. Block ``start + i`` has the blocks ``corner[i]`` at
-    its corners; all that are not last have some.
-    """
+    its corners; all that are not last have some."""
     inner = np.flatnonzero(~last[::size])
     number = np.full(len(last) // size, -1)
     number[inner] = np.arange(len(inner))
