@@ -68,9 +68,8 @@ def on_circles(mesh: PlaneMesh, circles: Sequence[Circle]) -> PlaneMesh:
     return replace(mesh, x=x)
 
 
-def _lattice(mesh: PlaneMesh, order: int) -> tuple[PlaneMesh, np.ndarray]:
-    """Nodes of a higher ``order`` on the cells of ``mesh`` as they are curved, and those on the tagged edges
-    ``(k, order + 1)`` from end to end."""
+def _raised(mesh: PlaneMesh, order: int) -> PlaneMesh:
+    """``mesh`` with nodes of a higher ``order`` on its cells as they are curved."""
     (kind, own), equispaced = cell_kind(mesh.cells.shape[1]), basix.LagrangeVariant.equispaced
     elements = [basix.ufl.element("P", kind, p, equispaced, shape=s) for p, s in ((own, (2,)), (order, ()))]
     made = create_mesh(MPI.COMM_SELF, cells=mesh.cells, x=mesh.x, e=elements[0])
@@ -78,7 +77,6 @@ def _lattice(mesh: PlaneMesh, order: int) -> tuple[PlaneMesh, np.ndarray]:
     cells = np.empty(V.dofmap.list.shape, dtype=np.int64)
     cells[made.topology.original_cell_index] = V.dofmap.list
     sides = cells[:, lagrange_element(kind, order).entity_closure_dofs[1]].reshape(-1, order + 1)
-    along = sides[sides_between(mesh.cells, mesh.edges[:, :2])][:, [0, *range(2, order + 1), 1]]
     apart = np.abs(lagrange_element(kind, order).points[:, None] - lagrange_element(kind, own).points).max(axis=2)
     there, here = np.nonzero(apart < _SAME)
     place = np.full(len(mesh.x), -1)
@@ -86,22 +84,19 @@ def _lattice(mesh: PlaneMesh, order: int) -> tuple[PlaneMesh, np.ndarray]:
     points = {name: place[nodes] for name, nodes in mesh.point_sets.items()}
     if any((nodes < 0).any() for nodes in points.values()):
         raise ValueError(f"point sets have nodes of order {own} that a mesh of order {order} has not")
-    return replace(mesh, x=V.tabulate_dof_coordinates()[:, :2].copy(), cells=cells, point_sets=points), along
-
-
-def _raised(mesh: PlaneMesh, order: int) -> PlaneMesh:
-    made, along = _lattice(mesh, order)
-    return replace(made, edges=along[:, [0, order, *range(1, order)]])
+    x, edges = V.tabulate_dof_coordinates()[:, :2].copy(), sides[sides_between(mesh.cells, mesh.edges[:, :2])]
+    return replace(mesh, x=x, cells=cells, edges=edges, point_sets=points)
 
 
 def _cut(mesh: PlaneMesh) -> PlaneMesh:
     """Each cell of order p cut in four, whose nodes are those of a cell of order 2 p."""
     kind, p = cell_kind(mesh.cells.shape[1])
-    made, along = _lattice(mesh, 2 * p)
+    made = _raised(mesh, 2 * p)
     corner = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [0.5, 0.5]])  # of each part; the last triangle is turned
     size = np.array([0.5, 0.5, 0.5, -0.5 if kind == TRIANGLE else 0.5])
     parts = corner[:, None] + size[:, None, None] * lagrange_element(kind, p).points
     nodes = np.abs(parts[:, :, None] - lagrange_element(kind, 2 * p).points).max(axis=3).argmin(axis=2)
+    along = made.edges[:, [0, *range(2, 2 * p + 1), 1]]
     halves = np.stack([along[:, : p + 1], along[:, p:]], axis=1).reshape(-1, p + 1)[:, [0, p, *range(1, p)]]
     cells, bodies, tags = made.cells[:, nodes].reshape(-1, nodes.shape[1]), mesh.bodies.repeat(4), mesh.tags.repeat(2)
     return replace(made, cells=cells, bodies=bodies, edges=halves, tags=tags)

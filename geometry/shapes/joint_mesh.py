@@ -65,9 +65,8 @@ def mesh_joint(
                 if entities:
                     gmsh.model.addPhysicalGroup(dim, entities, tag, name)
         of_size: dict[str, list[int]] = {}
-        for body, faces in drawn.faces.items():
-            if faces:
-                of_size.setdefault(drawn.sizes[body], []).extend(faces)
+        for body in filter(drawn.faces.get, drawn.faces):
+            of_size.setdefault(drawn.sizes[body], []).extend(drawn.faces[body])
         fields = []
         for expression, faces in of_size.items():
             fields.append(mesh.field.add("MathEval"))
