@@ -21,13 +21,13 @@ Account: TypeAlias = "JointAccount | GeneralAccount"
 Column = tuple[str, Callable[[Any], float | int]]  # heading, and its value of a step
 
 
-def account_of(scene: AnyScene, comm: MPI.Comm, timer: Timer | None = None, partitioner=None) -> Account:
+def account_of(scene: AnyScene, comm: MPI.Comm, timer: Timer | None = None) -> Account:
     """The problem of ``scene``, ready to be solved, and its account. Collective over ``comm``; raises `InputError`."""
     if isinstance(scene, Scene):
-        return JointAccount(Joint(scene, comm, timer=timer, partitioner=partitioner))
+        return JointAccount(Joint(scene, comm, timer=timer))
     from archord.presets.general_account import GeneralAccount
 
-    return GeneralAccount(scene, comm, timer=timer, partitioner=partitioner)
+    return GeneralAccount(scene, comm, timer)
 
 
 def record_type(scene: AnyScene) -> type:

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from archord.materials.material import Array
 from archord.presets.edge import PER_STEP, SurfaceProfile, surface_profiles
 from archord.presets.joint_account import sizes
-from archord.presets.measures import Record, energy_balance
+from archord.presets.measures import Record, costs, energy_balance, headed
 from archord.presets.problem import as_input_error, general_problem, require_mirrored
 from archord.report.timer import Timer
 from archord.scene.problem import LIVE, ProblemScene
@@ -35,10 +35,10 @@ class GeneralAccount:
     fixed: ClassVar[tuple[str, ...]] = ("s", "weight", "X")
     per_step: ClassVar[tuple[str, ...]] = (*PER_STEP, "slip")
 
-    def __init__(self, scene: ProblemScene, comm: MPI.Comm, *, timer: Timer | None = None, partitioner=None) -> None:
+    def __init__(self, scene: ProblemScene, comm: MPI.Comm, timer: Timer | None = None) -> None:
         timer = timer or Timer()
         with timer("mesh"):
-            problem = general_problem(scene, comm, partitioner)
+            problem = general_problem(scene, comm)
         self.scene, self._warnings = scene, list[str]()
         with as_input_error(scene):
             if scene.mesh.shape is None:
@@ -55,15 +55,12 @@ class GeneralAccount:
     def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
         """Headings of history.csv and their values: loads, supports, interactions, bodies, energies, what the step
         cost."""
-        energy = self.scene.units.energy_of(self.scene.analysis.thickness)
-        columns: list[tuple[str, Callable[[Any], float | int]]]
-        columns = [("step", attrgetter("step")), ("load_factor", attrgetter("at"))]
-        for name, unit in self._units().items():
-            columns.append((f"{name} [{unit}]" if unit else name, itemgetter(name)))
-        for name in ("elastic_energy", "plastic_dissipation", "work"):
-            columns.append((f"{name} [{energy}]", attrgetter(name)))
-        columns += [(name, attrgetter(name)) for name in ("force_balance", "iterations", "cutbacks")]
-        return [*columns, ("seconds [s]", attrgetter("seconds"))]
+        energies = ("elastic_energy", "plastic_dissipation", "work")
+        last = dict.fromkeys(energies, self.scene.units.energy_of(self.scene.analysis.thickness))
+        last |= {"force_balance": "", "iterations": "", "cutbacks": "", "seconds": "s"}
+        first = ("step", attrgetter("step")), ("load_factor", attrgetter("at"))
+        values = [(headed(name, unit), itemgetter(name)) for name, unit in self._units().items()]
+        return [*first, *values, *((headed(name, unit), attrgetter(name)) for name, unit in last.items())]
 
     def _units(self) -> dict[str, str]:
         """Units of all values, by name and in order."""
@@ -117,19 +114,12 @@ class GeneralAccount:
         for body in system.problem.bodies:
             if body.material.yields:
                 values += system.largest_peeq(body)
-        stored, dissipated = system.energies()
         return Record(
-            step=len(before) + 1,
             at=system.equilibrium.load,
             values=dict(zip(self._units(), map(float, values), strict=True)),
             contact_area=area,
-            elastic_energy=stored,
-            plastic_dissipation=dissipated,
-            work=work,
             force_balance=system.force_balance(),
-            iterations=step.iterations,
-            cutbacks=step.cutbacks,
-            seconds=seconds,
+            **costs(before, step, system.energies(), work, seconds),
         )
 
     def facts(self) -> dict[str, Any]:

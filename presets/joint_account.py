@@ -15,7 +15,7 @@ from archord.geometry.basis import bulk_quadrature, cell_basis
 from archord.presets.arc import SYMMETRY, ArcProfile, arc_profiles, peak_pressure, semi_angle
 from archord.presets.edge import PER_STEP
 from archord.presets.joint import Joint
-from archord.presets.measures import Measures, energy_balance
+from archord.presets.measures import Measures, costs, energy_balance, headed
 from archord.solver.stepping import Step
 from archord.solver.system import System
 
@@ -60,7 +60,7 @@ class JointAccount:
         columns: list[tuple[str, Callable[[Any], float | int]]] = []
         for name in [field.name for field in fields(Measures)]:
             scale, divisor, unit = scales.get(name, ("", 1.0, ""))
-            columns.append((f"{name} [{unit}]" if unit else name, attrgetter(name)))
+            columns.append((headed(name, unit), attrgetter(name)))
             if scale:
                 columns.append((f"{name}/{scale}", partial(_over, name, divisor)))
         return columns
@@ -79,7 +79,6 @@ class JointAccount:
         """The measures of the last accepted state, which follows the steps ``before``. Collective."""
         joint, arcs = self.system, list(profiles.values())
         peeq, peeq_integral = joint.peeq()
-        stored, dissipated = joint.energies()
         forces, delta = joint.forces(), joint.delta()
         P = forces["pin"]
         area = SYMMETRY * float(np.mean([(p.in_contact * p.width).sum() for p in arcs]))
@@ -87,7 +86,6 @@ class JointAccount:
         scale = max(abs(P), *(abs(m.P) for m in before), at_rest)
         eps = float(np.mean([semi_angle(p) for p in arcs]))
         return Measures(
-            step=len(before) + 1,
             delta=delta,
             P=P,
             p0=peak_pressure(arcs, eps),
@@ -95,13 +93,8 @@ class JointAccount:
             contact_area=area,
             peeq_max=peeq,
             peeq_integral=peeq_integral,
-            elastic_energy=stored,
-            plastic_dissipation=dissipated,
-            work=work,
             force_balance=max(abs(f - P) for f in forces.values()) / scale if scale else 0.0,
-            iterations=step.iterations,
-            cutbacks=step.cutbacks,
-            seconds=seconds,
+            **costs(before, step, joint.energies(), work, seconds),
         )
 
     def facts(self) -> dict[str, dict[str, Any]]:

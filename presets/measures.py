@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from archord.solver.stepping import Step
+
 
 @dataclass(frozen=True)
 class Measures:
@@ -76,6 +78,20 @@ class Work:
         """Add the step from the last ``delta`` to this one, where the load is ``force``."""
         self.total += float(np.sum(0.5 * np.add(force, self.force) * np.subtract(delta, self.delta)))
         self.delta, self.force = (np.asarray(value).tolist() for value in (delta, force))
+
+
+def costs(
+    before: Sequence[Any], step: Step, energies: tuple[float, float], work: float, seconds: float
+) -> dict[str, Any]:
+    """What both kinds of records tell of a ``step`` that follows the steps ``before``."""
+    energy = {"elastic_energy": energies[0], "plastic_dissipation": energies[1], "work": work}
+    cost = {"iterations": step.iterations, "cutbacks": step.cutbacks, "seconds": seconds}
+    return {"step": len(before) + 1} | energy | cost
+
+
+def headed(name: str, unit: str) -> str:
+    """The heading of a column, with its unit if it has one."""
+    return f"{name} [{unit}]" if unit else name
 
 
 def energy_balance(steps: Sequence[Measures | Record], fit: int = 0, *, contact: bool = True) -> float | None:

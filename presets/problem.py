@@ -26,13 +26,13 @@ _SHAPES: dict[str, Callable[..., TaggedMesh]] = {"lug": lug, "bushing": bushing,
 _AXES = {"x": 0, "y": 1, "rotation": 2}
 
 
-def general_problem(scene: ProblemScene, comm: MPI.Comm, partitioner=None) -> Problem:
-    """The problem that ``scene`` states; ``partitioner`` as for `gmsh_to_mesh`. Collective over ``comm``.
+def general_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
+    """The problem that ``scene`` states. Collective over ``comm``.
 
     Raises `InputError`: a file that is no mesh, a set that it does not have, a problem that contradicts itself.
     """
     with as_input_error(scene):
-        return _Builder(scene, scene_mesh(scene, comm, partitioner)).problem()
+        return _Builder(scene, scene_mesh(scene, comm)).problem()
 
 
 @contextmanager
@@ -46,34 +46,32 @@ def as_input_error(scene: ProblemScene) -> Iterator[None]:
         raise InputError(said if said.endswith((".", "?")) else f"{said}.") from None
 
 
-def scene_mesh(scene: ProblemScene, comm: MPI.Comm, partitioner=None) -> TaggedMesh:
+def scene_mesh(scene: ProblemScene, comm: MPI.Comm) -> TaggedMesh:
     """The mesh of ``scene``. Collective; raises ValueError."""
     mesh = scene.mesh
     if mesh.shape is not None:
         shape = mesh.shape.arguments()
-        return _SHAPES[shape.pop("kind")](comm, degree=scene.analysis.degree, partitioner=partitioner, **shape)
+        return _SHAPES[shape.pop("kind")](comm, degree=scene.analysis.degree, **shape)
     from archord.geometry.meshes.read import read_mesh, tagged  # with scipy, which solves of presets do without
 
     source = LIVE.get(mesh.file or "", mesh.file)
     circles = [Circle(circle.facets, (circle.centre[0], circle.centre[1]), circle.radius) for circle in mesh.circle]
-    options = {"scale": mesh.scale, "order": mesh.order, "refine": mesh.refine, "partitioner": partitioner}
-    return read_mesh(tagged(*source) if isinstance(source, tuple) else source, comm, circles=circles, **options)
+    given = tagged(*source) if isinstance(source, tuple) else source
+    return read_mesh(given, comm, circles=circles, scale=mesh.scale, order=mesh.order, refine=mesh.refine)
 
 
 def require_mirrored(scene: ProblemScene, system: System) -> None:
     """Raise ValueError where a rigid coupling of a part with mirror images shares nodes with an edge that is held in
     one direction, as a mirror line is, and could leave that line or turn. Collective."""
-    of, couplings = system.problem.mesh, [c for c in scene.coupling if c.kind == "rigid"]
     fixed: dict[str, set[str]] = {}
     for support in scene.support:
         fixed.setdefault(support.on, set()).update(support.fixed)
-    edges = {on: min(axes) for on, axes in fixed.items() if len(axes) == 1 and on not in {c.name for c in couplings}}
-    for coupling in couplings if scene.analysis.symmetry > 1 else []:
-        nodes = of.dofs_in(system.V, coupling.facets)
-        for on, axis in edges.items():
-            shared = len(np.intersect1d(nodes, of.dofs_in(system.V, on)))
-            free = [freedom for freedom in (axis, "rotation") if freedom not in fixed.get(coupling.name, ())]
-            if free and system.comm.allreduce(shared):
+    held = {c.name: fixed.pop(c.name, set()) for c in scene.coupling}
+    for coupling in scene.coupling if scene.analysis.symmetry > 1 else []:
+        for on, axis in [(on, *axes) for on, axes in fixed.items() if len(axes) == 1 and coupling.kind == "rigid"]:
+            ends, edge = (system.problem.mesh.dofs_in(system.V, name) for name in (coupling.facets, on))
+            free = [freedom for freedom in (axis, "rotation") if freedom not in held[coupling.name]]
+            if free and system.comm.allreduce(len(np.intersect1d(ends, edge))):
                 raise ValueError(
                     f"the rigid coupling {coupling.name!r} of a part with mirror images meets {on!r}, which is held in "
                     f"{axis}: hold its {' and '.join(free)}, too, in a [[support]]"

@@ -112,16 +112,13 @@ def samples(hypercube: LatinHypercube) -> list[Overrides]:
     """
     from scipy.stats import qmc
 
-    ranges = list(hypercube.ranges.values())
-    generator = np.random.default_rng(hypercube.seed)
-    points = qmc.LatinHypercube(d=len(ranges), seed=generator).random(hypercube.number)
-    log = np.array([r.scale == "log" for r in ranges])
-    ends = np.array([[r.low, r.high] for r in ranges])
-    ends[log] = np.log(ends[log])
-    values = ends[:, 0] + points * (ends[:, 1] - ends[:, 0])
-    values[:, log] = np.exp(values[:, log])
-    rounded = [[float(f"{value:.{_DIGITS}g}") for value in row] for row in values]
-    return [dict(zip(hypercube.ranges, row, strict=True)) for row in rounded]
+    ranges, generator = hypercube.ranges, np.random.default_rng(hypercube.seed)
+    columns = qmc.LatinHypercube(d=len(ranges), seed=generator).random(hypercube.number).T
+    for k, r in enumerate(ranges.values()):
+        low, high = np.log([r.low, r.high]) if r.scale == "log" else (r.low, r.high)
+        values = low + columns[k] * (high - low)
+        columns[k] = np.exp(values) if r.scale == "log" else values
+    return [{key: float(f"{v:.{_DIGITS}g}") for key, v in zip(ranges, row, strict=True)} for row in columns.T]
 
 
 def combinations(found: list[Factor]) -> list[Overrides]:
