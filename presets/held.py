@@ -10,7 +10,6 @@ from mpi4py import MPI
 from archord.geometry.meshes.check import check_mesh, free_motions
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.plane_mesh import PlaneMesh
-from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.materials.material import Array
 from archord.scene.problem import ProblemScene
 from archord.solver.problem import Problem
@@ -36,15 +35,13 @@ def check(scene: ProblemScene, problem: Problem) -> list[str]:
     whole, failure = gathered(mesh), ""
     owner = {name: problem.body_of(name).name for part in scene.interaction for name in part.surfaces}
     if whole is not None:
-        failure = next(_loose(scene, mesh, whole, cells, owner), "")
+        failure = next(_loose(scene, whole, cells, owner), "")
     if failure := mesh.mesh.comm.bcast(failure):
         raise ValueError(failure)
     return warnings
 
 
-def _loose(
-    scene: ProblemScene, mesh: TaggedMesh, whole: PlaneMesh, cells: dict[str, str], owner: dict[str, str]
-) -> Iterator[str]:
+def _loose(scene: ProblemScene, whole: PlaneMesh, cells: dict[str, str], owner: dict[str, str]) -> Iterator[str]:
     """What is said of bodies that neither supports nor contact hold; a turning one in contact is no fault."""
     facets = {c.name: c.facets for c in scene.coupling}
     held: dict[str, list[tuple[Array, Array]]] = {body: [] for body in cells}
@@ -63,18 +60,15 @@ def _loose(
     for part in scene.interaction:
         edges = whole.x[whole.edges[np.isin(whole.tags, whole.facet_sets[part.surfaces[-1]])][:, :2]]
         middle, chord = edges.mean(axis=1), edges[:, 1] - edges[:, 0]
-        normals = [np.stack([chord[:, 1], -chord[:, 0]], axis=1) / np.linalg.norm(chord, axis=1)[:, None]]
-        if part.law == "tied":
-            normals.append(chord / np.linalg.norm(chord, axis=1)[:, None])
-        for normal in normals:
+        chord /= np.linalg.norm(chord, axis=1)[:, None]
+        across = np.stack([chord[:, 1], -chord[:, 0]], axis=1)
+        for direction in (across, chord) if part.law == "tied" else (across,):
             if part.rigid:
-                held[owner[part.surfaces[-1]]].append((middle, normal))
+                held[owner[part.surfaces[-1]]].append((middle, direction))
             else:
-                links.append((owner[part.surfaces[0]], owner[part.surfaces[1]], middle, normal))
-    touched = {body for a, b, _, _ in links for body in (a, b)} | {owner[p.surfaces[-1]] for p in scene.interaction}
-    for body, free in free_motions(held, links).items():
-        free = [motion for motion in free if motion != "rotation" or body not in touched]
-        if free:
+                links.append((owner[part.surfaces[0]], owner[part.surfaces[1]], middle, direction))
+    for body, motions in free_motions(held, links).items():
+        if free := [motion for motion in motions if motion != "rotation" or body not in owner.values()]:
             yield f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a [[support]]"
 
 

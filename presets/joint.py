@@ -96,12 +96,8 @@ def joint_mesh(
 
 def core_density(centre: Sequence[float], radius: float) -> Callable[[Any], Any]:
     """Density of a force, as `Load` takes it: a paraboloid within a circle."""
-
-    def density(x):
-        ray = x - ufl.as_vector(list(centre))
-        return ufl.max_value(1 - ufl.dot(ray, ray) / radius**2, 0)
-
-    return density
+    middle = ufl.as_vector(list(centre))
+    return lambda x: ufl.max_value(1 - ufl.dot(x - middle, x - middle) / radius**2, 0)
 
 
 def _coarser(scene: Scene) -> Scene:
@@ -112,10 +108,8 @@ def _coarser(scene: Scene) -> Scene:
         "relative_element_size": None,
         "growth": max(g.growth, min(_RATIO * g.growth, _STEEPEST)),
     }
-    analysis = {"tolerance": max(scene.analysis.tolerance, _COARSE_TOLERANCE)}
-    return scene.model_copy(
-        update={"joint": g.model_copy(update=sizes), "analysis": scene.analysis.model_copy(update=analysis)}
-    )
+    analysis = scene.analysis.model_copy(update={"tolerance": max(scene.analysis.tolerance, _COARSE_TOLERANCE)})
+    return scene.model_copy(update={"joint": g.model_copy(update=sizes), "analysis": analysis})
 
 
 class Joint(System):

@@ -13,8 +13,8 @@ import threading
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -71,16 +71,16 @@ def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Res
         with lock:
             report(result)
 
-    def ended(case: Case, future: Future) -> None:
+    def ended(future: Future) -> None:
         if not future.cancelled():
             error = future.exception()
-            finish(Result(case.run, "failed", f"{error}") if error else future.result())
+            finish(Result(of[future].run, "failed", f"{error}") if error else future.result())
 
-    handed = [(case, executor.submit(solve_case, case, folder)) for case in cases]
-    for case, future in handed:
-        future.add_done_callback(partial(ended, case))
+    of = {executor.submit(solve_case, case, folder): case for case in cases}
+    for future in of:
+        future.add_done_callback(ended)
     if MPI.Query_thread() == MPI.THREAD_MULTIPLE:  # else the manager's thread must be the only one that calls MPI
-        for case, future in reversed(handed):
+        for future, case in reversed(of.items()):
             if future.cancel():
                 finish(solve_case(case, folder))
 
@@ -97,10 +97,8 @@ def solve_case(case: Case, folder: Path) -> Result:
         result = _solved(case, run)
     except Exception as error:
         sentence = " ".join(f"{type(error).__name__}: {error}".split())
-        try:
+        with suppress(OSError):
             replace_file(run / FAILURE, f"{sentence}\n\n{''.join(traceback.format_exception(error))}")
-        except OSError as unwritten:
-            sentence += f" ({run / FAILURE} cannot be written: {unwritten.strerror})"
         result = Result(case.run, "failed", sentence)
     gc.collect()
     return replace(result, seconds=perf_counter() - begun)

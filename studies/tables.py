@@ -30,10 +30,7 @@ Row = list[str]
 @dataclass(frozen=True)
 class Result:
     """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be written), "failed"
-    (an error), "interrupted", "busy" (another process solves it) or "open" (not solved to its end).
-
-    ``seconds`` are those of this process.
-    """
+    (an error), "interrupted", "busy" (another process solves it) or "open"; ``seconds`` are those of this process."""
 
     run: str
     status: str
