@@ -58,15 +58,10 @@ def _located(x: Array, triangles: np.ndarray, to: Array) -> tuple[np.ndarray, Ar
         nearest = compute_closest_entity(tree, everything, mesh, places[lost])
         point, cell = np.append(point, lost), np.append(cell, nearest)
     cell = np.asarray(mesh.topology.original_cell_index)[cell]
-    X = _reference_points(x[triangles[cell]], to[point])
+    corners = x[triangles[cell]]
+    edges, ray = corners[:, 1:] - corners[:, :1], to[point] - corners[:, 0]
+    X = np.linalg.solve(np.swapaxes(edges, 1, 2), ray[..., None])[..., 0]
     smallest = np.minimum(X.min(axis=1), 1 - X.sum(axis=1))  # barycentric coordinate
     order = np.lexsort((-smallest, point))
     best = order[np.unique(point[order], return_index=True)[1]]
     return cell[best], X[best]
-
-
-def _reference_points(corners: Array, to: Array) -> Array:
-    """Coordinates ``(k, 2)`` of the points ``to`` in the reference triangle of those with ``corners`` ``(k, 3, 2)``."""
-    (ax, ay), (bx, by) = (corners[:, i].T - corners[:, 0].T for i in (1, 2))
-    dx, dy = to.T - corners[:, 0].T
-    return np.stack([by * dx - bx * dy, ax * dy - ay * dx], axis=1) / (ax * by - bx * ay)[:, None]

@@ -33,7 +33,6 @@ __all__ = ["create_vector", "distribute", "gathered", "gmsh_to_mesh", "strips"]
 
 Cut = Callable[[Array, np.ndarray, int], np.ndarray]
 
-
 _ALL_QUADS = 3  # gmsh's number of the recombination that leaves no triangles; it halves the edges of all lines
 
 with suppress(TypeError, ValueError):  # a handler of another language, or not the main thread
