@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import logging
 import signal
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from archord.output.folder import is_sweep
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
+from archord.scene import file as scene_file
 from archord.scene.errors import InputError
-from archord.scene.file import AnyScene, find_mesh
-from archord.scene.file import load_scene as load_scene_file
+from archord.scene.file import AnyScene
 from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
 from archord.scene.problem import LIVE, ProblemScene
@@ -24,10 +25,7 @@ if TYPE_CHECKING:
 
 
 def load(folder: str | Path) -> Any:
-    """The results in ``folder``: a `Run`, or a `Sweep` if it is a sweep's folder. Raises `InputError` for neither.
-
-    As the folder alone tells which, a type checker knows more of ``Run(folder)`` and ``Sweep(folder)``.
-    """
+    """The results in ``folder``: a `Run`, or a `Sweep` if it is a sweep's folder. Raises `InputError` for neither."""
     if not Path(folder).is_dir():
         raise InputError(f"{folder}: is not a folder; give the folder of a run or of a sweep.")
     return Sweep(folder) if is_sweep(folder) else Run(folder)
@@ -38,8 +36,8 @@ def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> An
 
     Raises `InputError` with one sentence per fault.
     """
-    given = {key: "" if value is None else toml_value(plain(value)) for key, value in (changes or {}).items()}
-    return load_scene_file(path, [f"{key}={value}" for key, value in given.items()])
+    given = ((key, "" if value is None else toml_value(plain(value))) for key, value in (changes or {}).items())
+    return scene_file.load_scene(path, [f"{key}={value}" for key, value in given])
 
 
 def Problem(
@@ -59,13 +57,13 @@ def Problem(
     """
     if isinstance(mesh, (str, Path, Mapping, Mesh)):
         mesh = {"file": str(mesh)} if isinstance(mesh, (str, Path)) else plain(mesh)
-        find_mesh(mesh, Path())
+        scene_file.find_mesh(mesh, Path())
     else:
         name = f"mesh {len(LIVE) + 1} given from Python"
         LIVE[name], mesh = mesh, {"file": name}
     parts = {"body": bodies, "interaction": interactions, "coupling": couplings, "support": supports, "load": loads}
-    kind: Any = ProblemScene
-    return kind(mesh=mesh, **{name: list(part) for name, part in parts.items()}, **sections)
+    sections |= {"mesh": mesh, **{name: list(part) for name, part in parts.items()}}
+    return ProblemScene(**sections)
 
 
 def solve(
@@ -79,27 +77,20 @@ def solve(
     """Solve ``scene`` (or the scene file of that name) into ``folder``, and give back the run. Collective over ``comm``
     (all ranks).
 
-    An occupied folder is refused without ``force``. ``progress`` reports steps on rank 0 as ``archord solve`` does. A
-    run that could not reach its end has the status "stopped", and the logger "archord" warns of it; its accepted steps
-    stay.
-
-    Raises `InputError` for bad input, on all ranks, and KeyboardInterrupt for Ctrl-C (SystemExit for SIGTERM and
-    SIGHUP) once the steps accepted so far are on disk.
+    An occupied folder is refused without ``force``. ``progress`` reports steps on rank 0 as ``archord solve`` does. Of
+    a run that could not reach its end (status "stopped") the logger "archord" warns. Raises `InputError` on all ranks,
+    and KeyboardInterrupt for Ctrl-C (SystemExit for SIGTERM and SIGHUP) once the accepted steps are on disk.
     """
     from mpi4py import MPI
 
     from archord.progress import solve_and_report
 
+    checked: Callable[[], AnyScene] = partial(load_scene, scene) if isinstance(scene, (str, Path)) else lambda: scene
     comm = MPI.COMM_WORLD if comm is None else comm
-
-    def checked() -> AnyScene:
-        return load_scene(scene) if isinstance(scene, (str, Path)) else scene
-
     _, outcome = solve_and_report(checked, Path(folder), comm, force=force, silent=not progress)
     if outcome.status == "interrupted":
-        if outcome.signal == signal.SIGINT:
-            raise KeyboardInterrupt(outcome.message)
-        raise SystemExit(128 + outcome.signal)
+        by_user = outcome.signal == signal.SIGINT
+        raise KeyboardInterrupt(outcome.message) if by_user else SystemExit(128 + outcome.signal)
     if outcome.status == "stopped" and comm.rank == 0:
         # not warnings.warn: importing ffcx sends warnings to a logger that shows nothing
         logging.getLogger("archord").warning("archord: %s: %s.", folder, outcome.message)

@@ -74,7 +74,7 @@ def _start(folder: Path, scene: AnyScene) -> Start:
     n = checkpoint.step
     reached, wanted = np.array(before.travelled[:n]), np.array(scene.travelled[:n])
     if len(wanted) < n or (np.abs(wanted - reached).max(0) > _SAME * np.abs(reached).max(0)).any():
-        said = f"{scene.loading} and its steps must begin as those of the run, {before.loads_said}"
+        said = f"{scene.loading} and its steps must begin as those of the run"
         raise InputError(f"{path}: its {n} steps are not the first ones of the scene's path; {said}.")
     path = folder / "run.json"
     try:
@@ -91,7 +91,7 @@ def _start(folder: Path, scene: AnyScene) -> Start:
 
 def _same_but_for_the_load(folder: Path, own: AnyScene, scene: AnyScene) -> None:
     """Raise `InputError` naming a key that differs between the run's ``own`` scene and ``scene``, unless it may."""
-    if own.loaded_by != scene.loaded_by:
+    if own.loading != scene.loading:
         raise InputError(f"{folder}: was loaded by {own.loading}; {scene.loading} cannot continue it.")
     a, b = scene_keys(own), scene_keys(scene)
     for key in sorted({*a, *b}):

@@ -118,7 +118,7 @@ def _without_mesh(scene: Scene) -> tuple:
     g, analysis = scene.joint, scene.analysis
     sizes = (g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.targets[-1])
     rounded = tuple(float(f"{size:.9g}") for size in sizes)
-    return (*rounded, tuple(scene.load.leg_steps), tuple(scene.load.legs),
+    return (*rounded, tuple(scene.load.stage_steps), tuple(scene.load.stages),
             scene.pin.model_dump_json(), scene.block.model_dump_json(),
             analysis.plane, analysis.kinematics, analysis.integration)  # fmt: skip
 

@@ -65,8 +65,9 @@ class GeneralAccount:
     def _units(self) -> dict[str, str]:
         """Units of all values, by name and in order."""
         scene, units = self.scene, self.scene.units
-        length, force, moment = units.length, scene.force_unit, units.energy_of(scene.analysis.thickness)
-        area = f"{length}{3 if scene.analysis.thickness else 2}"  # displaced, over the thickness a volume
+        length, thickness = units.length, scene.analysis.thickness
+        force, moment = units.force_of(thickness), units.energy_of(thickness)
+        area = f"{length}{3 if thickness else 2}"  # displaced, over the thickness a volume
         found: dict[str, str] = {}
         for load in scene.load:
             pair = ("rad", moment) if load.direction == "rotation" else (length, force)

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from archord.scene.errors import InputError
 from archord.scene.faults import shortened
-from archord.scene.problem import ProblemScene, is_problem
+from archord.scene.problem import ProblemScene
 from archord.scene.scene import CHOSEN, Scene
 from archord.scene.sections import LOADS
-from archord.scene.shapes import PRESETS, expand
+from archord.scene.shapes import PRESETS
 
 ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
-    "load": [(*LOADS, "path")],
+    "load": [(*LOADS, "pressure", "path")],
 }
 _BROUGHT = {"material": ("E", "nu", "yield_stress", "hardening")}
 _LARGEST_FILE = 10**6  # bytes
 _DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}")
-
 
 AnyScene = Scene | ProblemScene
 
@@ -37,8 +38,11 @@ def parse_scene(data: dict[str, Any], source: str = "scene", origin: Mapping[str
 
 def parse_any(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> AnyScene:
     """As `parse_scene`, of a joint, a general scene or a preset that stands for one."""
-    data, origin = expand(data, source, origin), None if {*PRESETS} & {*data} else origin
-    scene: Any = ProblemScene if is_problem(data) else Scene
+    preset: Any = next((scene for name, scene in PRESETS.items() if name in data), None)
+    if preset is not None:
+        data, origin = preset(source, origin, **data).general(), None
+    general = "joint" not in data and not {"mesh", "body", "interaction"}.isdisjoint(data)
+    scene: Any = ProblemScene if general else Scene
     return scene(source, origin, **data)
 
 
@@ -78,13 +82,13 @@ def set_later(key: str) -> bool:
 
 
 def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
-    """The files that `load_scene` reads: the scene and, if it has one, that of its load.path. Raises `InputError`."""
+    """The files that `load_scene` and a solve read: the scene, that of its load.path, its mesh. Raises `InputError`."""
     data = read_toml(path)
     for override in overrides:
         override_key(data, override)
-    load = data.get("load")
-    targets = load.get("path") if isinstance(load, dict) else None
-    return [path, path.parent / targets] if isinstance(targets, str) else [path]
+    tables = (data.get("load"), "path"), (data.get("mesh"), "file")
+    named = [table.get(key) for table, key in tables if isinstance(table, dict)]
+    return [path, *(path.parent / name for name in named if isinstance(name, str))]
 
 
 def _give_way(data: dict[str, Any], overrides: Sequence[str]) -> None:
@@ -131,10 +135,9 @@ def read_text(path: str | Path) -> str:
 
 def read_toml(path: str | Path) -> dict[str, Any]:
     """What the TOML file ``path`` holds. Raises `InputError`."""
+    text = read_text(path)
     try:
-        return _parsed(read_text(path))
-    except InputError:
-        raise
+        return _parsed(text)
     except (ValueError, RecursionError) as error:  # also whole numbers of thousands of digits, dates like 0000-00-00
         raise InputError(f"{path}: is not valid TOML: {shortened(str(error))}.") from None
 
@@ -147,31 +150,24 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def override_key(data: dict[str, Any], override: str) -> str:
-    """Set one ``a.b=value`` in ``data`` (value: TOML, a number, else text; nothing: drop it); returns the dotted
-    key."""
+    """Set one ``a.b=value`` in ``data``, or ``a.NAME.b=value`` in one of its tables (value: TOML, a number, else text;
+    nothing: drop it); returns the key as faults name it. Raises `InputError`."""
     key, sign, text = override.partition("=")
     section, dot, name = key.strip().partition(".")
-    if isinstance(data.get(section), list):
-        return _in_table(data[section], section, name, override)
-    if "\n" in override or not (sign and dot and section and name and "." not in name):
-        raise InputError(f"--set {override!r}: must read section.key=value, like joint.clearance=0.01.")
-    put(data, section, name, _value(text.strip()) if text.strip() else None, f"--set {override}")
-    return f"{section}.{name}"
-
-
-def _in_table(tables: list[Any], section: str, place: str, override: str) -> str:
-    """As `override_key`, of the key ``place``, NAME.KEY, of one of the ``tables`` of a section."""
-    name, dot, key = place.rpartition(".")
-    found = next((table for table in tables if isinstance(table, dict) and table.get("name") == name), None)
-    text = override.partition("=")[2].strip()
-    if not (dot and key and found is not None and "=" in override):
-        names = ", ".join(str(table.get("name")) for table in tables if isinstance(table, dict))
+    value = _value(text.strip()) if text.strip() else None
+    tables = data.get(section)
+    if not isinstance(tables, list):
+        if "\n" in override or not (sign and dot and section and name and "." not in name):
+            raise InputError(f"--set {override!r}: must read section.key=value, like joint.clearance=0.01.")
+        put(data, section, name, value, f"--set {override}")
+        return f"{section}.{name}"
+    known = {str(table.get("name")): table for table in reversed(tables) if isinstance(table, dict)}
+    part, _, name = name.rpartition(".")
+    if not (sign and name and part in known):
+        names = ", ".join(reversed(known))
         raise InputError(f"--set {override!r}: must read {section}.NAME.key=value, with a name among {names}.")
-    for other in (key, *_BROUGHT.get(key, ())):
-        found.pop(other, None)
-    if text:
-        found[key] = _value(text)
-    return f'{section} "{name}".{key}'
+    put({section: known[part]}, section, name, value, override)
+    return f"{section} {json.dumps(part)}.{name}"
 
 
 def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) -> None:
@@ -192,13 +188,11 @@ def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) ->
 
 
 def _value(text: str) -> Any:
-    try:
-        return _parsed(f"value = {text}")["value"]
-    except (ValueError, RecursionError):
-        try:
-            return float(text)
-        except ValueError:
-            return text
+    """A value of TOML, a number, else text."""
+    for read in (lambda text: _parsed(f"value = {text}")["value"], float):
+        with suppress(ValueError, RecursionError):
+            return read(text)
+    return text
 
 
 def resolved(scene: AnyScene) -> str:
@@ -206,17 +200,14 @@ def resolved(scene: AnyScene) -> str:
     import tomli_w
 
     data = scene.model_dump(exclude_none=True)
-    if scene.analysis.accuracy is not None:
-        for section, key in (name.split(".") for name in CHOSEN):
-            data.get(section, {}).pop(key, None)
-    if isinstance(scene, ProblemScene):
-        return tomli_w.dumps(data)
-    joint = data["joint"]
-    joint["block_size"] = scene.joint.W
-    if scene.analysis.accuracy is None and "element_size" not in joint:
-        joint.setdefault("relative_element_size", 0.04)
-    if scene.pin.rigid:
-        data["pin"] = {"rigid": True}
+    if isinstance(scene, Scene):
+        data["joint"]["block_size"] = scene.joint.W
+        if "element_size" not in data["joint"]:
+            data["joint"].setdefault("relative_element_size", 0.04)
+        if scene.pin.rigid:
+            data["pin"] = {"rigid": True}
+    for section, key in (name.split(".") for name in CHOSEN if scene.analysis.accuracy is not None):
+        data.get(section, {}).pop(key, None)
     return tomli_w.dumps(data)
 
 

@@ -3,82 +3,54 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from archord.scene.keys import Positive, Section, key, require
+from archord.scene.keys import Positive, Section, given, key, require
 
 _WIDEST = 1e6  # block_size over R
 _MOST_CELLS = 1e6  # triangles: some 10 GB, and minutes for a mesh generator that is not parallel
 Model = Literal["block", "ring"]
+Angle = Annotated[float, Field(gt=0, lt=math.pi / 2)]
 
 
 class JointGeometry(Section):
     """The pin of radius ``R`` in a hole of radius ``R + dR``, and the mesh of both."""
 
     model: Model = key(
-        "block: the paper's quarter joint, pressed at the pin's horizontal diameter; ring: half a whole pin in a ring "
-        "held at its outer edge, loaded by a force at the pin's core (Persson's joint)",
-        default="block",
+        "block: the paper's quarter joint; ring: a ring and half a pin, loaded at its core (Persson)", default="block"
     )
     radius: float = key("radius R of the pin", "length", gt=0, example=10.0)
-    clearance: float | None = key(
-        "dR = hole radius - pin radius, 1e-6 to 0.5 R; in a ring also negative", "length", default=None, other=0.05
-    )
+    clearance: float | None = key("dR = hole radius - pin radius; in a ring also negative", "length", other=0.05)
     relative_clearance: float | None = key("dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005)
-    block_size: Positive | None = key(
-        "width and depth of the block, or radius of the ring: from the hole's diameter to 1e6 R; 100 R if absent",
-        "length",
-        default=None,
-        other=1000.0,
-    )
-    element_size: Positive | None = key(
-        "edge length of the elements on the arcs, 1e-4 to 0.5 times R", "length", default=None, other=0.4
-    )
-    relative_element_size: Positive | None = key(
-        "element_size / R, instead of element_size: 1e-4 to 0.5; 0.04 if both are absent", default=None, example=0.04
-    )
-    size_ratio: float = key(
-        "element size on the pin's arc over element_size, which is that on the hole's", default=1.0, ge=0.01, le=100
-    )
-    edge_angle: float | None = key(
-        "block: angle [rad] at which the contact will end; elements shrink toward it",
-        default=None,
-        other=1.0,
-        gt=0,
-        lt=math.pi / 2,
-    )
+    block_size: Positive | None = key("side of the block, radius of the ring; 100 R if absent", "length", other=1000.0)
+    element_size: Positive | None = key("edge length of the elements on the arcs, up to 0.5 R", "length", other=0.4)
+    relative_element_size: Positive | None = key("element_size/R; 0.04 if both are absent", default=None, example=0.04)
+    size_ratio: float = key("element size on the pin's arc over that on the hole's", default=1.0, ge=0.01, le=100)
+    edge_angle: Angle | None = key("block: angle [rad] of the contact's end; elements shrink toward it", other=1.0)
     edge_ratio: float = key("element size at edge_angle over element_size", default=0.25, ge=0.01, le=1)
     growth: float = key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
 
     @model_validator(mode="after")
     def _geometry(self) -> JointGeometry:
+        name = given(self, ("clearance", "relative_clearance"))
+        require(1e-30 <= self.radius <= 1e30, "radius", "must be between 1e-30 and 1e30; choose other units")
         dR, h = self.dR / self.radius, self.h / self.radius
-        name = self._given("clearance")
-        require(getattr(self, name) is not None, "clearance", "is missing (or relative_clearance)")
         require(dR > 0 or self.is_ring, name, "must be positive: only a ring may have an interference")
         require(1e-6 <= abs(dR) <= 0.5, name, "must be between 1e-6 and 0.5 times the radius, in a ring or minus that")
-        name = self._given("element_size")
+        sizes = "element_size", "relative_element_size"
+        name = sizes[0] if self.relative_element_size is None else given(self, sizes)
         require(1e-4 <= h <= 0.5, name, "must be between 1e-4 and 0.5 times the radius")
         on_pin = self.size_ratio * h
         require(1e-4 <= on_pin <= 0.5, "size_ratio", "must leave the pin elements of 1e-4 to 0.5 times the radius")
         require(self.edge_angle is None or not self.is_ring, "edge_angle", "is only for the model block")
-        holds = 2 * (self.radius + self.dR) <= self.W
-        require(holds, "block_size", "must be at least twice the radius of the hole")
+        require(2 * (self.radius + self.dR) <= self.W, "block_size", "must be at least twice the radius of the hole")
         require(self.W / self.radius <= _WIDEST, "block_size", f"must not exceed {_WIDEST:g} times the radius")
-        cells, most = self.expected_cells, f"{_MOST_CELLS:.0e}"
-        require(
-            cells <= _MOST_CELLS, name, f"with growth = {self.growth:g} makes {cells:.0e} of at most {most} triangles"
-        )
+        cells = self.expected_cells
+        said = f"with growth = {self.growth:g} makes {cells:.0e} of at most {_MOST_CELLS:.0e} triangles"
+        require(cells <= _MOST_CELLS, name, said)
         return self
-
-    def _given(self, name: str) -> str:
-        """The key that holds the length ``name``: itself, or the ratio to R in its place."""
-        absolute = getattr(self, name) is not None
-        both = absolute and getattr(self, f"relative_{name}") is not None
-        require(not both, name, f"must not be given together with relative_{name}")
-        return name if absolute else f"relative_{name}"
 
     @property
     def expected_cells(self) -> float:

@@ -7,26 +7,42 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-LINE = r"^[^\x00-\x1f]*$"  # a pattern: text on one line
-SEPARATOR = "\0"  # of the parts of a key
+Name = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f]*$")]  # text on one line
 Positive = Annotated[float, Field(gt=0)]
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 def key(
     description: str, unit: str = "", *, default: Any = ..., example: Any = None, other: Any = None, **limits: Any
 ) -> Any:
     """A documented key; its ``unit`` is the scene's unit of that kind. ``--example`` shows ``example``, by default the
-    ``default``, or commented out what ``other`` scenes may say."""
+    ``default``, or commented out what ``other`` scenes may say of a key that is absent (None) by default."""
     shown = example if other is None else other
+    default = None if default is ... and other is not None else default
     extra: Any = {"unit": unit, "shown": default if shown is None else shown, "hidden": other is not None}
     return Field(default, description=description, json_schema_extra=extra, **limits)
 
 
-def require(holds: bool, name: str | tuple[str, ...], said: str) -> None:
-    """Raise ValueError unless it ``holds`` what is ``said`` of the key ``name``: "section.key", or the section, the
-    name of one of its tables and the key there."""
+class Fault(ValueError):
+    """What is ``said`` of the key at ``place``: of its section, or below sections or the names of tables."""
+
+    def __init__(self, place: tuple[str, ...], said: str) -> None:
+        super().__init__(said)
+        self.place = place
+
+
+def require(holds: bool, place: str | tuple[str, ...], said: str) -> None:
+    """Raise `Fault` unless it ``holds`` what is ``said`` of the key at ``place``, a tuple or "section.key"."""
     if not holds:
-        raise ValueError(f"{name if isinstance(name, str) else SEPARATOR.join(name)}|{said}")
+        raise Fault(tuple(place.split(".")) if isinstance(place, str) else place, said)
+
+
+def given(section: BaseModel, names: tuple[str, ...]) -> str:
+    """The one key among ``names`` that ``section`` has. Raises `Fault` unless it has exactly one."""
+    found = [name for name in names if getattr(section, name) is not None]
+    require(len(found) > 0, names[0], f"is missing (or {', '.join(names[1:])})")
+    require(len(found) == 1, found[0], f"must not be given together with {' and '.join(found[1:])}")
+    return found[0]
 
 
 def toml_value(value: Any) -> str:
@@ -39,4 +55,5 @@ def toml_value(value: Any) -> str:
 class Section(BaseModel):
     """A section of a scene: no unknown keys, no conversions, no numbers that are not finite, not to be changed."""
 
+    # a section that no scene uses is not built: that of all takes as long as all the rest of a start
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True)

@@ -9,9 +9,8 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from archord.materials.hardening import Hardening, LinearHardening, SwiftHardening, TabularHardening, VoceHardening
 from archord.materials.named import metal
-from archord.scene.keys import Positive, Section, key
+from archord.scene.keys import Fault, Pair, Positive, Section, key, require
 
-_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 _LAWS = {"Voce": {"saturation", "rate"}, "Swift": {"offset", "exponent"}, "a tension test": {"engineering"}}
 
 
@@ -23,14 +22,12 @@ class HardeningLaw(Section):
     rate: Positive | None = key("Voce: how fast it gets there", default=None)
     offset: Positive | None = key("Swift: PEEQ by which the power law is shifted", default=None)
     exponent: Annotated[float, Field(gt=0, le=1)] | None = key("Swift: exponent of the power law", default=None)
-    engineering: list[_Pair] | None = key("points [strain, stress] of a tension test", default=None, min_length=1)
+    engineering: list[Pair] | None = key("points [strain, stress] of a tension test", default=None, min_length=1)
 
     @model_validator(mode="after")
     def _one_law(self) -> HardeningLaw:
-        given = set(self.model_dump(exclude_none=True))
-        if given not in _LAWS.values():
-            laws = "; or ".join(f"{' and '.join(sorted(keys))} ({law})" for law, keys in _LAWS.items())
-            raise ValueError(f"|must have {laws}")
+        laws = "; or ".join(f"{' and '.join(sorted(keys))} ({law})" for law, keys in _LAWS.items())
+        require(set(self.model_dump(exclude_none=True)) in _LAWS.values(), (), f"must have {laws}")
         return self
 
 
@@ -40,36 +37,33 @@ def _kind(value: Any) -> str:
 
 HardeningKey = Annotated[
     Annotated[float, Field(ge=0), Tag("number")]
-    | Annotated[list[_Pair], Field(min_length=1), Tag("list")]
+    | Annotated[list[Pair], Field(min_length=1), Tag("list")]
     | Annotated[HardeningLaw, Tag("law")],
     Discriminator(_kind),
 ]
 
 
-def with_material(data: Any, unit: str) -> Any:
-    """The keys ``data`` of a solid with those of the metal that ``material`` names, in the ``unit`` of stress, unless
-    they have their own; its hardening goes with its own yield stress alone. Raises ValueError."""
-    name = data.get("material") if isinstance(data, dict) else None
-    if not isinstance(name, str) or data.get("rigid"):
+def filled(data: Any, unit: str) -> Any:
+    """The keys ``data`` of a solid with those that they leave open: those of the metal that ``material`` names, in the
+    ``unit`` of stress, whose hardening goes with its own yield stress alone; and the yield stress that a table or a
+    tension test says. Raises `Fault`."""
+    if not isinstance(data, dict):
         return data
-    try:
-        found = metal(name, unit)
-    except ValueError as error:
-        raise ValueError(f"material|{error}") from None
-    if "hardening" in data or "yield_stress" in data:
-        del found["hardening"]
-    return found | data
-
-
-def with_yield_stress(data: Any) -> Any:
-    """The keys ``data`` of a solid with the yield stress that its table or tension test says, unless they have one."""
-    hardening = data.get("hardening") if isinstance(data, dict) else None
+    if isinstance(name := data.get("material"), str) and not data.get("rigid"):
+        try:
+            found = metal(name, unit)
+        except ValueError as error:
+            raise Fault(("material",), str(error)) from None
+        if "hardening" in data or "yield_stress" in data:
+            del found["hardening"]
+        data = found | data
+    hardening = data.get("hardening")
     with suppress(TypeError, ValueError, IndexError, KeyError):  # what is no table is refused later
         if isinstance(hardening, dict):
             strain, stress = hardening["engineering"][0]
-            data = {"yield_stress": stress * (1 + strain)} | data
-        elif hardening is not None:
-            data = {"yield_stress": hardening[0][1]} | data
+            return {"yield_stress": stress * (1 + strain)} | data
+        if hardening is not None:
+            return {"yield_stress": hardening[0][1]} | data
     return data
 
 

@@ -3,45 +3,33 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from itertools import product
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from archord.scene.keys import key, require
-from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Path, ProblemAnalysis, Support
-from archord.scene.scene import RANGE, SOFTEST, WEAKEST, Checked
-from archord.scene.sections import MOST_STEPS, ProblemOutput, Stepping, Units
+from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Path, Support
+from archord.scene.scene import STEPS, Checked, require_solids
+from archord.scene.sections import ProblemAnalysis, ProblemOutput, Stepping, Units, steps_of
 
 FORMAT = 2
-CHOSEN = ("stepping", "initial"), ("stepping", "maximum")  # what an accuracy chooses, beside the mesh
 # parts whose names must differ, as results, reactions and drives are found by them
-_APART = {
-    "body": (),
-    "interaction": ("body", "coupling"),
-    "coupling": (),
-    "support": ("coupling", "load"),
-    "load": (),
-}
+_APART = {"body": (), "interaction": ("body", "coupling"), "coupling": (), "support": ("coupling", "load"), "load": ()}
 LIVE: dict[str, Any] = {}  # meshes given from Python, by what stands in the place of their file
 
 
 class MeshScene(Checked):
     """A mesh alone, with the keys of its section."""
 
-    newest: ClassVar[int] = FORMAT
+    format: Literal[2] = 2
     mesh: Mesh = Field(description="the mesh")
 
 
 class ProblemScene(Checked):
-    """Bodies on a mesh, what they touch, what holds them and what loads them.
+    """Bodies on a mesh, what they touch, what holds them and what loads them; made as `Scene`. Raises `InputError`."""
 
-    As `Scene`, of sections; `[[body]]` and its like are lists of tables. Raises `InputError`.
-    """
-
-    newest: ClassVar[int] = FORMAT
     format: Literal[2] = key("version of the scene format", default=FORMAT)
     units: Units = Field(default_factory=Units, description="names of the units")
     mesh: Mesh = Field(description="the mesh")
@@ -62,25 +50,13 @@ class ProblemScene(Checked):
                 alike = [p for p in getattr(self, other) if p.name == part.name and p is not part]
                 said = f"must not be the name of {'another' if other == section else 'a'} {other}, too"
                 require(not alike, (section, part.name, "name"), said)
-        used = [name for i in self.interaction for name in i.surfaces]
-        many = [name for name, count in Counter(used).items() if count > 1]
+        used = Counter(name for i in self.interaction for name in i.surfaces)
+        many = [name for name, count in used.items() if count > 1]
         require(not many, "interaction", f"uses the facet sets {many} more than once")
         self._directions()
-        stiffest = max(body.E for body in self.body)
-        for body in self.body:
-            at = "body", body.name
-            require(RANGE[0] <= body.E <= RANGE[1], (*at, "E"), "must be between 1e-30 and 1e30; choose other units")
-            require(stiffest <= body.E / SOFTEST, (*at, "E"), f"must be at least {SOFTEST:g} of the largest E")
-            strong = body.yield_stress is None or body.yield_stress >= WEAKEST * body.E
-            require(strong, (*at, "yield_stress"), f"must be at least {WEAKEST:g} times E")
-        for section, name in CHOSEN if self.analysis.accuracy is not None else ():
-            free = name not in getattr(self, section).model_fields_set
-            require(free, f"{section}.{name}", "must not be given together with analysis.accuracy, which chooses it")
-        steps = self.path.steps
-        n = self.n_stages
-        fits = not isinstance(steps, list) or len(steps) == n
-        require(fits, "path.steps", f"must have one number for each of the {n} stages")
-        require(len(self.targets) <= MOST_STEPS, "path.steps", f"must not add up to more than {MOST_STEPS} steps")
+        require_solids({("body", name): body for name, body in self.solids.items()})
+        self.require_open(STEPS)
+        steps_of(self.path.steps, self.n_stages, "path.steps")
         return self
 
     def _directions(self) -> None:
@@ -97,10 +73,7 @@ class ProblemScene(Checked):
             said = f"repeats {freedom!r} of {on!r}, which {before} holds or loads already"
             require(before is None or on not in couplings | discs, at, said)
             seen[on, freedom] = f"the {section} {name!r}"
-        for support in self.support:
-            require(
-                support.on not in discs, ("support", support.name, "on"), "must not be a rigid disc, which stands still"
-            )
+            require(section == "load" or on not in discs, (section, name, "on"), "must not be a rigid disc")
         for load in self.load:
             free = load.kind != "pressure" or load.on not in couplings | discs
             require(free, ("load", load.name, "on"), "must be a facet set for a pressure")
@@ -123,9 +96,7 @@ class ProblemScene(Checked):
     @property
     def targets(self) -> list[float]:
         """The load factor at every output step; stage k ends at k."""
-        steps = self.path.steps
-        each = steps if isinstance(steps, list) else [steps] * self.n_stages
-        counts = [self.path.fit_steps] * self.fits + each
+        counts = [self.path.fit_steps] * self.fits + steps_of(self.path.steps, self.n_stages, "path.steps")
         return [stage + k / n for stage, n in enumerate(counts) for k in range(1, n + 1)]
 
     @property
@@ -140,11 +111,6 @@ class ProblemScene(Checked):
         return False
 
     @property
-    def loaded_by(self) -> Any:
-        """What a run must be loaded by to be continued with this scene."""
-        return [(load.name, load.on, load.direction, load.kind) for load in self.load]
-
-    @property
     def accurate(self) -> str:
         """Name of what an accuracy is asked of."""
         load = self.load[-1]  # that of its two columns which it does not prescribe
@@ -152,30 +118,10 @@ class ProblemScene(Checked):
 
     @property
     def loading(self) -> str:
-        """The loads in words."""
-        return "load " + ", ".join(f'"{load.name}"' for load in self.load)
+        """What a run must be loaded by to be continued with this scene, in words."""
+        return " and ".join(f'load "{q.name}" ({q.kind} {q.direction or ""} on {q.on})' for q in self.load)
 
     @property
-    def loads_said(self) -> str:
-        """Values and steps in words."""
-        return f"{[load.stages for load in self.load]} and {self.path.steps}"
-
-    @property
-    def thickness(self) -> float:
-        """Thickness, 1 if forces are per unit thickness."""
-        return self.analysis.thickness or 1.0
-
-    @property
-    def force_unit(self) -> str:
-        """Unit of forces."""
-        return self.units.force_of(self.analysis.thickness)
-
-    @property
-    def plastic(self) -> bool:
-        """Whether any body can yield."""
-        return any(body.yield_stress is not None for body in self.body)
-
-
-def is_problem(data: Mapping[str, Any]) -> bool:
-    """Whether ``data`` is meant as a general scene."""
-    return "joint" not in data and not {"mesh", "body", "interaction"}.isdisjoint(data)
+    def solids(self) -> dict[str, Body]:
+        """The bodies by name."""
+        return {body.name: body for body in self.body}

@@ -9,23 +9,16 @@ from archord.materials.named import metals
 from archord.report.table import Table
 from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
-from archord.scene.problem import ProblemScene
-from archord.scene.scene import FORMAT, Scene
-from archord.scene.shapes import PRESETS, Preset
+from archord.scene.problem import FORMAT, ProblemScene
+from archord.scene.scene import FORMAT as JOINT_FORMAT
+from archord.scene.scene import Scene
+from archord.scene.shapes import PRESETS
 
-_GENERAL: dict[str, Any] = {}
-for _name, _info in ProblemScene.model_fields.items():
-    if _name != "format":
-        _GENERAL[_name] = _info
-    if _name == "mesh":
-        _GENERAL["mesh.circle"] = Mesh.model_fields["circle"]
-_SECTIONS: dict[str, Any] = {name: info for name, info in Scene.model_fields.items() if name != "format"}
-_PRESETS = {
-    name: info
-    for scene in PRESETS.values()
-    for name, info in scene.model_fields.items()
-    if name not in Preset.model_fields
-} | {"load": Preset.model_fields["load"]}
+_JOINT: dict[str, Any] = {name: info for name, info in Scene.model_fields.items() if name != "format"}
+_GENERAL: dict[str, Any] = {name: info for name, info in ProblemScene.model_fields.items() if name != "format"}
+_GENERAL["mesh.circle"] = Mesh.model_fields["circle"]
+_OWN = ("lug", "plate", "bushing", "sleeve", "housing", "load")  # sections of presets
+_PRESETS = {name: scene.model_fields[name] for scene in PRESETS.values() for name in _OWN if name in scene.model_fields}
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 _KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false", "array": "list"}
 
@@ -33,7 +26,7 @@ _KINDS = {"number": "number", "integer": "whole number", "string": "text", "bool
 def example(general: bool = False) -> str:
     """A commented scene that shows every key, of a joint or a ``general`` one; alternatives and absent defaults are
     commented out."""
-    sections, version = (_GENERAL, ProblemScene.newest) if general else (_SECTIONS, FORMAT)
+    sections, version = (_GENERAL, FORMAT) if general else (_JOINT, JOINT_FORMAT)
     text = f"# An archord scene: archord solve scene.toml\n\nformat = {version}  # version of the scene format\n"
     for section, info in sections.items():
         text += f"\n{_heading(section, info)}  # {info.description}\n"
@@ -49,23 +42,21 @@ def reference() -> str:
     """All sections and keys as Markdown tables."""
     parts = [
         "# Scene reference\n",
-        "Printed by `archord scene --reference`. Units are the scene's own: any consistent set.\n",
-        "A scene with the section `[joint]` is one of a pin in a hole; one with `[mesh]` is a general one, of any "
-        "bodies on any mesh.\n",
-        "Above the sections a scene may say the version of its format, and what archord writes does say it: "
-        f"`format = {FORMAT}`, of a general scene `format = {ProblemScene.newest}`. A scene of a newer version is "
-        "refused.\n",
+        "Printed by `archord scene --reference`. Units are the scene's own: any consistent set. A scene may begin with "
+        f"the version of its format, `format = {JOINT_FORMAT}`, of a general scene `format = {FORMAT}`, and what is "
+        "written by archord does so. A scene of a newer version is refused.\n",
         "# Joints\n",
-        *_tables(_SECTIONS, {}),
+        "A scene with the section `[joint]` is one of a pin in a hole.\n",
+        *_tables(_JOINT, {}),
         "# General scenes\n",
-        "The sections units, stepping and output are those of joints. Headings in double brackets may stand any number "
-        "of times.\n",
-        *_tables(_GENERAL, {name: _SECTIONS[name] for name in ("units", "analysis", "stepping", "output")}),
+        "A scene with the section `[mesh]` is a general one, of any bodies on any mesh. The sections units, stepping "
+        "and output are those of joints. Headings in double brackets may stand any number of times.\n",
+        *_tables(_GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}),
         "# Presets\n",
         "A scene with `[lug]` (and `[plate]`) or `[bushing]` (and `[[sleeve]]`, `[housing]`) stands for a general one, "
         "which `archord scene --expand` prints. The section pin is that of joints, plate, sleeves and housing have "
         "materials like it, and the other sections are those of general scenes.\n",
-        *_tables(_PRESETS, dict.fromkeys(("plate", "sleeve", "housing"), _SECTIONS["block"])),
+        *_tables(_PRESETS, dict.fromkeys(("plate", "sleeve", "housing"), _JOINT["block"])),
     ]
     return "\n".join(parts)
 
@@ -110,7 +101,7 @@ def _keys(section: Any) -> Iterator[tuple[str, Any, dict[str, Any]]]:
 
 def _allowed(schema: dict[str, Any]) -> str:
     """Type and limits of a key from its JSON schema, for a table."""
-    kinds = schema.get("anyOf", schema.get("oneOf", [schema]))
+    kinds = [kind for part in schema.get("anyOf", [schema]) for kind in part.get("oneOf", [part])]
     one, *more = [s for s in kinds if s.get("type") != "null"]
     if "enum" in one:
         return ", ".join(f"`{toml_value(value)}`" for value in one["enum"])

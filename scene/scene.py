@@ -1,14 +1,10 @@
-"""The scene: a joint and its loading, checked, with every key's unit and default.
-
-Any consistent set of units will do; ``[units]`` only names them. Where a key has an alternative (``clearance`` and
-``relative_clearance``), the scene gives one of the two.
-"""
+"""The scene: a joint and its loading, checked, with every key's unit and default; in any consistent set of units."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
@@ -19,18 +15,15 @@ from archord.scene.geometry import JointGeometry
 from archord.scene.keys import Section, key, require
 from archord.scene.sections import Analysis, Load, Output, Pin, Solid, Stepping, Units
 
-RANGE = 1e-30, 1e30  # of lengths and moduli; powers of them must not leave the range of numbers
 FORMAT = 1  # version of the scene format: rises when a scene gets a meaning that an older archord would get wrong
-SOFTEST = 1e-8  # ratio of the moduli
-WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
-# what an accuracy chooses
-CHOSEN = ("joint.element_size", "joint.relative_element_size", "joint.growth", "stepping.initial", "stepping.maximum")
+STEPS = ("stepping.initial", "stepping.maximum")  # what an accuracy chooses of any scene, and of a joint
+CHOSEN = ("joint.element_size", "joint.relative_element_size", "joint.growth", *STEPS)
+_SOFTEST = 1e-8  # ratio of the moduli
+_WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
 
 
 class Checked(Section):
-    """A scene, checked: sections given as tables or as their classes; `newest` is the version of its format."""
-
-    newest: ClassVar[int] = FORMAT
+    """A scene, checked: sections given as tables or as their classes; the default ``format`` is the newest."""
 
     def __init__(self, source: str = "scene", origin: Mapping[str, str] | None = None, /, **sections: Any) -> None:
         """Check ``sections`` as read from ``source``; ``origin`` names another source of some keys."""
@@ -38,9 +31,9 @@ class Checked(Section):
             data = plain(sections)
         except RecursionError:
             raise InputError(f"{source}: is not a scene: its tables are nested too deeply.") from None
-        version = data.get("format", self.newest)
-        if isinstance(version, int) and version > self.newest:  # it may hold anything else that is unknown here
-            said = f"is for a newer archord; this one reads format {self.newest}"
+        version, newest = data.get("format"), type(self).model_fields["format"].default
+        if isinstance(version, int) and version > newest:  # it may hold anything else that is unknown here
+            said = f"is for a newer archord; this one reads format {newest}"
             raise InputError(f"{source}: format = {version} {said}.")
         try:
             units = data.get("units")
@@ -48,6 +41,24 @@ class Checked(Section):
             self.__pydantic_validator__.validate_python(data, self_instance=self, context=context)
         except ValidationError as error:
             raise InputError(in_sentences(error.errors(), data, type(self), source, dict(origin or {}))) from None
+
+    def require_open(self: Any, chosen: tuple[str, ...]) -> None:
+        """Raise `Fault` if the scene gives a key of those that its accuracy chooses."""
+        for name in chosen if self.analysis.accuracy is not None else ():
+            section, key = name.split(".")
+            table = getattr(self, section)
+            free = key not in table.model_fields_set or getattr(table, key) is None
+            require(free, name, "must not be given together with analysis.accuracy, which chooses it")
+
+    @property
+    def thickness(self: Any) -> float:
+        """Thickness, 1 if forces are per unit thickness."""
+        return self.analysis.thickness or 1.0
+
+    @property
+    def plastic(self: Any) -> bool:
+        """Whether any body can yield."""
+        return any(solid.yield_stress is not None for solid in self.solids.values())
 
 
 class Scene(Checked):
@@ -69,33 +80,19 @@ class Scene(Checked):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        joint, pin, load = self.joint, self.pin, f"load.{self.load.name}"
-        for name in CHOSEN if self.analysis.accuracy is not None else ():
-            section, key = name.split(".")
-            given: BaseModel = getattr(self, section)
-            free = key not in given.model_fields_set or getattr(given, key) is None
-            require(free, name, "must not be given together with analysis.accuracy, which chooses it")
+        joint, pin, load = self.joint, self.pin, f"load.{self.load.kind}"
+        self.require_open(CHOSEN)
+        require_solids({(name,): body for name, body in self.solids.items()})
         said = 'must be "block" or "both": a rigid pin has no contact edge to integrate'
         require(not pin.rigid or self.analysis.integration != "pin", "analysis.integration", said)
-        sizes = {"joint.radius": joint.radius} | {f"{name}.E": body.E for name, body in self.solids.items()}
-        for name, size in sizes.items():
-            require(RANGE[0] <= size <= RANGE[1], name, "must be between 1e-30 and 1e30; choose other units")
-        for name, body in self.solids.items():
-            strong = body.yield_stress is None or body.yield_stress >= WEAKEST * body.E
-            require(strong, f"{name}.yield_stress", f"must be at least {WEAKEST:g} times {name}.E")
-            allowed = not isinstance(body.hardening, float) or body.hardening <= body.E / WEAKEST
-            require(allowed, f"{name}.hardening", f"must not exceed {1 / WEAKEST:g} times {name}.E")
-        alike = all(SOFTEST <= body.E / self.block.E <= 1 / SOFTEST for body in self.solids.values())
-        require(alike, "pin.E", "must be between 1e-8 and 1e8 times block.E (or set rigid = true)")
         if joint.is_ring:
             said = 'does not load a joint whose model is "ring"; give force or relative_force'
             require(self.force_controlled, load, said)
             require(not pin.rigid, "pin.rigid", 'must be false where joint.model is "ring"')
             require(not pin.whole, "pin.whole", 'is for joint.model = "block": the pin of a ring is whole anyway')
-        scale = self.E_star * self.thickness if self.force_controlled else 1.0
-        largest, most = max(map(abs, self.targets)), 0.5 * scale * joint.radius
-        what = "E* R" if self.force_controlled else "the radius"
-        require(largest <= most, load, f"must not exceed half {what} ({most:g})")
+        scale, what = (self.E_star * self.thickness, "E* R") if self.force_controlled else (1.0, "the radius")
+        most = 0.5 * scale * joint.radius
+        require(max(map(abs, self.targets)) <= most, load, f"must not exceed half {what} ({most:g})")
         return self
 
     def require_mesh(self) -> None:
@@ -106,23 +103,20 @@ class Scene(Checked):
     @property
     def force_controlled(self) -> bool:
         """Whether the load is a force."""
-        return self.load.name in ("force", "relative_force")
+        return self.load.kind in ("force", "relative_force")
 
     @property
     def load_unit(self) -> float:
         """What the targets of the section load are multiplied by."""
         scale = {"displacement": self.joint.dR, "relative_force": self.E_star * self.joint.radius * self.thickness}
-        return scale.get(self.load.name, 1.0)
+        return scale.get(self.load.kind, 1.0)
 
     @property
     def targets(self) -> list[float]:
         """The load at every output step: the displacement of the pin, or the force on it."""
-        out, begin = [], 0.0
-        for leg, n in zip(self.load.legs, self.load.leg_steps, strict=True):
-            end = leg * self.load_unit
-            out += [begin + (end - begin) * k / n for k in range(1, n)] + [end]
-            begin = end
-        return out
+        ends = [0.0, *(stage * self.load_unit for stage in self.load.stages)]
+        stages = zip(pairwise(ends), self.load.stage_steps, strict=True)
+        return [b if k == n else a + (b - a) * k / n for (a, b), n in stages for k in range(1, n + 1)]
 
     @property
     def steps_numbered(self) -> bool:
@@ -135,24 +129,14 @@ class Scene(Checked):
         return [[target] for target in self.targets]
 
     @property
-    def loaded_by(self) -> Any:
-        """What a run must be loaded by to be continued with this scene."""
-        return self.force_controlled
-
-    @property
     def accurate(self) -> str:
         """Name of what an accuracy is asked of."""
         return "delta" if self.force_controlled else "P"
 
     @property
     def loading(self) -> str:
-        """The load in words."""
-        return f"load.{self.load.name}"
-
-    @property
-    def loads_said(self) -> str:
-        """Targets and steps in words."""
-        return f"{self.load.legs} and {self.load.leg_steps}"
+        """What a run must be loaded by to be continued with this scene, in words."""
+        return "a force" if self.force_controlled else "a displacement"
 
     @property
     def E_star(self) -> float:
@@ -160,19 +144,22 @@ class Scene(Checked):
         return 1 / sum(1 / contact_modulus(s.E, s.nu, self.analysis.plane) for s in self.solids.values())
 
     @property
-    def thickness(self) -> float:
-        """Thickness, 1 if forces are per unit thickness."""
-        return self.analysis.thickness or 1.0
-
-    @property
-    def plastic(self) -> bool:
-        """Whether any body can yield."""
-        return any(solid.yield_stress is not None for solid in self.solids.values())
-
-    @property
     def solids(self) -> dict[str, Solid]:
         """The deformable bodies by name."""
         return {"block": self.block} if self.pin.rigid else {"pin": self.pin, "block": self.block}
+
+
+def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
+    """Raise `Fault` for moduli and strengths, by their places, that leave the tolerances or the range of numbers."""
+    stiffest = max(solid.E for solid in solids.values())
+    for place, solid in solids.items():
+        modulus, strength = (*place, "E"), solid.yield_stress
+        require(1e-30 <= solid.E <= 1e30, modulus, "must be between 1e-30 and 1e30; choose other units")
+        require(stiffest <= solid.E / _SOFTEST, modulus, f"must be at least {_SOFTEST:g} of the largest E")
+        strong = strength is None or strength >= _WEAKEST * solid.E
+        require(strong, (*place, "yield_stress"), f"must be at least {_WEAKEST:g} times E")
+        allowed = not isinstance(solid.hardening, float) or solid.hardening <= solid.E / _WEAKEST
+        require(allowed, (*place, "hardening"), f"must not exceed {1 / _WEAKEST:g} times E")
 
 
 def plain(value: Any) -> Any:

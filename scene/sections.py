@@ -3,59 +3,56 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationInfo, model_validator
 
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import Hardening
 from archord.materials.material import Material, Plane
-from archord.scene.keys import LINE, Positive, Section, key, require
-from archord.scene.plasticity import HardeningKey, hardening_law, with_material, with_yield_stress
+from archord.scene.keys import Fault, Name, Positive, Section, given, key, require
+from archord.scene.plasticity import HardeningKey, filled, hardening_law
 
 NotNegative = Annotated[float, Field(ge=0)]
 LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
 # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
 Ratio = Annotated[float, Field(ge=-0.999, le=0.499999)]
-_FORCE = {("MPa", "mm"): "N/mm", ("Pa", "m"): "N/m"}
 _E, _NU = "Young's modulus, unless a material brings it", "Poisson's ratio, unless a material brings it"
 MOST_STEPS = 10_000  # output steps
-Targets = float | Annotated[list[float], Field(min_length=1)]
+Accuracy = Annotated[float, Field(ge=1e-5, le=0.1)]
+Side = Literal["both", "pin", "block"]
 Steps = Annotated[int, Field(ge=1, le=MOST_STEPS)]
+_Kind = Discriminator(lambda value: "list" if isinstance(value, list) else "number")
+StepCounts = Annotated[
+    Annotated[Steps, Tag("number")] | Annotated[list[Steps], Field(min_length=1), Tag("list")], _Kind
+]
+Targets = Annotated[Annotated[float, Tag("number")] | Annotated[list[float], Field(min_length=1), Tag("list")], _Kind]
 BackStress = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 
 
 class Units(Section):
     """Names of the scene's units, for headings; they must be consistent (force = stress times length squared)."""
 
-    length: str = key("unit of length", default="mm", min_length=1, pattern=LINE)
-    stress: str = key("unit of stress and of Young's modulus", default="MPa", min_length=1, pattern=LINE)
-
-    @property
-    def force(self) -> str:
-        """Unit of force per unit thickness."""
-        return _FORCE.get((self.stress, self.length), f"{self.stress} {self.length}")
+    length: Name = key("unit of length", default="mm")
+    stress: Name = key("unit of stress and of Young's modulus", default="MPa")
 
     def force_of(self, thickness: float | None) -> str:
         """Unit of force of a joint of this thickness, per unit thickness without."""
+        newton = (self.stress, self.length) in (("MPa", "mm"), ("Pa", "m"))
         if thickness is None:
-            return self.force
-        force = _FORCE.get((self.stress, self.length))
-        return force.split("/")[0] if force else f"{self.stress} {self.length}2"
+            return f"N/{self.length}" if newton else f"{self.stress} {self.length}"
+        return "N" if newton else f"{self.stress} {self.length}2"
 
     def energy_of(self, thickness: float | None) -> str:
         """Unit of energy of a joint of this thickness, per unit thickness without."""
-        force = self.force_of(1.0)
-        return force if thickness is None else f"{force} {self.length}"
+        return self.force_of(1.0) + ("" if thickness is None else f" {self.length}")
 
 
 class Solid(Section):
     """Isotropic elastic solid, elastic-plastic (J2) with a yield stress."""
 
-    material: str | None = key(
-        "metal of docs/materials.md, for the keys that are not given", default=None, other="S355", exclude=True
-    )
+    material: str | None = key("metal of docs/materials.md, for keys not given", other="S355", exclude=True)
     yield_stress: Positive | None = key("yield stress; elastic if absent", "stress", default=None, example=300.0)
     hardening: HardeningKey = key(
         "modulus d(yield stress)/d(PEEQ), 0: perfect plasticity; or points [PEEQ, true stress]; or a law: {saturation, "
@@ -63,12 +60,8 @@ class Solid(Section):
         "stress",
         default=0.0,
     )
-    back_stresses: list[BackStress] | None = key(
-        "back stresses of kinematic hardening (Armstrong and Frederick): up to three [modulus, rate of recovery]",
-        default=None,
-        other=[[20000.0, 100.0]],
-        min_length=1,
-        max_length=3,
+    back_stresses: Annotated[list[BackStress], Field(min_length=1, max_length=3)] | None = key(
+        "back stresses (Armstrong and Frederick): up to three [modulus, rate of recovery]", other=[[20000.0, 100.0]]
     )
     E: Positive = key(_E, "stress", example=210000.0)
     nu: Ratio = key(_NU, example=0.3)
@@ -76,7 +69,7 @@ class Solid(Section):
     @model_validator(mode="before")
     @classmethod
     def _filled(cls, data: Any, info: ValidationInfo) -> Any:
-        return with_material(with_yield_stress(data), (info.context or {}).get("stress", "MPa"))
+        return filled(data, (info.context or {}).get("stress", "MPa"))
 
     @model_validator(mode="after")
     def _plasticity(self):
@@ -84,11 +77,10 @@ class Solid(Section):
         require(self.yield_stress is not None or not self.back_stresses, "back_stresses", "need a yield_stress")
         require(all(C > 0 for C, _ in self.back_stresses or ()), "back_stresses", "must have positive moduli")
         if self.yield_stress is not None and self.E is not None:
-            none = np.zeros(1)
             try:
-                first, rise = (float(np.max(value)) for value in (self.law.stress(none), self.law.slope(none)))
+                first, rise = (float(np.max(of(np.zeros(1)))) for of in (self.law.stress, self.law.slope))
             except ValueError as error:
-                raise ValueError(f"hardening|is no hardening law: {error}") from None
+                raise Fault(("hardening",), f"is no hardening law: {error}") from None
             said = f"must begin at yield_stress ({self.yield_stress:g})"
             require(math.isclose(first, self.yield_stress, rel_tol=1e-9), "hardening", said)
             require(rise >= 0, "hardening", "must not soften: saturation must be at least yield_stress")
@@ -105,16 +97,14 @@ class Solid(Section):
         return hardening_law(self.yield_stress or 0.0, self.hardening, self.E)
 
     def constitutive(self, plane: Plane) -> Material:
-        """The constitutive law: `Elastic` without a yield stress, `KinematicMaterial` with back stresses, `J2Material`
-        else."""
+        """The constitutive law: `Elastic`, `J2Material` with a yield stress, `KinematicMaterial` with back stresses."""
         if self.yield_stress is None:
             return Elastic(self.E, self.nu, plane)
         if self.back_stresses:
             from archord.materials.kinematic import KinematicMaterial
 
-            return KinematicMaterial(
-                self.E, self.nu, plane, self.law, tuple((C, gamma) for C, gamma in self.back_stresses)
-            )
+            back_stresses = tuple((C, gamma) for C, gamma in self.back_stresses)
+            return KinematicMaterial(self.E, self.nu, plane, self.law, back_stresses)
         from archord.materials.j2 import J2Material
 
         return J2Material(self.E, self.nu, plane, self.law)
@@ -132,93 +122,80 @@ class Pin(Solid):
     def _rigid_or_solid(self) -> Pin:
         # a table brings the yield stress
         for name in ("material", "hardening", "yield_stress", "back_stresses", "E", "nu", "whole"):
-            given = name in self.model_fields_set and getattr(self, name)
-            require(not (self.rigid and given), name, "is not for a rigid pin")
+            said = name in self.model_fields_set and getattr(self, name)
+            require(not (self.rigid and said), name, "is not for a rigid pin")
         for name in ("E", "nu"):
             require(self.rigid or getattr(self, name) is not None, name, "is missing (or set rigid = true)")
         return self
 
 
-class Load(Section):
-    """The displacement of the pin, from first touch, or the force on it: a ramp to a target, or to several in turn."""
+class Loading(Section):
+    """A load of one of several ``kinds`` (keys): one value, or a list of values at the ends of stages."""
 
-    displacement: Targets | None = key(
-        "displacement delta of the pin over dR, at most R/2: a target, or a list of them", default=None, example=2.0
-    )
-    displacement_absolute: Targets | None = key(
-        "displacement delta of the pin, instead of displacement", "length", default=None, other=0.1
-    )
-    force: Targets | None = key(
-        "force P on the whole pin (per unit thickness without analysis.thickness), instead of a displacement",
-        "force",
-        default=None,
-        other=1000.0,
-    )
-    relative_force: Targets | None = key("P/(E* R), instead of force", default=None, other=0.01)
-    path: str | None = key(
-        "CSV file of targets: one column headed by one of the names above; by default one step each",
-        default=None,
-        other="cycle.csv",
-        min_length=1,
-        pattern=LINE,
-    )
-    core_radius: float = key("ring: radius over R of the core that the force acts on", default=0.1, ge=0.01, le=0.5)
-    steps: Steps | Annotated[list[Steps], Field(min_length=1)] = key(
-        "output steps up to each target: one number for all, or a list with one for each", default=20
-    )
+    kinds: ClassVar[tuple[str, ...]] = ("displacement", "force")
 
     @model_validator(mode="after")
-    def _one_load(self) -> Load:
-        given = [name for name in (*LOADS, "path") if getattr(self, name) is not None]
-        require(len(given) > 0, "displacement", f"is missing (or {', '.join(LOADS[1:])}, path)")
-        require(len(given) == 1, given[0], f"must not be given together with {' and '.join(given[1:])}")
-        require(self.path is None, "path", "is for scene files alone; give the list of its targets instead")
-        each = f"must have one number for each of the {len(self.legs)} targets of {self.name}"
-        require(len(self.leg_steps) == len(self.legs), "steps", each)
-        require(sum(self.leg_steps) <= MOST_STEPS, "steps", f"must not add up to more than {MOST_STEPS} steps")
+    def _one_kind(self):
+        given(self, self.kinds)
         return self
 
     @property
-    def name(self) -> str:
+    def kind(self) -> str:
         """The key that holds the load."""
-        return next(name for name in LOADS if getattr(self, name) is not None)
+        return given(self, self.kinds)
 
     @property
-    def legs(self) -> list[float]:
-        """The targets in turn, as given."""
-        value = getattr(self, self.name)
+    def stages(self) -> list[float]:
+        """The values at the ends of the stages, as given."""
+        value = getattr(self, self.kind)
         return value if isinstance(value, list) else [value]
 
+
+def steps_of(steps: int | list[int], n: int, place: str) -> list[int]:
+    """Output steps of each of ``n`` stages. Raises `Fault` if they are not that many."""
+    each = steps if isinstance(steps, list) else [steps] * n
+    require(len(each) == n, place, f"must have one number for each of the {n} stages")
+    require(sum(each) <= MOST_STEPS, place, f"must not add up to more than {MOST_STEPS} steps")
+    return each
+
+
+class Load(Loading):
+    """The displacement of the pin, from first touch, or the force on it: a ramp to a target, or to several in turn."""
+
+    kinds = (*LOADS, "path")
+    displacement: Targets | None = key(
+        "displacement of the pin over dR: a target, or a list", default=None, example=2.0
+    )
+    displacement_absolute: Targets | None = key("displacement delta of the pin, instead", "length", other=0.1)
+    force: Targets | None = key("force P on the whole pin, instead of a displacement", "force", other=1000.0)
+    relative_force: Targets | None = key("P/(E* R), instead of force", other=0.01)
+    path: Name | None = key("CSV file of targets: one column, headed by one of the names above", other="cycle.csv")
+    core_radius: float = key("ring: radius over R of the core that the force acts on", default=0.1, ge=0.01, le=0.5)
+    steps: StepCounts = key("output steps up to each target: one number for all, or a list", default=20)
+
+    @model_validator(mode="after")
+    def _steps(self) -> Load:
+        require(self.path is None, "path", "is for scene files alone; give the list of its targets instead")
+        steps_of(self.steps, len(self.stages), "steps")
+        return self
+
     @property
-    def leg_steps(self) -> list[int]:
+    def stage_steps(self) -> list[int]:
         """Output steps up to each target."""
-        return self.steps if isinstance(self.steps, list) else [self.steps] * len(self.legs)
+        return steps_of(self.steps, len(self.stages), "steps")
 
 
 class Modelling(Section):
     """How a problem is modelled and solved."""
 
     plane: Literal["strain", "stress"] = key("plane strain or plane stress", default="strain")
-    kinematics: Literal["current", "reference"] = key(
-        "pairs in contact: closest points on the deformed curves, or fixed ones where they touch", default="current"
-    )
-    gamma_factor: float = key(
-        "Nitsche's gamma over the trace constant of a contact cell; coercive above 0.25", default=0.5, ge=1e-3, le=1e6
-    )
-    accuracy: float | None = key(
-        "relative error of P (of delta under a force) to reach by a choice of element_size, growth and step length",
-        default=None,
-        other=0.001,
-        ge=1e-5,
-        le=0.1,
+    kinematics: Literal["current", "reference"] = key("closest points on deformed curves, or fixed", default="current")
+    gamma_factor: float = key("Nitsche's gamma over trace constant; coercive above 0.25", default=0.5, ge=1e-3, le=1e6)
+    accuracy: Accuracy | None = key(
+        "relative error of P (of delta under a force) to reach by mesh and steps", other=0.001
     )
     degree: Literal[2, 3] = key("polynomial degree of displacements and of the curved geometry", default=2)
-    thickness: Positive | None = key(
-        "thickness, for forces and energies of the whole; they are per unit thickness if absent",
-        "length",
-        default=None,
-        other=10.0,
-    )
+    thickness: Positive | None = key("thickness; forces and energies are per unit if absent", "length", other=10.0)
     tolerance: float = key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
     max_iterations: int = key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
 
@@ -226,12 +203,14 @@ class Modelling(Section):
 class Analysis(Modelling):
     """How the joint is modelled and solved."""
 
-    coarse_start: bool = key(
-        "on a fine mesh, take the guess for every step from a coarser one; false is for comparison", default=True
-    )
-    integration: Literal["both", "pin", "block"] = key(
-        "whose contact edge carries the integral: both halves (unbiased), or one side's alone", default="both"
-    )
+    coarse_start: bool = key("guess every step on a fine mesh from a coarser one; false: for comparison", default=True)
+    integration: Side = key("whose edge carries the contact integral: both (unbiased), or one side's", default="both")
+
+
+class ProblemAnalysis(Modelling):
+    """How a general problem is modelled and solved."""
+
+    symmetry: int = key("how many times the part makes up the whole, of which results are", default=1, ge=1, le=100)
 
 
 class Stepping(Section):
@@ -246,8 +225,7 @@ class Stepping(Section):
 
     @model_validator(mode="after")
     def _ordered(self) -> Stepping:
-        ordered = self.minimum <= self.initial <= self.maximum
-        require(ordered, "initial", "must be between stepping.minimum and stepping.maximum")
+        require(self.minimum <= self.initial <= self.maximum, "initial", "must be between stepping.minimum and maximum")
         return self
 
 

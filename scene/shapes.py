@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from archord.scene.geometry import JointGeometry
 from archord.scene.keys import Positive, Section, key, require
 from archord.scene.scene import Checked, Scene, plain
-from archord.scene.sections import Modelling, Pin, ProblemOutput, Solid, Stepping, Steps, Targets, Units
+from archord.scene.sections import Loading, Modelling, Pin, ProblemOutput, Solid, StepCounts, Stepping, Targets, Units
 
 _THINNEST, _DEEPEST, _FARTHEST = 0.02 * (1 - 1e-9), 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
+_MATERIAL = {*Solid.model_fields}
+Radii = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 PinPart = Literal["half", "whole", "none"]
 
 
@@ -21,9 +22,7 @@ class Shape(Section):
     """A shape around a pin, and how finely it is meshed."""
 
     radius: float = key("radius R of the pin", "length", example=10.0, ge=1e-30, le=1e30)
-    element_size: Positive | None = key(
-        "edge length of the elements on the arcs, 1e-3 to 0.5 R; 0.04 R if absent", "length", default=None, other=0.4
-    )
+    element_size: Positive | None = key("edge length of elements on the arcs; 0.04 R if absent", "length", other=0.4)
     growth: float = key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
     pin: PinPart = key("part of the pin that is meshed; [pin] says it in a preset", default="half", other="whole")
 
@@ -47,9 +46,7 @@ class Lug(Shape):
 
     clearance: float = key("hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1)
     width: Positive = key("width W", "length", example=40.0)
-    edge_distance: Positive | None = key(
-        "from the hole's centre to the loaded end; W/2 if absent", "length", default=None, example=20.0
-    )
+    edge_distance: Positive | None = key("from hole's centre to the loaded end; W/2 if absent", "length", other=20.0)
     length: Positive | None = key("from the hole's centre to the clamp; 1.5 W if absent", "length", default=None)
     end: Literal["round", "square"] = key("the loaded end: an arc of radius W/2, or straight", default="round")
     half: bool = key("model the half y >= 0 alone", default=True)
@@ -58,14 +55,17 @@ class Lug(Shape):
     @model_validator(mode="after")
     def _lug(self) -> Lug:
         a, R = self.arguments(), self.radius
-        hole, said = R + self.clearance, f"must leave a ligament of at least {_THINNEST:g} R"
+        hole, half = R + self.clearance, self.width / 2
         between = f"must be between {-_DEEPEST:g} and 0.5 times the radius"
         require(-_DEEPEST <= self.clearance / R <= 0.5, "clearance", between)
-        require(self.width / 2 - hole >= _THINNEST * R, "width", f"{said} beside the hole")
-        require(a["edge_distance"] - hole >= _THINNEST * R, "edge_distance", f"{said} before the hole")
-        behind = max(hole, self.width / 2 - a["edge_distance"])
-        require(a["length"] - behind >= _THINNEST * R, "length", f"{said} behind the hole and the end's arc")
-        for name in ("width", "edge_distance", "length"):
+        behind = a["length"] - max(hole, half - a["edge_distance"])
+        ligaments = {
+            "width": (half - hole, "beside the hole"),
+            "edge_distance": (a["edge_distance"] - hole, "before the hole"),
+            "length": (behind, "behind the hole and the end's arc"),
+        }
+        for name, (ligament, where) in ligaments.items():
+            require(ligament >= _THINNEST * R, name, f"must leave a ligament of at least {_THINNEST:g} R {where}")
             require(a[name] <= _FARTHEST * R, name, f"must not exceed {_FARTHEST:g} R")
         return self
 
@@ -78,16 +78,8 @@ class Lug(Shape):
 class Bushing(Shape):
     """A pin in sleeves in a housing that is held at its outer edge."""
 
-    rings: list[Annotated[list[Positive], Field(min_length=2, max_length=2)]] = key(
-        "inner and outer radii from the pin outward; [[sleeve]] and [housing] say them in a preset",
-        "length",
-        default=[],
-        other=[[10.05, 14.0], [13.98, 30.0]],
-    )
-    touching: bool = key(
-        "bodies with clearance touch on the load axis at first, as they do for a force, or are concentric",
-        default=False,
-    )
+    rings: list[Radii] = key("inner and outer radii from the pin outward", "length", default=[])
+    touching: bool = key("bodies touch on the load axis at first, as under a force, or are concentric", default=False)
     kind: Literal["bushing"] = "bushing"
 
     @model_validator(mode="after")
@@ -96,7 +88,7 @@ class Bushing(Shape):
         return self
 
     def check(self, rings: list[list[float]], names: list[str]) -> None:
-        """Raise ValueError, of the keys ``names``, for ``rings`` that do not fit."""
+        """Raise `Fault`, of the keys ``names``, for ``rings`` that do not fit."""
         R, edge = self.radius, self.radius
         fits = f"must not overlap what is inside by more than {_DEEPEST:g} of its radius, nor be wider by more than 0.5"
         for name, (inner, outer) in zip(names, rings, strict=True):
@@ -125,21 +117,18 @@ class Ring(Solid):
     outer: Positive = key("outer radius", "length", example=14.0)
 
 
-class PinLoad(Section):
+class PinLoad(Loading):
     """How the pin is moved in +x: by its diameter across the axis, or as a rigid disc."""
 
     displacement: Targets | None = key("displacement of the pin", "length", default=None, example=0.1)
-    force: Targets | None = key("force on the whole pin, instead", "force", default=None, other=1000.0)
+    force: Targets | None = key("force on the whole pin, instead", "force", other=1000.0)
     at: Literal["diameter", "centre"] = key(
-        "where a force acts: on the diameter, which stays straight, or on the pin's centre alone", default="diameter"
+        "a force acts on the straight diameter, or on the centre", default="diameter"
     )
-    steps: Steps | Annotated[list[Steps], Field(min_length=1)] = key("output steps up to each target", default=20)
+    steps: StepCounts = key("output steps up to each target", default=20)
 
     @model_validator(mode="after")
-    def _one_load(self) -> PinLoad:
-        none, both = self.displacement is None and self.force is None, None not in (self.displacement, self.force)
-        require(not none, "displacement", "is missing (or force)")
-        require(not both, "displacement", "must not be given together with force")
+    def _at(self) -> PinLoad:
         require(self.at == "diameter" or self.force is not None, "at", 'must be "diameter" for a displacement')
         return self
 
@@ -147,7 +136,6 @@ class PinLoad(Section):
 class Preset(Checked):
     """What the scenes of presets share."""
 
-    newest: ClassVar[int] = 2
     format: Literal[2] = key("version of the scene format", default=2)
     units: Units = Field(default_factory=Units, description="names of the units")
     pin: Pin = Field(description="material of the pin")
@@ -156,44 +144,30 @@ class Preset(Checked):
     stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
     output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
-    def _require_whole(self, name: str, inner: float, outer: float) -> None:
-        whole = self.pin.whole or self.pin.rigid or inner <= outer
+    def _require_whole(self, name: str, gap: float) -> None:
+        whole = self.pin.whole or self.pin.rigid or gap >= 0
         require(whole, name, "needs pin.whole = true, as half a pin cannot be pressed in")
 
-    def _general(
-        self, shape: Shape, solids: Mapping[str, Solid], held: str, surfaces: list[str], radii: list[float]
+    def _pulled(
+        self, shape: Shape, solids: Mapping[str, Solid], held: str, surfaces: list[str], gaps: list[float]
     ) -> dict[str, Any]:
-        """The general scene of ``solids`` with the edge ``held``; ``surfaces`` and their ``radii`` go from the pin
-        outward, the first faces the second, the third the fourth, ..."""
+        """The general scene of ``solids``, from the pin outward, with the edge ``held``; of their ``surfaces`` the
+        first faces the second at the first of the ``gaps``, the third the fourth, ..."""
         half, touching = (getattr(shape, name, True) for name in ("half", "touching"))
-        rigid, gaps = self.pin.rigid, [outer - inner for inner, outer in zip(radii[::2], radii[1::2], strict=True)]
-        said = _shared(self)
-        bodies, material = solids if rigid else {"pin": self.pin, **solids}, {*Solid.model_fields}
-        contacts: list[dict[str, Any]] = [
-            {"name": f"{a} in {b}", "surfaces": [inner, outer], "overlap": max(-gap, 0.0)}
-            for (a, b), inner, outer, gap in zip(
-                pairwise(["pin", *solids]), surfaces[::2], surfaces[1::2], gaps, strict=True
-            )
-        ]
+        rigid, names, contacts = self.pin.rigid, ["pin", *solids], list[dict[str, Any]]()
+        for k, gap in enumerate(gaps):
+            facing = {"name": f"{names[k]} in {names[k + 1]}", "surfaces": surfaces[2 * k : 2 * k + 2]}
+            contacts.append(facing | {"overlap": max(-gap, 0.0)})
         if rigid:
             disc = {"centre": [touching * sum(max(gap, 0.0) for gap in gaps), 0.0], "radius": shape.radius}
             contacts[0] |= {"surfaces": [surfaces[1]], "rigid": disc}
         supports = [{"name": held, "on": held, "fixed": ["x", "y"]}]
         if half or not rigid:
             supports.append({"name": "axis", "on": "axis" if half else "centre", "fixed": ["y"]})
-        part = "none" if rigid else "whole" if self.pin.whole else "half"
         place = contacts[0]["name"] if rigid else {"diameter": "flat"}.get(self.load.at, "centre")
-        load = {"name": "pull", "on": place, "direction": "x"}
-        return said | {
-            "format": 2,
-            "analysis": said["analysis"] | {"symmetry": 2 if half else 1},
-            "mesh": {"shape": shape.arguments() | {"pin": part}},
-            "body": [{"name": n} | s.model_dump(exclude_none=True, include=material) for n, s in bodies.items()],
-            "interaction": contacts,
-            "support": supports,
-            "load": [load | self.load.model_dump(exclude_none=True, exclude={"steps", "at"})],
-            "path": {"steps": self.load.steps},
-        }
+        pull = {"name": "pull", "on": place, "direction": "x", self.load.kind: getattr(self.load, self.load.kind)}
+        parts = {"interaction": contacts, "support": supports, "load": [pull], "path": {"steps": self.load.steps}}
+        return _general(self, shape.arguments(), 2 if half else 1, solids, **parts)
 
 
 class LugScene(Preset):
@@ -204,13 +178,12 @@ class LugScene(Preset):
 
     @model_validator(mode="after")
     def _consistent(self) -> LugScene:
-        self._require_whole("lug.clearance", 0.0, self.lug.clearance)
+        self._require_whole("lug.clearance", self.lug.clearance)
         return self
 
     def general(self) -> dict[str, Any]:
         """The general scene that it stands for."""
-        radii = [self.lug.radius, self.lug.radius + self.lug.clearance]
-        return self._general(self.lug, {"lug": self.plate}, "clamp", ["pin", "hole"], radii)
+        return self._pulled(self.lug, {"lug": self.plate}, "clamp", ["pin", "hole"], [self.lug.clearance])
 
 
 class BushingScene(Preset):
@@ -223,67 +196,59 @@ class BushingScene(Preset):
     @model_validator(mode="after")
     def _consistent(self) -> BushingScene:
         names = ["sleeve"] * len(self.sleeve) + ["housing"]
-        self.bushing.check(self._rings(), names)
-        self._require_whole(names[0], self.bushing.radius, self._rings()[0][0])
+        self.bushing.check(self._rings, names)
+        self._require_whole(names[0], self._rings[0][0] - self.bushing.radius)
         return self
 
+    @property
     def _rings(self) -> list[list[float]]:
         return [[ring.bore, ring.outer] for ring in (*self.sleeve, self.housing)]
 
     def general(self) -> dict[str, Any]:
         """The general scene that it stands for."""
-        solids: dict[str, Solid] = {f"sleeve {k}": sleeve for k, sleeve in enumerate(self.sleeve, 1)}
-        surfaces = ["pin", *(f"{name} {side}" for name in solids for side in ("inside", "outside")), "bore"]
+        sleeves = {f"sleeve {k}": sleeve for k, sleeve in enumerate(self.sleeve, 1)}
+        surfaces = ["pin", *(f"{name} {side}" for name in sleeves for side in ("inside", "outside")), "bore"]
         touching = self.bushing.touching or self.load.force is not None
-        shape = self.bushing.model_copy(update={"rings": self._rings(), "touching": touching})
-        radii = [shape.radius, *(r for ring in shape.rings for r in ring)][:-1]
-        return self._general(shape, solids | {"housing": self.housing}, "outer edge", surfaces, radii)
+        shape = self.bushing.model_copy(update={"rings": self._rings, "touching": touching})
+        inner = [shape.radius, *(outer for _, outer in self._rings)]
+        gaps = [bore - edge for edge, (bore, _) in zip(inner, self._rings, strict=False)]
+        return self._pulled(shape, sleeves | {"housing": self.housing}, "outer edge", surfaces, gaps)
 
 
-def _shared(scene: Scene | Preset) -> dict[str, Any]:
-    """The sections that general scenes have, too: their keys that were given, as an accuracy chooses some others."""
-    return {name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")}
+def _general(
+    scene: Scene | Preset, shape: dict[str, Any], symmetry: int, solids: Mapping[str, Solid], **parts: Any
+) -> dict[str, Any]:
+    """The general scene of a pin in ``solids``, with its other ``parts``. Of the sections that ``scene`` has, too, the
+    keys that were given, as an accuracy chooses some others."""
+    pin, said = scene.pin, {name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")}
+    for name in ("integration", "coarse_start"):  # of joints alone
+        said["analysis"].pop(name, None)
+    bodies = solids if pin.rigid else {"pin": pin, **solids}
+    parts |= {
+        "mesh": {"shape": shape | {"pin": "none" if pin.rigid else "whole" if pin.whole else "half"}},
+        "body": [{"name": n} | s.model_dump(exclude_none=True, include=_MATERIAL) for n, s in bodies.items()],
+    }
+    return said | parts | {"analysis": said["analysis"] | {"symmetry": symmetry}}
 
 
 def general_joint(scene: Scene) -> dict[str, Any]:
     """The general scene that the ``scene`` of a joint stands for; its pin is pressed along -y."""
     g, pin, load = scene.joint, scene.pin, scene.load
-    said = _shared(scene)
-    for name in ("integration", "coarse_start"):
-        said["analysis"].pop(name, None)
-    material = {*Solid.model_fields}
-    bodies = [{"name": n} | s.model_dump(exclude_none=True, include=material) for n, s in scene.solids.items()]
     contact: dict[str, Any] = {"name": "contact", "surfaces": ["pin", "hole"], "overlap": max(-g.dR, 0.0)}
     if pin.rigid:
         contact |= {"surfaces": ["hole"], "rigid": {"centre": [0.0, -g.dR], "radius": g.radius}}
     elif scene.analysis.integration != "both":
         contact["integrated"] = "pin" if scene.analysis.integration == "pin" else "hole"
-    part = "none" if pin.rigid else "whole" if pin.whole else "half"
     on = "contact" if pin.rigid else "pin" if g.is_ring else "pin top"
     press: dict[str, Any] = {"name": "press", "on": on, "direction": "y"}
-    press["force" if scene.force_controlled else "displacement"] = [-leg * scene.load_unit for leg in load.legs]
+    press["force" if scene.force_controlled else "displacement"] = [-at * scene.load_unit for at in load.stages]
     if g.is_ring:
         press["core"] = {"centre": [0.0, 0.0], "radius": load.core_radius * g.radius}
-    shape = g.model_dump(exclude_none=True) | {"kind": "joint", "pin": part, "core_radius": load.core_radius}
-    return said | {
-        "analysis": said["analysis"] | {"symmetry": 2},
-        "mesh": {"shape": shape},
-        "body": bodies,
-        "interaction": [contact],
-        "support": [
-            {"name": "axis", "on": "symmetry", "fixed": ["x"]},
-            {"name": "block", "on": "block held", "fixed": ["x", "y"]},
-        ],
-        "load": [press],
-        "path": {"steps": load.leg_steps},
-    }
+    shape = g.model_dump(exclude_none=True) | {"kind": "joint", "core_radius": load.core_radius}
+    axis = {"name": "axis", "on": "symmetry", "fixed": ["x"]}
+    block = {"name": "block", "on": "block held", "fixed": ["x", "y"]}
+    parts = {"interaction": [contact], "support": [axis, block], "load": [press], "path": {"steps": load.stage_steps}}
+    return _general(scene, shape, 2, {"block": scene.block}, **parts)
 
 
 PRESETS: dict[str, type[LugScene] | type[BushingScene]] = {"lug": LugScene, "bushing": BushingScene}
-
-
-def expand(data: dict[str, Any], source: str = "scene", origin: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """The general scene that a preset's ``data`` stand for; those of another scene unchanged. Raises `InputError`."""
-    name = next((name for name in PRESETS if name in data), None)
-    scene: Any = PRESETS.get(str(name))
-    return data if scene is None else scene(source, origin, **data).general()

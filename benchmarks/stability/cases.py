@@ -139,7 +139,7 @@ def fine_scene(scene: Any) -> Scene:
         scene,
         joint=joint | ({"growth": 1.0} if tiny else {}),
         analysis={"gamma_factor": None},
-        load={"steps": [max(20, 2 * n) for n in scene.load.leg_steps]} if scene.plastic else {},
+        load={"steps": [max(20, 2 * n) for n in scene.load.stage_steps]} if scene.plastic else {},
     )
 
 

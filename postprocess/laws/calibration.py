@@ -41,7 +41,7 @@ class Calibration:
             fitted_range=(float(loads.min()), float(loads.max())),
             plane=run.plane,
             length_unit=run.scene.units.length,
-            force_unit=run.scene.units.force,
+            force_unit=run.scene.units.force_of(None),
             fitted_to=tuple(part.name for part in self.joint.residuals),
         )
 

@@ -50,7 +50,7 @@ def test_the_table_is_whole():
             if expected.value == FINE:
                 assert expected.quantity in fine[case.name]
                 own, scene = case.scene, fine_scene(case.scene)
-                assert (scene.pin, scene.block, scene.load.legs) == (own.pin, own.block, own.load.legs)
+                assert (scene.pin, scene.block, scene.load.stages) == (own.pin, own.block, own.load.stages)
                 assert (scene.joint.dR, scene.joint.size_ratio) == (own.joint.dR, 1)
                 assert scene.joint.h <= 0.025 * scene.joint.radius
                 assert not scene.plastic or len(scene.targets) >= 20

@@ -101,7 +101,7 @@ def test_a_run_goes_on_with_further_stages(tmp_path):
     parts = tmp_path / "parts"
     solve_scene(pressed(0.1, steps=[2]), parts, MPI.COMM_SELF)
     with pytest.raises(
-        InputError, match=r'steps are not the first ones of the scene\'s path; load "press" and its steps'
+        InputError, match=r'steps are not the first ones of the scene\'s path; load "press" .* and its steps'
     ):
         plan_restart(parts, pressed(0.12, 0.15, steps=[2, 1]))
     plan = plan_restart(parts, pressed(0.1, 0.15, 0.1, steps=[2, 1, 1]), extend=True)
@@ -138,7 +138,7 @@ def test_an_accuracy_under_a_pressure_is_that_of_the_displacement(tmp_path):
 
 def test_another_load_is_refused(run):
     other = scene(load=[{"name": "pull", "on": "flat", "direction": "x", "displacement": 0.1}], path={"steps": 3})
-    with pytest.raises(InputError, match=r'was loaded by load "press"; load "pull" cannot continue it'):
+    with pytest.raises(InputError, match=r'was loaded by load "press" .*; load "pull" .* cannot continue it'):
         plan_restart(run.folder, other, extend=True)
 
 

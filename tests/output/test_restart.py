@@ -194,7 +194,7 @@ def finished(tmp_path_factory):
         ({"displacement": 1.0, "steps": 2}, "4 steps are not the first ones of the scene's path"),
         ({"displacement": 4.0, "steps": 4}, "4 steps are not the first ones of the scene's path"),
         ({"displacement": [1.0, 0.5, 4.0], "steps": 2}, "4 steps are not the first ones of the scene's path"),
-        ({"relative_force": 0.1}, "load.relative_force cannot continue it"),
+        ({"relative_force": 0.1}, "was loaded by a displacement; a force cannot continue it"),
     ],
 )
 def test_a_path_that_does_not_go_on_is_refused(finished, load, said):

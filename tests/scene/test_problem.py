@@ -6,7 +6,7 @@ import tomllib
 import pytest
 
 from archord.scene.errors import InputError
-from archord.scene.file import load_scene, parse_any, resolved
+from archord.scene.file import files_read, load_scene, parse_any, resolved
 from archord.scene.problem import ProblemScene
 from archord.scene.reference import example
 
@@ -114,6 +114,9 @@ def test_an_interference_has_a_stage_of_its_own():
         ("support.0.name", "press", 'support "press".name = "press" must not be the name of a load, too.'),
         ("load.0.force", 1.0, 'load "press".displacement = .* must not be given together with force'),
         ("load.0.displacement", None, 'load "press".displacement is missing'),
+        ("load.0.displacement", [0.1, "x"], 'load "press".displacement = .0.1, "x".: entry 2 must be a number'),
+        ("load.0.displacement", {"a": 1}, 'load "press".displacement must be a number'),
+        ("path.steps", [0, 1], "path.steps = .0, 1.: entry 1 must be at least 1"),
         ("load.0.direction", None, 'load "press".direction is missing'),
         ("load.1.direction", "z", 'load "side".direction = "z" must be'),
         ("interaction.0.surfaces", ["pin"], 'interaction "contact".surfaces = ."pin". must name two facet sets'),
@@ -149,6 +152,21 @@ def test_a_scene_loads_as_it_is_resolved(tmp_path):
     assert parse_any(tomllib.loads(resolved(scene))) == scene
     with pytest.raises(InputError, match=r"must read body.NAME.key=value, with a name among pin, lug"):
         load_scene(path, ["body.plate.E=1"])
+
+
+def test_set_replaces_alternatives_in_tables(tmp_path):
+    """As in the sections of a joint."""
+    path = tmp_path / "lug.toml"
+    path.write_text(LUG)
+    load = load_scene(path, ["load.press.force=[1, 2]"]).load[0]
+    assert (load.kind, load.stages) == ("force", [1, 2])
+
+
+def test_files_that_a_solve_reads_are_known(tmp_path):
+    """No result may be written over them."""
+    path = tmp_path / "lug.toml"
+    path.write_text(LUG)
+    assert files_read(path) == [path, tmp_path / "lug.msh"]
 
 
 def test_the_example_is_a_scene():

@@ -57,7 +57,7 @@ def basic() -> dict:
         ("block", "hardening", {"rat": 1.0}, "block.hardening.rat = 1.0 is not a known key; did you mean rate?"),
         ("block", "back_stresses", [[1.0, 1.0]], "need a yield_stress."),
         ("block", "yield_stress", 0.0, "must be greater than 0."),
-        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times block.E."),
+        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times E."),
         ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
         ("pin", "rigid", True, "is not for a rigid pin."),
         ("pin", None, {"rigid": True, "material": "S355"}, 'pin.material = "S355" is not for a rigid pin.'),
@@ -72,7 +72,7 @@ def basic() -> dict:
         ("load", "steps", 2.5, "must be a whole number."),
         ("load", "steps", 0, "must be at least 1."),
         ("load", "steps", [4, "x"], '= [4, "x"]: entry 2 must be a whole number.'),
-        ("load", "steps", [4, 5], "= [4, 5] must have one number for each of the 1 targets of displacement."),
+        ("load", "steps", [4, 5], "= [4, 5] must have one number for each of the 1 stages."),
         ("load", "displacement", 200.0, "must not exceed half the radius (5)."),
     ],
 )

@@ -51,7 +51,7 @@ def test_a_preset_is_the_general_scene_that_it_prints(data):
     assert parse_any(tomllib.loads(resolved(scene))) == scene
     assert scene.analysis.symmetry == 2
     if "units" in data:
-        assert (scene.force_unit, scene.thickness, scene.analysis.accuracy) == ("N", 5.0, 1e-3)
+        assert (scene.units.force_of(5.0), scene.thickness, scene.analysis.accuracy) == ("N", 5.0, 1e-3)
 
 
 def test_ten_lines_of_a_lug_say_all_of_it():

@@ -133,9 +133,9 @@ def test_the_resolved_file_gives_the_same_cases(tmp_path):
         ranges = { "joint.clearance" = { from = 0.001, to = 0.01, scale = "log" } }
     """
     sweep = read_sweep(written(tmp_path, text, "scenes/base.toml"))
-    assert {case.scene.load.name for case in sweep.cases} == {"relative_force"}
+    assert {case.scene.load.kind for case in sweep.cases} == {"relative_force"}
     unchanged = read_sweep(written(tmp_path, "", "scenes/base.toml"))
-    assert unchanged.cases[0].scene.load.legs == [0.5, 1.0]
+    assert unchanged.cases[0].scene.load.stages == [0.5, 1.0]
     for number, one in enumerate((sweep, unchanged)):
         folder = tmp_path / f"elsewhere{number}"
         folder.mkdir()
