@@ -32,10 +32,7 @@ def load(folder: str | Path) -> Any:
 
 
 def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> AnyScene:
-    """Read and check a scene file, with ``changes`` like ``{"joint.clearance": 0.01}``; None drops a key.
-
-    Raises `InputError` with one sentence per fault.
-    """
+    """Read a scene file with ``changes`` like ``{"joint.clearance": 0.01}`` (None drops a key). Raises `InputError`."""
     given = ((key, "" if value is None else toml_value(plain(value))) for key, value in (changes or {}).items())
     return scene_file.load_scene(path, [f"{key}={value}" for key, value in given])
 

@@ -57,8 +57,7 @@ def load_joint(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     """Read and check the scene file ``path``, with ``overrides`` like ``"joint.clearance=0.01"`` on top.
 
-    A mesh file is looked for beside it. Raises `InputError` with one sentence per fault: file, key, value, and what is
-    allowed.
+    A mesh file is looked for beside it. Raises `InputError` with one sentence per fault: file, key, value, what may be.
     """
     data = read_toml(path)
     if "base" in data and "joint" not in data:

@@ -42,8 +42,7 @@ class JointGeometry(Section):
         sizes = "element_size", "relative_element_size"
         name = sizes[0] if self.relative_element_size is None else given(self, sizes)
         require(1e-4 <= h <= 0.5, name, "must be between 1e-4 and 0.5 times the radius")
-        on_pin = self.size_ratio * h
-        require(1e-4 <= on_pin <= 0.5, "size_ratio", "must leave the pin elements of 1e-4 to 0.5 times the radius")
+        require(1e-4 <= self.size_ratio * h <= 0.5, "size_ratio", "must leave elements of 1e-4 to 0.5 R on the pin")
         require(self.edge_angle is None or not self.is_ring, "edge_angle", "is only for the model block")
         require(2 * (self.radius + self.dR) <= self.W, "block_size", "must be at least twice the radius of the hole")
         require(self.W / self.radius <= _WIDEST, "block_size", f"must not exceed {_WIDEST:g} times the radius")

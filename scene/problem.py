@@ -60,7 +60,7 @@ class ProblemScene(Checked):
         return self
 
     def _directions(self) -> None:
-        """Raise ValueError where one direction of one place is held or loaded twice, or turns what cannot turn."""
+        """Raise `Fault` where one direction of one place is held or loaded twice, or turns what cannot turn."""
         couplings, discs = {c.name for c in self.coupling}, {i.name for i in self.interaction if i.rigid}
         seen: dict[tuple[str, str], str] = {}
         parts = [("support", s.name, s.on, f) for s in self.support for f in s.fixed]
@@ -119,7 +119,7 @@ class ProblemScene(Checked):
     @property
     def loading(self) -> str:
         """What a run must be loaded by to be continued with this scene, in words."""
-        return " and ".join(f'load "{q.name}" ({q.kind} {q.direction or ""} on {q.on})' for q in self.load)
+        return " and ".join(f'load "{q.name}" ({q.kind} {q.direction or "normal"} on {q.on})' for q in self.load)
 
     @property
     def solids(self) -> dict[str, Body]:

@@ -163,9 +163,7 @@ class Load(Loading):
     """The displacement of the pin, from first touch, or the force on it: a ramp to a target, or to several in turn."""
 
     kinds = (*LOADS, "path")
-    displacement: Targets | None = key(
-        "displacement of the pin over dR: a target, or a list", default=None, example=2.0
-    )
+    displacement: Targets | None = key("displacement of the pin over dR: target, or list", default=None, example=2.0)
     displacement_absolute: Targets | None = key("displacement delta of the pin, instead", "length", other=0.1)
     force: Targets | None = key("force P on the whole pin, instead of a displacement", "force", other=1000.0)
     relative_force: Targets | None = key("P/(E* R), instead of force", other=0.01)
@@ -191,9 +189,7 @@ class Modelling(Section):
     plane: Literal["strain", "stress"] = key("plane strain or plane stress", default="strain")
     kinematics: Literal["current", "reference"] = key("closest points on deformed curves, or fixed", default="current")
     gamma_factor: float = key("Nitsche's gamma over trace constant; coercive above 0.25", default=0.5, ge=1e-3, le=1e6)
-    accuracy: Accuracy | None = key(
-        "relative error of P (of delta under a force) to reach by mesh and steps", other=0.001
-    )
+    accuracy: Accuracy | None = key("relative error of P (delta under a force) to reach by mesh and steps", other=0.001)
     degree: Literal[2, 3] = key("polynomial degree of displacements and of the curved geometry", default=2)
     thickness: Positive | None = key("thickness; forces and energies are per unit if absent", "length", other=10.0)
     tolerance: float = key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)

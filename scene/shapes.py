@@ -122,9 +122,7 @@ class PinLoad(Loading):
 
     displacement: Targets | None = key("displacement of the pin", "length", default=None, example=0.1)
     force: Targets | None = key("force on the whole pin, instead", "force", other=1000.0)
-    at: Literal["diameter", "centre"] = key(
-        "a force acts on the straight diameter, or on the centre", default="diameter"
-    )
+    at: Literal["diameter", "centre"] = key("a force acts on the straight diameter or the centre", default="diameter")
     steps: StepCounts = key("output steps up to each target", default=20)
 
     @model_validator(mode="after")
@@ -145,8 +143,8 @@ class Preset(Checked):
     output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
     def _require_whole(self, name: str, gap: float) -> None:
-        whole = self.pin.whole or self.pin.rigid or gap >= 0
-        require(whole, name, "needs pin.whole = true, as half a pin cannot be pressed in")
+        fits = self.pin.whole or self.pin.rigid or gap >= 0
+        require(fits, name, "needs pin.whole = true, as half a pin cannot be pressed in")
 
     def _pulled(
         self, shape: Shape, solids: Mapping[str, Solid], held: str, surfaces: list[str], gaps: list[float]
