@@ -16,10 +16,9 @@ class Measures:
     """One accepted output step of the whole joint (both symmetric halves), in the scene's units.
 
     ``contact_area`` is the arc length in contact, the mean of both sides; ``peeq_max`` the largest value at a
-    quadrature point, which grows without bound under mesh refinement where perfect plasticity localises. ``work`` is
-    the integral of ``P`` over ``delta`` by the trapezoidal rule. ``force_balance`` is the largest difference between
-    the forces at pin, contact and block, over the largest ``P`` so far, or over ``E* delta``, about what it would be in
-    contact, where nothing touches: what is left there is round-off.
+    quadrature point, which grows without bound under mesh refinement where perfect plasticity localises.
+    ``force_balance`` is the largest difference between the forces at pin, contact and block, over the largest ``P`` so
+    far, or where nothing touches over ``E* delta``, about what it would be in contact.
     """
 
     step: int

@@ -27,10 +27,8 @@ _AXES = {"x": 0, "y": 1, "rotation": 2}
 
 
 def general_problem(scene: ProblemScene, comm: MPI.Comm) -> Problem:
-    """The problem that ``scene`` states. Collective over ``comm``.
-
-    Raises `InputError`: a file that is no mesh, a set that it does not have, a problem that contradicts itself.
-    """
+    """The problem that ``scene`` states. Collective over ``comm``; raises `InputError` for a file that is no mesh, a
+    set that it does not have, a problem that contradicts itself."""
     with as_input_error(scene):
         return _Builder(scene, scene_mesh(scene, comm)).problem()
 

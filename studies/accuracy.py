@@ -54,8 +54,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What was ``asked`` and what is ``estimated`` (None if unknown) of the last level: errors of mesh and steps,
-    added."""
+    """What was ``asked`` and is ``estimated`` (None if unknown) of the last level: errors of mesh and steps, added."""
 
     asked: float
     estimated: float | None
@@ -77,13 +76,12 @@ def solve_to_accuracy(
     on_level: Callable[[Level], None] = lambda level: None,
     **options: Any,
 ) -> Outcome:
-    """Solve ``scene`` to its ``analysis.accuracy`` into ``folder``; as `solve_scene`, whose arguments the others are,
-    where it has none or a run goes on from ``start``. Collective.
+    """Solve ``scene`` to its ``analysis.accuracy`` into ``folder``; as `solve_scene`, whose arguments the others are
+    and whose errors it raises, where it has none or a run goes on from ``start``. Collective.
 
     The run that stays has the finest mesh; its scene.toml holds that mesh and the length of its steps, its run.json the
     `Accuracy`, which the outcome has, too. ``on_level`` reports every mesh on every rank. If the finest mesh or the
-    shortest steps allowed do not do, a warning says so. A mesh on which the scene cannot be solved ends everything, as
-    does an interrupt. Raises what `solve_scene` raises.
+    shortest steps allowed do not do, a warning says so. A mesh that cannot be solved ends everything, as interrupts do.
     """
     if scene.analysis.accuracy is None or start is not None:
         return solve_scene(scene, folder, comm, start=start, interrupt=interrupt, on_start=on_start, **options)
@@ -125,8 +123,7 @@ class _Search:
         self.step_error: float | None = None if self.scene.plastic else 0.0
 
     def refine(self) -> None:
-        """Solve until the estimate is as small as asked. Raises `_End` if no finer mesh is allowed, or a run does not
-        get to its end."""
+        """Solve until the estimate is as small as asked. Raises `_End` if there is no finer mesh, or a run stops."""
         curves: list[Curve] = []  # in steps of the final length, on the meshes that resolve the contact
         for mesh in count():
             curve, level = self._solve(mesh, self.substeps)

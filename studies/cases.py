@@ -58,10 +58,8 @@ class Sweep:
 
 
 def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
-    """Read the sweep file ``path``, with ``overrides`` of its base, and check the scene of every case.
-
-    Raises `InputError` with one sentence per fault.
-    """
+    """Read the sweep file ``path``, with ``overrides`` of its base, and check the scene of every case. Raises
+    `InputError` with one sentence per fault."""
     path = Path(path)
     file = load_sweep(path, overrides)
     varied = factors(file)
@@ -106,10 +104,7 @@ def factors(sweep: SweepFile) -> list[Factor]:
 
 
 def samples(hypercube: LatinHypercube) -> list[Overrides]:
-    """The samples of a Latin hypercube: of the ``number`` equal parts of each range every one holds one sample.
-
-    The same seed gives the same samples.
-    """
+    """The samples of a Latin hypercube, by its seed: each of the ``number`` equal parts of a range holds one."""
     from scipy.stats import qmc
 
     ranges, generator = hypercube.ranges, np.random.default_rng(hypercube.seed)
@@ -122,10 +117,7 @@ def samples(hypercube: LatinHypercube) -> list[Overrides]:
 
 
 def combinations(found: list[Factor]) -> list[Overrides]:
-    """The overrides of every case, the last factor varying fastest; those of the base, none, if nothing varies.
-
-    Raises `InputError` if there are too many.
-    """
+    """The overrides of every case, the last factor varying fastest. Raises `InputError` if there are too many."""
     number = math.prod(len(choices) for _, choices in found)
     if number > MOST_CASES:
         raise InputError(f"has {number} cases; {MOST_CASES} are allowed.")

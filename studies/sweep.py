@@ -18,11 +18,8 @@ _LINEAR = 3e4  # dofs up to which a step costs in proportion to them
 
 
 def claim(sweep: Sweep, folder: Path) -> None:
-    """Make ``folder`` ready for the sweep, or go on in it, and write the resolved sweep file.
-
-    A folder of another sweep must share a case with this one: then it is taken for an earlier state of the same. Raises
-    `InputError` if the folder cannot be used, or holds something else.
-    """
+    """Make ``folder`` ready for the sweep, or go on in it, and write the resolved sweep file. Raises `InputError` if it
+    cannot be used or holds something else; a sweep that shares a case is taken for an earlier state of this one."""
     try:
         if folder.is_dir() and any(folder.iterdir()) and not (folder / FILE).exists():
             raise InputError(f"{folder}: is not empty and holds no sweep; choose another folder with -o.")

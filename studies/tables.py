@@ -72,11 +72,8 @@ def result_of(case: Case, folder: Path) -> Result:
 
 
 def write(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> dict[str, Result]:
-    """Write both tables, from what is in the run folders now; returns how each run ended.
-
-    ``results`` of this process hold where a run folder says nothing. Each table is replaced in one move, by several
-    processes one after the other. Raises `InputError` if one cannot be written.
-    """
+    """Write both tables, from what is in the run folders now, several processes one after the other; returns how each
+    run ended. ``results`` of this process hold where a run folder says nothing. Raises `InputError`."""
     own = {result.run: result for result in results}
     try:
         with alone(folder):
