@@ -183,7 +183,8 @@ def _energy_limit(scene: AnyScene, steps: list[Any]) -> float:
 def not_finite(folder: Path) -> list[str]:
     """The places in a run's files that hold a nan or an infinity."""
     constants: list[str] = []
-    json.loads((folder / "run.json").read_text(encoding="utf-8"), parse_constant=constants.append)
+    if (folder / "run.json").exists():
+        json.loads((folder / "run.json").read_text(encoding="utf-8"), parse_constant=constants.append)
     found = [f"run.json: {name}" for name in sorted(set(constants))]
     history = read_history(folder / "history.csv")
     found += [f"history.csv: {name}" for name, column in history.items() if not np.all(np.isfinite(column))]
