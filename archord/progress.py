@@ -1,14 +1,15 @@
-"""A solve and its progress on rank 0, line by line."""
+"""A solve and its progress on rank 0: a line for every step, and on a terminal one that moves until the next."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from archord.ranks import on_terminal
 from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
@@ -56,7 +57,12 @@ class Progress:
     one, at the end."""
 
     def __init__(self, scene: AnyScene, silent: bool) -> None:
-        self.silent, self.by_mesh = silent, scene.analysis.accuracy is not None
+        self.silent, self.by_mesh, self.iterations = silent, scene.analysis.accuracy is not None, 0
+        self.moving: Any = None
+        if not silent and on_terminal():
+            from rich.console import Console
+
+            self.moving = Console().status("meshing")
         self.title, self.columns = _shown(scene)
         self.last, self.unit = "last value", 1.0
         if isinstance(scene, Scene):
@@ -67,6 +73,12 @@ class Progress:
             self.print(f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value")
             costs = f"substeps     dofs  {self.last:>10s}  error of mesh  error of steps  seconds"
             self.print(f" mesh  elements/R  growth  {costs}")
+
+    def show(self, load: float, iterations: int) -> None:
+        """Show on a terminal the load that was tried last, and the Newton iterations so far."""
+        self.iterations += iterations
+        if self.moving is not None:
+            self.moving.update(f"load {load:.6g}, {self.iterations} Newton iterations")
 
     def print(self, text: str) -> None:
         """Print a line."""
@@ -144,9 +156,10 @@ def solve_and_report(
         options["on_level"] = report.level
     elif begun is not None:
         options["timer"] = Timer({"start-up": perf_counter() - begun})
-    options |= {"on_start": report.start, "on_step": report.step}
+    options |= {"on_start": report.start, "on_step": report.step, "on_attempt": report.show}
     try:
-        outcome = solve_to_accuracy(scene, folder, comm, start=start, **options)
+        with report.moving or nullcontext():
+            outcome = solve_to_accuracy(scene, folder, comm, start=start, **options)
     except InputError:  # found by the mesh: nothing is left of a scene that is refused
         if new and comm.rank == 0:
             with suppress(OSError):

@@ -29,6 +29,12 @@ def launched_with_others() -> bool:
     return "PMIX_RANK" in os.environ and "OMPI_COMM_WORLD_SIZE" not in os.environ
 
 
+def on_terminal() -> bool:
+    """Whether somebody watches stdout. Under a launcher nobody can tell: Open MPI gives its ranks a terminal of their
+    own even where it writes to a file itself."""
+    return sys.stdout.isatty() and not any(name in os.environ for name in _RANK)
+
+
 def run_on_ranks(command: str, work: Callable[[], int]) -> int:
     """Exit code of ``work``, done by all ranks for a command of `COLLECTIVE`, else by rank 0 alone.
 

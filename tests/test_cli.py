@@ -1,7 +1,9 @@
 """The command as a user runs it: exit codes, sentences and what is written."""
 
+import contextlib
 import json
 import os
+import pty
 import signal
 import subprocess
 import sys
@@ -50,7 +52,7 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
     nothing is printed but by PETSC_OPTIONS: PETSc is finalized, and its output flushed, before the process ends."""
     first = archord("solve", SCENE, *COARSE, cwd=tmp_path)
     assert first.stderr == ""
-    assert [line.split()[0] for line in first.stdout.splitlines()[2:6]] == ["1", "2", "3", "4"]
+    assert [line.split()[0] for line in first.stdout.splitlines()[2:]] == ["1", "2", "3", "4", "4"]
     history = (tmp_path / "runs" / "steel_pin" / "history.csv").read_text()
     said = "runs/steel_pin: is not empty; choose another folder with -o, or overwrite a run in it with --force.\n"
     assert archord("solve", SCENE, *COARSE, cwd=tmp_path, code=2).stderr == said
@@ -61,6 +63,21 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
         assert (quiet.returncode, quiet.stderr) == (0, "")
         assert printed in quiet.stdout
         assert bool(printed) == bool(quiet.stdout)
+
+
+@pytest.mark.parametrize("quiet", [[], ["-q"]])
+def test_a_terminal_shows_how_far_a_solve_is(tmp_path, quiet):
+    """Between two lines of steps, in one line that moves; nothing of it with -q."""
+    ours, theirs = pty.openpty()
+    command, environment = [*SOLVE, *COARSE, *quiet], ENVIRONMENT | {"TERM": "xterm", "COLUMNS": "120"}
+    process, said = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=theirs), b""
+    os.close(theirs)
+    with contextlib.suppress(OSError), open(ours, "rb", buffering=0) as terminal:  # Linux' word for its end
+        while read := terminal.read(1024):
+            said += read
+    assert process.wait() == 0
+    assert (b" Newton iterations" in said, b"    4          2  " in said) == (not quiet, not quiet)
+    assert bool(said) == (not quiet)
 
 
 def test_ranks_print_once_and_give_the_same_history(tmp_path):
