@@ -15,7 +15,8 @@ from archord.scene.errors import InputError
 Say = Callable[[str], None]
 
 
-def _repeats(help: str, default: int) -> Callable:
+def _repeats(default: int, of: str) -> Callable:
+    help = f"runs of {of}; the median counts"
     return click.option("--repeats", type=click.IntRange(1), default=default, help=help)
 
 
@@ -92,7 +93,7 @@ def stability(output: Path, only: str | None, quiet: bool) -> int:
 @output("folder for runs and table", "runs/scaling")
 @click.option("--largest", type=click.FloatRange(5000), default=1_000_000, metavar="N", help="dofs of the largest mesh")
 @click.option("--ranks", type=click.IntRange(1), default=2, metavar="N", help="solve on 1, 2, 4, ... N ranks")
-@_repeats("runs of each case; the median counts", 1)
+@_repeats(1, "each case")
 @quiet("what is wrong")
 def scaling(output: Path, largest: float, ranks: int, repeats: int, quiet: bool) -> int:
     """Solve the paper's joint on ever finer meshes and several ranks: time by part and memory per rank.
@@ -108,7 +109,7 @@ def scaling(output: Path, largest: float, ranks: int, repeats: int, quiet: bool)
 @benchmark.command()
 @click.argument("group", type=click.Choice(["joint", "sweep", "strategies"]), default="joint")
 @output("folder for runs and table", "runs/variants")
-@_repeats("runs of each variant; the median counts", 3)
+@_repeats(3, "each variant")
 @quiet("what is wrong")
 def variants(group: str, output: Path, repeats: int, quiet: bool) -> int:
     """Solve scenes with one thing switched, by turns, and tell what each variant loads, needs and writes.
@@ -144,7 +145,7 @@ def accuracy(output: Path, only: str, quiet: bool) -> int:
 @benchmark.command("work-precision")
 @output("folder for runs, tables and diagrams", "runs/work_precision")
 @click.option("--only", multiple=True, metavar="PATTERN", help='part of "case: code, series, mesh"; may be repeated')
-@_repeats("timed runs of every point", 3)
+@_repeats(3, "every point")
 @click.option("--limit", type=click.FloatRange(1.0), default=600.0, help="seconds that a process may take")
 @quiet("what failed")
 def work_precision(output: Path, only: tuple[str, ...], repeats: int, limit: float, quiet: bool) -> int:

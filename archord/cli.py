@@ -73,20 +73,13 @@ def _run(arguments: list[str], begun: float) -> int:
     except (BrokenPipeError, SystemExit):  # the reader, like head, has seen enough; click makes one of the other
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE if _command(arguments) in COLLECTIVE else 0  # what solves is not done
-    except (KeyboardInterrupt, click.exceptions.Abort):
-        _say("archord: interrupted.")
-        return 130
-    except InputError as error:
-        _say(str(error))
-        return 2
+    except (KeyboardInterrupt, click.exceptions.Abort, InputError) as error:
+        bad = isinstance(error, InputError)
+        if launcher_rank() == 0:
+            print(error if bad else "archord: interrupted.", file=sys.stderr, flush=True)
+        return 2 if bad else 130
     except Exception as error:
         return _fail(error)
-
-
-def _say(text: str) -> None:
-    """Print to stderr on rank 0."""
-    if launcher_rank() == 0:
-        print(text, file=sys.stderr, flush=True)
 
 
 def _fail(error: Exception) -> int:

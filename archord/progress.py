@@ -26,19 +26,25 @@ if TYPE_CHECKING:
 Column = tuple[str, str, Callable[[Any], float]]  # heading, format, and value of a step
 
 
-def _shown(scene: AnyScene) -> tuple[str, list[Column]]:
-    """What is solved in words, and the columns of its steps: of a general scene displacement and force of each load."""
+def _shown(scene: AnyScene) -> tuple[str, list[Column], str, float]:
+    """What is solved in words, the columns of its steps (of a general scene displacement and force of each load), and
+    name and unit of what tells how accurate a mesh is."""
     kind, plane = "elastic-plastic" if scene.plastic else "elastic", f"plane {scene.analysis.plane}"
     if isinstance(scene, Scene):
         dR, R, E_star = scene.joint.dR, scene.joint.radius, scene.E_star
         unit = E_star * R * scene.thickness
-        return f"{kind} joint, {plane}, dR/R = {dR / R:g}", [
-            ("delta/dR", "9.5g", lambda m: m.delta / dR),
-            ("P/(E* R)", "11.7f", lambda m: round(m.P / unit, 7) + 0.0),  # no minus before a zero
-            ("eps/deg", "8.3f", lambda m: math.degrees(m.eps)),
-            ("p0/E*", "9.6f", lambda m: m.p0 / E_star),
-            ("PEEQ max", "9.2e", lambda m: m.peeq_max),
-        ]
+        last = ("delta/dR", dR) if scene.force_controlled else ("P/(E* R)", unit)
+        return (
+            f"{kind} joint, {plane}, dR/R = {dR / R:g}",
+            [
+                ("delta/dR", "9.5g", lambda m: m.delta / dR),
+                ("P/(E* R)", "11.7f", lambda m: round(m.P / unit, 7) + 0.0),  # no minus before a zero
+                ("eps/deg", "8.3f", lambda m: math.degrees(m.eps)),
+                ("p0/E*", "9.6f", lambda m: m.p0 / E_star),
+                ("PEEQ max", "9.2e", lambda m: m.peeq_max),
+            ],
+            *last,
+        )
 
     def value(name: str) -> Column:
         return name, f"{max(14, len(name))}.6g", lambda m: m.values[name]
@@ -49,7 +55,7 @@ def _shown(scene: AnyScene) -> tuple[str, list[Column]]:
     loads = [value(f"{load.name} {what}") for load in scene.load[:_LOADS_SHOWN] for what in ("displacement", "force")]
     bodies = "1 body" if len(scene.body) == 1 else f"{len(scene.body)} bodies"
     columns: list[Column] = [("load factor", "11.5g", lambda m: m.at), *loads, ("PEEQ max", "9.2e", peeq)]
-    return f"{bodies}, {kind}, {plane}", columns
+    return f"{bodies}, {kind}, {plane}", columns, "last value", 1.0
 
 
 class Progress:
@@ -63,15 +69,10 @@ class Progress:
             from rich.console import Console
 
             self.moving = Console().status("meshing")
-        self.title, self.columns = _shown(scene)
-        self.last, self.unit = "last value", 1.0
-        if isinstance(scene, Scene):
-            self.last, self.unit = "P/(E* R)", scene.E_star * scene.joint.radius * scene.thickness
-            if scene.force_controlled:
-                self.last, self.unit = "delta/dR", scene.joint.dR
+        self.title, self.columns, last, self.unit = _shown(scene)
         if self.by_mesh:
             self.print(f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value")
-            costs = f"substeps     dofs  {self.last:>10s}  error of mesh  error of steps  seconds"
+            costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
             self.print(f" mesh  elements/R  growth  {costs}")
 
     def show(self, load: float, iterations: int) -> None:
@@ -87,15 +88,9 @@ class Progress:
 
     def start(self, system: Any) -> None:
         """Say what is going to be solved."""
-        if not self.by_mesh:
-            ranks = f"{system.comm.size} rank{'s' if system.comm.size > 1 else ''}"
-            self.print(f"{self.title}: {system.n_cells} {system.cell_kind}, {system.n_dofs} dofs, {ranks}")
-            self.print_headings()
-
-    def step(self, m: Any) -> None:
-        """Show an accepted output step."""
-        if not self.by_mesh:
-            self.print_step(m)
+        ranks = f"{system.comm.size} rank{'s' if system.comm.size > 1 else ''}"
+        self.print(f"{self.title}: {system.n_cells} {system.cell_kind}, {system.n_dofs} dofs, {ranks}")
+        self.headings()
 
     def level(self, level: Level) -> None:
         """Show a mesh that is solved."""
@@ -105,20 +100,13 @@ class Progress:
             f"{level.last / self.unit:10.7f}  {mesh:>13s}  {steps:>14s}  {level.seconds:7.1f}"
         )
 
-    def finish(self, outcome: Outcome) -> None:
-        """Show what is known only now."""
-        if self.by_mesh:
-            self.print_headings()
-            for m in outcome.steps:
-                self.print_step(m)
-
-    def print_headings(self) -> None:
+    def headings(self) -> None:
         """Print the headings of steps."""
         widths = ((name, int(form.partition(".")[0])) for name, form, _ in self.columns)
         self.print("  ".join([" step", *(f"{name:>{width}s}" for name, width in widths), "iterations  cutbacks"]))
 
-    def print_step(self, m: Any) -> None:
-        """Print a step as a row."""
+    def step(self, m: Any) -> None:
+        """Show an accepted output step."""
         cells = (f"{value(m):{form}}" for _, form, value in self.columns)
         self.print("  ".join([f"{m.step:5d}", *cells, f"{m.iterations:10d}  {m.cutbacks:8d}"]))
 
@@ -152,11 +140,12 @@ def solve_and_report(
     from archord.studies.accuracy import solve_to_accuracy  # with all of dolfinx: bad input is told before
 
     report = Progress(scene, silent or comm.rank != 0)
+    options["on_attempt"] = report.show
     if report.by_mesh:
         options["on_level"] = report.level
-    elif begun is not None:
-        options["timer"] = Timer({"start-up": perf_counter() - begun})
-    options |= {"on_start": report.start, "on_step": report.step, "on_attempt": report.show}
+    else:
+        options |= {"on_start": report.start, "on_step": report.step}
+        options["timer"] = Timer({"start-up": perf_counter() - begun} if begun is not None else {})
     try:
         with report.moving or nullcontext():
             outcome = solve_to_accuracy(scene, folder, comm, start=start, **options)
@@ -165,5 +154,8 @@ def solve_and_report(
             with suppress(OSError):
                 folder.rmdir()
         raise
-    report.finish(outcome)
+    if report.by_mesh:
+        report.headings()
+        for m in outcome.steps:
+            report.step(m)
     return scene, outcome

@@ -54,15 +54,10 @@ def run_on_ranks(command: str, work: Callable[[], int]) -> int:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
     code = work()
     if code == 2:
-        _leave_together(code)
+        from mpi4py import MPI
+
+        from archord.output.ranks import arrived_before
+
+        if not arrived_before(MPI.COMM_WORLD, _PATIENCE):  # the fault is here alone
+            MPI.COMM_WORLD.Abort(code)
     return code
-
-
-def _leave_together(code: int) -> None:
-    """Wait until all ranks have found their input bad; end them if they do not come, as the fault is here alone."""
-    from mpi4py import MPI
-
-    from archord.output.ranks import arrived_before
-
-    if not arrived_before(MPI.COMM_WORLD, _PATIENCE):
-        MPI.COMM_WORLD.Abort(code)

@@ -75,10 +75,8 @@ def read_opinion(scene: AnyScene, system: System, mesh: DeckMesh, folder: Path) 
     text, p0 = (folder / "deck.frd").read_text(), None
     if isinstance(scene, Scene):
         arc = np.unique(mesh.surfaces[surface_name(system.problem.interactions[0], 0)].nodes)
-        angle, pressure = (
-            np.arctan2(mesh.x[:, 0], -mesh.x[:, 1] - scene.joint.dR),
-            read_nodal(text, "CONTACT", mesh)[:, 3],
-        )
+        angle = np.arctan2(mesh.x[:, 0], -mesh.x[:, 1] - scene.joint.dR)
+        pressure = read_nodal(text, "CONTACT", mesh)[:, 3]
         pressed = arc[pressure[arc] > 0]
         p0 = axis_pressure(angle[pressed], pressure[pressed])
     increments = [line.split() for line in (folder / "deck.sta").read_text().splitlines()]
@@ -145,17 +143,11 @@ def peeq_integral(printed: Printed, mesh: DeckMesh) -> float:
 def areas(x: Array) -> Array:
     """Areas ``(m,)`` of elements by their nodes ``(m, 3, 4, 6 or 8, 2)``, counting curved edges' parabolic segments;
     positive if counterclockwise."""
-
-    def polygons(order: list[int]) -> Array:
-        x0, x1 = np.moveaxis(x[:, order], 2, 0)
-        return 0.5 * (x0 * np.roll(x1, -1, axis=1) - x1 * np.roll(x0, -1, axis=1)).sum(axis=1)
-
     n = 3 if x.shape[1] in (3, 6) else 4
-    corners = polygons(list(range(n)))
-    if x.shape[1] == n:
-        return corners
-    around = [k for corner in range(n) for k in (corner, n + corner)]
-    return corners + 4 / 3 * (polygons(around) - corners)  # Archimedes: a segment has 4/3 of its triangle
+    around = x.reshape(len(x), -1, n, 2).swapaxes(1, 2).reshape(x.shape)
+    edges = (np.stack([p, np.roll(p, -1, axis=1)], axis=-1) for p in (x[:, :n], around))
+    corners, whole = (np.linalg.det(both).sum(axis=1) / 2 for both in edges)
+    return corners + 4 / 3 * (whole - corners)  # Archimedes: a segment has 4/3 of its triangle
 
 
 def read_nodal(text: str, block: str, mesh: DeckMesh) -> Array:
@@ -192,9 +184,8 @@ def compare(scene: Path, folder: Path) -> Table:
         one, other = fields.stress[own], opinion.stress[nodes]
         add(f"{body}: largest von Mises stress", von_mises(one).max(), von_mises(other).max())
         table.add(f"{body}: stresses", "", "", f"{np.linalg.norm(other - one) / np.linalg.norm(one):.2%}")
-    table.add(
-        "seconds", *(f"{run.seconds:.1f}" for run in (ours, theirs)), f"times {theirs.seconds / ours.seconds:.1f}"
-    )
+    seconds = ours.seconds, theirs.seconds
+    table.add("seconds", *(f"{taken:.1f}" for taken in seconds), f"times {seconds[1] / seconds[0]:.1f}")
     return table
 
 

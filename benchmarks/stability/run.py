@@ -17,7 +17,6 @@ from mpi4py import MPI
 from archord.benchmarks.case import Case, Expected, driven, matches, quantities, side_by_side
 from archord.benchmarks.stability.cases import FILE, FINE, Values, cases
 from archord.output.history import read_history
-from archord.output.run import Outcome
 from archord.output.step_file import all_arrays
 from archord.report.files import write_report
 from archord.report.table import Table
@@ -27,16 +26,21 @@ from archord.scene.scene import Scene
 from archord.solver.stepping import Step, StepFailure
 
 _BALANCE = 1e-8  # largest difference of forces over P, unless round-off is known to be larger
+_COMPARED = ("quantity", "value", "expected", "by", "deviation")
 _SPREAD = 10.0  # a sum of forces may be off by so many times the norm of their residual
 
 
 @dataclass(frozen=True)
 class Check:
-    """An ``error`` that must not be larger than ``allowed``; ``fault`` says so where it is."""
+    """An ``error`` that must not be larger than ``allowed``; ``fault`` says so where it is.
+
+    ``entries`` tell what was compared, by the table's headings.
+    """
 
     error: float
     allowed: float
     fault: str
+    entries: dict[str, str] = field(default_factory=dict)
 
     @property
     def share(self) -> float:
@@ -68,22 +72,13 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Comparison(Check):
-    """A ``value`` beside the ``reference`` that was ``expected``; the error is relative, absolute where that is 0."""
-
-    expected: Expected
-    value: float
-    reference: float
-
-
-@dataclass(frozen=True)
 class Line:
     """A line of the table: a case, its result, the comparison that takes the largest share of its tolerance, if there
     is any, and what is wrong."""
 
     case: Case
     result: Result
-    worst: Comparison | None
+    worst: Check | None
     faults: list[str]
 
     @property
@@ -135,7 +130,7 @@ def solve_case(case: Case, folder: Path) -> Result:
 
     Raises KeyboardInterrupt if a signal interrupted the run.
     """
-    result, begun = Result(), perf_counter()
+    result, begun, scene = Result(), perf_counter(), case.scene
 
     def attempted(load: float, iterations: int) -> None:
         result.iterations += iterations
@@ -145,27 +140,22 @@ def solve_case(case: Case, folder: Path) -> Result:
     try:
         outcome = case.attempt(folder, on_attempt=attempted)
         result.status, result.message = outcome.status, outcome.message
-        _look(result, case.scene, outcome)
+        report = json.loads((outcome.folder / "run.json").read_text(encoding="utf-8"))
+        result.not_finite, result.warnings = not_finite(outcome.folder), report["warnings"]
+        result.steps = len(outcome.steps)
+        result.cutbacks = report["totals"]["cutbacks"] + report.get("failed_step", {}).get("cutbacks", 0)
+        if outcome.steps:
+            estimates = report["error_estimates"]
+            balance, energy = estimates["force_balance"], estimates["energy_balance"] or 0.0
+            allowed = max(_BALANCE, _SPREAD * estimates["newton_residual"])
+            result.forces = Check(balance, allowed, f"forces differ by {balance:.1e} of P")
+            limit = 1.001 * _energy_limit(scene, outcome.steps) + 1e-8
+            result.energy = Check(energy, limit, f"energy is off by {energy:.1e} of the work")
+            result.quantities = quantities(scene, outcome.steps[-1])
     except Exception as error:
         result.status, result.message = "failed", f"{type(error).__name__}: {error}"
     result.seconds = perf_counter() - begun
     return result
-
-
-def _look(result: Result, scene: AnyScene, outcome: Outcome) -> None:
-    """Fill in what the run's files and steps tell."""
-    report = json.loads((outcome.folder / "run.json").read_text(encoding="utf-8"))
-    result.not_finite, result.warnings = not_finite(outcome.folder), report["warnings"]
-    result.steps = len(outcome.steps)
-    result.cutbacks = sum(m.cutbacks for m in outcome.steps) + report.get("failed_step", {}).get("cutbacks", 0)
-    if outcome.steps:
-        estimates = report["error_estimates"]
-        balance, energy = estimates["force_balance"], estimates["energy_balance"] or 0.0
-        allowed = max(_BALANCE, _SPREAD * estimates["newton_residual"])
-        result.forces = Check(balance, allowed, f"forces differ by {balance:.1e} of P")
-        limit = 1.001 * _energy_limit(scene, outcome.steps) + 1e-8
-        result.energy = Check(energy, limit, f"energy is off by {energy:.1e} of the work")
-        result.quantities = quantities(scene, outcome.steps[-1])
 
 
 def _energy_limit(scene: AnyScene, steps: list[Any]) -> float:
@@ -209,23 +199,24 @@ def judge(case: Case, results: dict[str, Result], fine: Values) -> Line:
         faults.append(f"not finite: {', '.join(result.not_finite)}")
     comparisons = [_compare(case, expected, results, fine) for expected in case.expected if ended]
     faults += [c.fault for c in (result.forces, result.energy, *comparisons) if c is not None and c.share > 1]
-    worst = max(comparisons, key=lambda c: c.share) if comparisons else None
-    return Line(case, result, worst, faults)
+    return Line(case, result, max(comparisons, key=lambda c: c.share) if comparisons else None, faults)
 
 
-def _compare(case: Case, expected: Expected, results: dict[str, Result], fine: Values) -> Comparison:
+def _compare(case: Case, expected: Expected, results: dict[str, Result], fine: Values) -> Check:
+    """The relative error, absolute where the reference is 0."""
     value, reference = results[case.name].quantities.get(expected.quantity, math.nan), expected.value
     if isinstance(reference, str):
         values = fine.get(case.name, {}) if reference == FINE else results[reference].quantities
         reference = expected.factor * values.get(expected.quantity, math.nan)
     deviation = abs(value / reference - 1) if reference else abs(value)
     fault = f"{expected.quantity} is {value:.6g}, not {reference:.6g} ({expected.source})"
-    return Comparison(deviation, expected.tolerance, fault, expected, value, reference)
+    said = expected.quantity, f"{value:.8g}", f"{reference:.8g}", expected.source, f"{deviation:.1e}"
+    return Check(deviation, expected.tolerance, fault, dict(zip(_COMPARED, said, strict=True)))
 
 
 def row(line: Line) -> dict[str, object]:
     """The entries of a line by heading; what is not there is empty."""
-    case, result, worst = line.case, line.result, line.worst
+    case, result = line.case, line.result
     energy = result.energy if result.energy and result.energy.allowed < math.inf else None
     return {
         "group": case.group,
@@ -236,31 +227,23 @@ def row(line: Line) -> dict[str, object]:
         "cutbacks": result.cutbacks,
         "force balance": f"{result.forces.error:.0e}" if result.forces else "",
         "energy error": f"{energy.error:.0e}" if energy else "",
-        "quantity": worst.expected.quantity if worst else "",
-        "value": f"{worst.value:.8g}" if worst else "",
-        "expected": f"{worst.reference:.8g}" if worst else "",
-        "by": worst.expected.source if worst else "",
-        "deviation": f"{worst.error:.1e}" if worst else "",
+        **(line.worst.entries if line.worst else dict.fromkeys(_COMPARED, "")),
         "seconds": f"{result.seconds:.1f}",
         "verdict": line.verdict,
     }
 
 
-def markdown(lines: list[Line]) -> str:
-    """How many are as they should be, the table, and the sentences of the runs that stopped."""
+def write(lines: list[Line], folder: Path) -> tuple[str, list[Path]]:
+    """Write stability.csv and stability.md into ``folder``: how many are as they should be, the table, and the
+    sentences of the runs that stopped. Returns the Markdown and the files."""
+    rows = [*map(row, lines)]
     converged = sum(line.result.status == "done" for line in lines)
     solvable = sum(not line.case.stops for line in lines)
     seconds = sum(line.result.seconds for line in lines)
     said = "".join(f"- {line.case.name}: {line.result.message}.\n" for line in lines if line.result.message)
-    return (
+    text = (
         f"{len(lines)} scenes in {seconds:.0f} s: {converged} converged of the {solvable} that have a solution, "
         f"{len(lines) - solvable} must stop with a sentence; {sum(bool(line.faults) for line in lines)} not as they "
-        f"should be.\n\n{Table.of([*map(row, lines)]).markdown()}"
-        + (f"\nWhat the runs that stopped said:\n\n{said}" if said else "")
+        f"should be.\n\n{Table.of(rows).markdown()}" + (f"\nWhat the runs that stopped said:\n\n{said}" if said else "")
     )
-
-
-def write(lines: list[Line], folder: Path) -> tuple[str, list[Path]]:
-    """Write stability.csv and stability.md into ``folder``; returns the Markdown and the files."""
-    text = markdown(lines)
-    return text, write_report(folder, "stability", [*map(row, lines)], text)
+    return text, write_report(folder, "stability", rows, text)
