@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Drawing, PinPart, Sketch, around, mesh_joint
+from archord.geometry.shapes.joint_mesh import PinPart, Sketch, around, mesh_joint
 
 _LAYERS = 2  # across a wall, at least
 _SLENDER = 4.0  # longest element of a wall over its thickness
@@ -45,30 +45,20 @@ def bushing(
     shifts = [sum(gaps[i:]) for i in range(len(rings) + 1)]
     names = ["pin", *(f"sleeve {k}" for k in range(1, len(rings))), "housing"]
     sets = [(f"{name} inside", f"{name} outside") for name in names[1:-1]] + [("bore", "outer edge")]
-
-    def draw(geo) -> Drawing:
-        sketch = Sketch(geo, names, ["pin", "flat", *(name for pair in sets for name in pair), "axis"])
-        sketch.pin(shifts[0], 1, pin)
-        sizes = {"pin": f"{size!r} + {growth!r} * Abs({around(shifts[0])} - 1)"}
-        parts: dict[int, float] = {}
-        grid: dict[int, list[int]] = {}
-        for body, pair, (inner, outer), x in zip(names[1:], sets, rings, shifts[1:], strict=True):
-            ends = [((x + r, 0.0), (x, r), (x - r, 0.0)) for r in (inner, outer)]
-            arcs = {name: sketch.path(body, *places, centre=(x, 0.0)) for name, places in zip(pair, ends, strict=True)}
-            across = sketch.path(body, ends[0][0], ends[1][0]) + sketch.path(body, ends[0][2], ends[1][2])
-            face = sketch.face(body, **arcs, axis=across)
-            r, layers = around(x), (outer - inner) / (size * inner)
-            away = f"{r} - {inner!r}" if body == "housing" else f"Min(Abs({r} - {inner!r}), Abs({r} - {outer!r}))"
-            sizes[body] = f"{size!r} * {r} + {growth!r} * Abs({away})"
-            if layers < _THIN:
-                parts |= dict.fromkeys(across, max(_LAYERS, layers))
-                grid[face] = [sketch.point(body, places[i]) for places, i in zip(ends * 2, (0, 0, 2, 2), strict=True)]
-        round_lines = [line for name, lines in sketch.lines.items() if name not in ("flat", "axis") for line in lines]
-        parts |= dict.fromkeys(round_lines, math.pi / 2 / size)
-        return Drawing(sketch.faces, sizes, sketch.lines, parts, grid)
-
-    circles = [Circle("pin", (shifts[0], 0.0), 1.0)]
-    for pair, radii, x in zip(sets, rings, shifts[1:], strict=True):
-        circles += [Circle(name, (x, 0.0), r) for name, r in zip(pair, radii, strict=True)]
-    key = ("bushing", rings, size, growth, touching, pin)
-    return mesh_joint(comm, draw, circles, key, radius=radius, **options)
+    sketch = Sketch(names, ["pin", "flat", *(name for pair in sets for name in pair), "axis"])
+    sketch.pin(shifts[0], 1, pin)
+    sketch.sizes["pin"] = f"{size!r} + {growth!r} * Abs({around(shifts[0])} - 1)"
+    for body, pair, (inner, outer), x in zip(names[1:], sets, rings, shifts[1:], strict=True):
+        ends = [((x + r, 0.0), (x, r), (x - r, 0.0)) for r in (inner, outer)]
+        circles = [Circle(name, (x, 0.0), r) for name, r in zip(pair, (inner, outer), strict=True)]
+        arcs = {on.facets: sketch.path(body, *places, on=on) for on, places in zip(circles, ends, strict=True)}
+        across = sketch.path(body, ends[0][0], ends[1][0]) + sketch.path(body, ends[0][2], ends[1][2])
+        face = sketch.face(body, **arcs, axis=across)
+        r, layers = around(x), (outer - inner) / (size * inner)
+        away = f"{r} - {inner!r}" if body == "housing" else f"Min(Abs({r} - {inner!r}), Abs({r} - {outer!r}))"
+        sketch.sizes[body] = f"{size!r} * {r} + {growth!r} * Abs({away})"
+        if layers < _THIN:
+            sketch.parts |= dict.fromkeys(across, max(_LAYERS, layers))
+            sketch.grid[face] = [sketch.point(body, ends[i][j]) for j in (0, 2) for i in (0, 1)]
+    sketch.parts |= {line: math.pi / 2 / size for name in sketch.circles for line in sketch.lines[name]}
+    return mesh_joint(comm, sketch, radius=radius, **options)

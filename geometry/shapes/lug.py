@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Drawing, PinPart, Sketch, around, mesh_joint
+from archord.geometry.shapes.joint_mesh import PinPart, Sketch, around, mesh_joint
 
 _ACROSS = 3  # elements across the narrowest ligament, at least
 _CORNER = 2.0  # size at the clamp's corners, where the stress is singular, over that on the arcs
@@ -44,25 +44,19 @@ def lug(
     """
     hole, side, tip, back = (v / radius for v in (radius + clearance, width / 2, edge_distance, length))
     size, x = min(element_size / radius, (min(side, tip) - hole) / _ACROSS), max(hole - 1, 0.0)
-    round_end = end == "round"
-
-    def draw(geo) -> Drawing:
-        sketch = Sketch(geo, ("pin", "lug"), ("pin", "hole", "flat", "clamp", "axis", "end", "sides"))
-        for up in (1,) if half else (1, -1):
-            arc = sketch.path("lug", (hole, 0), (0, up * hole), (-hole, 0), centre=(0, 0))
-            axis = sketch.path("lug", (-hole, 0), (-back, 0)) + sketch.path("lug", (tip, 0), (hole, 0))
-            corner = (tip - side if round_end else tip, up * side)
-            clamp, sides = sketch.path("lug", (-back, 0), (-back, up * side)), [(-back, up * side), corner]
-            last = sketch.path("lug", corner, (tip, 0), centre=(tip - side, 0) if round_end else None)
-            sketch.face("lug", hole=arc, axis=axis, clamp=clamp, sides=sketch.path("lug", *sides), end=last)
-            sketch.pin(x, up, pin)
-        growing = f"{size!r} + {growth!r} * Abs({{}} - {{!r}})"
-        clamped = f"{_CORNER * size!r} + {growth!r} * Sqrt((x + {back!r})^2 + (Abs(y) - {side!r})^2)"
-        sizes = {"pin": growing.format(around(x), 1.0), "lug": f"Min({growing.format(around(0), hole)}, {clamped})"}
-        parts = {line: math.pi / 2 / size for line in sketch.lines["pin"] + sketch.lines["hole"]}
-        return Drawing(sketch.faces, sizes, sketch.lines, parts)
-
-    circles = [Circle("pin", (x, 0.0), 1.0), Circle("hole", (0.0, 0.0), hole)]
-    circles += [Circle("end", (tip - side, 0.0), side)] * round_end
-    key = ("lug", hole, side, tip, back, size, growth, end, half, pin)
-    return mesh_joint(comm, draw, circles, key, radius=radius, **options)
+    apex = Circle("end", (tip - side, 0.0), side) if end == "round" else None
+    sketch = Sketch(("pin", "lug"), ("pin", "hole", "flat", "clamp", "axis", "end", "sides"))
+    for up in (1,) if half else (1, -1):
+        arc = sketch.path("lug", (hole, 0), (0, up * hole), (-hole, 0), on=Circle("hole", (0.0, 0.0), hole))
+        axis = sketch.path("lug", (-hole, 0), (-back, 0)) + sketch.path("lug", (tip, 0), (hole, 0))
+        corner = (tip - side if apex else tip, up * side)
+        clamp, sides = sketch.path("lug", (-back, 0), (-back, up * side)), [(-back, up * side), corner]
+        last = sketch.path("lug", corner, (tip, 0), on=apex)
+        sketch.face("lug", hole=arc, axis=axis, clamp=clamp, sides=sketch.path("lug", *sides), end=last)
+        sketch.pin(x, up, pin)
+    growing = f"{size!r} + {growth!r} * Abs({{}} - {{!r}})"
+    clamped = f"{_CORNER * size!r} + {growth!r} * Sqrt((x + {back!r})^2 + (Abs(y) - {side!r})^2)"
+    sketch.sizes["pin"] = growing.format(around(x), 1.0)
+    sketch.sizes["lug"] = f"Min({growing.format(around(0), hole)}, {clamped})"
+    sketch.parts |= dict.fromkeys(sketch.lines["pin"] + sketch.lines["hole"], math.pi / 2 / size)
+    return mesh_joint(comm, sketch, radius=radius, **options)

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.joint_mesh import Drawing, Sketch, mesh_joint
+from archord.geometry.shapes.joint_mesh import Sketch, mesh_joint
 
 _EDGE_GROWTH = 0.4  # of elements that shrink toward the contact's edge, per unit of distance from it
 
@@ -39,35 +39,34 @@ def quarter_joint(
     whole one the upper half, free, is meshed with the rest, which is then pressed along a line inside it.
     """
     hole, width, size = 1.0 + clearance / radius, block_size / radius, element_size / radius
-    on_arc = {"pin": size_ratio * size, "hole": size}
-
-    def draw(geo) -> Drawing:
-        sketch = Sketch(geo, ("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry", "pin back"))
-        middle, bottom, side, top = (0, 1 - hole), (0, -hole), (1, 1 - hole), (0, 2 - hole)
-        if not rigid_pin:
-            sketch.point("pin", middle)
-            arc, half = sketch.path("pin", bottom, side, centre=middle), sketch.path("pin", side, middle)
-            sketch.face("pin", **{"pin": arc, "pin top": half}, symmetry=sketch.path("pin", middle, bottom))
-            if whole_pin:
-                sketch.point("pin", top)
-                back, line = sketch.path("pin", side, top, centre=middle), sketch.path("pin", top, middle)
-                sketch.face("pin", **{"pin back": back, "symmetry": line, "pin top": half})
-        corners = (hole, 0), (width, 0), (width, -width), (0, -width)
-        for place in ((0, 0), bottom, *corners):
-            sketch.point("block", place)
-        arc, (held, *free) = sketch.path("block", bottom, corners[0], centre=(0, 0)), sketch.path("block", *corners)
-        line = sketch.path("block", corners[-1], bottom)
-        sketch.face("block", **{"hole": arc, "block held": [held], "": free, "symmetry": line})
-        from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
-        sizes = {body: f"{size!r} + {from_arc}" for body, size in zip(sketch.faces, on_arc.values(), strict=True)}
-        parts = {line: math.pi / 2 / on_arc[arc] for arc in on_arc for line in sketch.lines[arc]}
-        if edge is not None:
+    sketch = Sketch(("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry", "pin back"))
+    middle, bottom, side, top = (0, 1 - hole), (0, -hole), (1, 1 - hole), (0, 2 - hole)
+    if not rigid_pin:
+        sketch.point("pin", middle)
+        arc, half = sketch.path("pin", bottom, side, on=Circle("pin", middle, 1.0)), sketch.path("pin", side, middle)
+        sketch.face("pin", **{"pin": arc, "pin top": half}, symmetry=sketch.path("pin", middle, bottom))
+        if whole_pin:
+            sketch.point("pin", top)
+            back, line = (
+                sketch.path("pin", side, top, on=Circle("pin back", middle, 1.0)),
+                sketch.path("pin", top, middle),
+            )
+            sketch.face("pin", **{"pin back": back, "symmetry": line, "pin top": half})
+    corners = (hole, 0), (width, 0), (width, -width), (0, -width)
+    for place in ((0, 0), bottom, *corners):
+        sketch.point("block", place)
+    arc, (held, *free) = (
+        sketch.path("block", bottom, corners[0], on=Circle("hole", (0, 0), hole)),
+        sketch.path("block", *corners),
+    )
+    line = sketch.path("block", corners[-1], bottom)
+    sketch.face("block", **{"hole": arc, "block held": [held], "": free, "symmetry": line})
+    for body, name, on_arc in (("pin", "pin", size_ratio * size), ("block", "hole", size)):
+        sketch.sizes[body] = f"{on_arc!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
+        if edge is None:
+            sketch.parts |= dict.fromkeys(sketch.lines[name], math.pi / 2 / on_arc)
+        else:
             x, y = hole * math.sin(edge[0]), hole * math.cos(edge[0])
             near_edge = f"{edge[1] / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
-            sizes, parts = {body: f"Min({value}, {near_edge})" for body, value in sizes.items()}, {}
-        return Drawing(sketch.faces, sizes, sketch.lines, parts)
-
-    circles = [Circle(name, (0.0, 1 - hole), 1.0) for name in ("pin", "pin back")] + [Circle("hole", (0.0, 0.0), hole)]
-    near = edge and (edge[0], edge[1] / radius)
-    key = ("quarter joint", hole, width, size, growth, size_ratio, near, rigid_pin, whole_pin)
-    return mesh_joint(comm, draw, circles, key, radius=radius, **options)
+            sketch.sizes[body] = f"Min({sketch.sizes[body]}, {near_edge})"
+    return mesh_joint(comm, sketch, radius=radius, **options)
