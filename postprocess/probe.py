@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,13 +16,13 @@ from archord.scene.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from archord.geometry.curve import Curve
     from archord.postprocess.run import Run
 
-CONTACT = {"pressure": "pressure", "facet_pressure": "pressure", "gap": "gap"}
-Points = tuple[Array, Array, Array, Array | None]  # of a `Probe`: x, s, values, angle
-_CLOSED = 0.999  # of a circle's length
+_CONTACT = {"pressure": "pressure", "facet_pressure": "pressure", "gap": "gap"}
+_UNITLESS = ("peeq", "plastic")  # beginnings of names
+_GAP = 0.3  # degrees: the least gap in a circle
 _SMOOTH = 0.9  # cosine of the angle between facets without a corner
+_ROUND_OFF = 1e-6  # degrees
 _NOTHING = 1e-9  # of the largest force of a run: round-off
 _SAMPLES = 201  # on a line
 
@@ -62,9 +62,8 @@ class Probe:
     def over(self, length: float) -> Probe:
         """This over P / ``length``, the mean stress that the force makes in a section. Raises `InputError`."""
         if not (self.force and length > 0):
-            raise InputError(
-                f"{self.place}: has no factor over a section of {length:g} under a force of {self.force:g}."
-            )
+            section = f"a section of {length:g} under a force of {self.force:g}"
+            raise InputError(f"{self.place}: has no factor over {section}.")
         return replace(self, quantity=f"{self.quantity}/(P/L)", unit="", values=self.values / (self.force / length))
 
     def frame(self) -> pd.DataFrame:
@@ -76,73 +75,69 @@ class Probe:
         return frame_of(known, {"angle": "°", self.quantity: self.unit})
 
 
-def probe_edge(run: Run, edge: str, quantity: str, step: int) -> Probe:
-    """A ``quantity`` at the nodes along an ``edge`` of the mesh: its "hoop", "normal" or "shear" stress, or one of
-    `at_nodes`; or "pressure" or "gap" at the integration points of a surface, or "facet_pressure", the mean of each
-    facet, which scatters less where bodies yield. Raises `InputError`."""
-    along = _contact if quantity in CONTACT else _stress
-    x, s, values, angle = along(run, edge, quantity, step)
-    return Probe(edge, quantity, _unit(run, quantity), step, *_driving(run, step), x, s, values, angle)
+def probe(run: Run, edge: str, quantity: str, step: int, line: Sequence[float]) -> Probe:
+    """A ``quantity`` along an ``edge`` of the mesh or the straight ``line`` x0, y0, x1, y1. Raises `InputError`.
+
+    At the nodes of an edge its "hoop" (the default), "normal" or "shear" stress, or a nodal field; at the integration
+    points of a surface "pressure" or "gap", or "facet_pressure", the mean of each facet, which scatters less where
+    bodies yield. On a line a nodal field (von Mises stress), linear between nodes.
+    """
+    if bool(edge) == bool(line):
+        raise InputError("probe: give an edge or a line.")
+    quantity = quantity or ("von_mises" if line else "hoop")
+    along = _contact if quantity in _CONTACT else _stress
+    points = _inside(run, line, quantity, step) if line else along(run, edge, quantity, step)
+    unit = run.scene.units.length if quantity in ("ux", "uy", "gap") else run.scene.units.stress
+    unit = "rad" if quantity == "principal_angle" else "" if quantity.startswith(_UNITLESS) else unit
+    return Probe(edge or "line", quantity, unit, step, *_driving(run, step), *points)
 
 
-def _contact(run: Run, edge: str, quantity: str, step: int) -> Points:
+def _contact(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
     from archord.geometry.curve import circle_through  # with bases, which most readers of runs do without
 
     arc = run.arc(step, edge)
-    x, s, values = undeformed(arc, edge, run.scene), arc.s, getattr(arc, CONTACT[quantity])
-    circle = circle_through(x.reshape(-1, 2))
-    if quantity == "facet_pressure":
-        share = arc.weight / arc.width[:, None]
-        x, s, values = (np.einsum("fq,fq...->f...", share, array) for array in (x, s, values))
+    points = undeformed(arc, edge, run.scene), arc.s, getattr(arc, _CONTACT[quantity])
+    circle, share = circle_through(points[0].reshape(-1, 2)), arc.weight / arc.width[:, None]
+    means = [np.einsum("fq,fq...->f...", share, values) for values in points]
+    x, s, values = means if quantity == "facet_pressure" else points
     x, s, values = x.reshape(-1, 2), s.ravel(), values.ravel()
     if circle is None:
-        return x, s, values, None
+        return x, s, values
     centre, radius = circle
-    angle = np.degrees(np.arctan2(*(x - centre).T[::-1])) % 360
-    if arc.width.sum() < _CLOSED * 2 * np.pi * radius:  # from the free end on
-        rising = np.sort(angle)
-        angle[angle < rising[np.argmax(np.diff(rising, prepend=rising[-1] - 360))]] += 360
+    middle, half = _angle(means[0], centre), np.degrees(arc.width / (2 * radius))
+    angle = _rising(_angle(x, centre), middle - half, middle + half)
     order = np.argsort(angle)
     return x[order], np.radians(angle[order]) * radius, values[order], angle[order]
 
 
-def _stress(run: Run, edge: str, quantity: str, step: int) -> Points:
-    from archord.geometry.curve import Curve
-
+def _stress(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
     fields = run.fields(step)
     edges = [name for name, facets in fields.edges.items() if len(facets)]
     if edge not in edges:
         raise InputError(f"{run.folder}: has no edge {edge!r}; its edges are {', '.join(edges) or 'none'}.")
-    rows, begins, radius = _oriented(fields, edge)
-    nodes, index = np.unique(rows, return_inverse=True)
-    curve = Curve(fields.coordinates[nodes], 2, index.reshape(rows.shape))
-    s, angle = curve.arc_length(np.array([0.0, 0.5, 1.0])), None
-    if radius:
-        first = np.maximum.accumulate(np.where(s[:, 0] == 0, np.arange(len(rows)), 0))  # facet of each piece
-        angle = begins[first, None] + np.degrees(s / radius)
-        s = np.radians(angle) * radius
-    tangent, joined = _tangents(curve)
-    values = {name: whole[rows] for name, whole in at_nodes(fields).items()}
+    rows, s, radius = _along(fields, edge)
+    tangent, joined = _tangents(fields.coordinates[rows], rows)
+    stresses = {}
     if fields.stress is not None:
         xx, yy, _, xy = np.moveaxis(fields.stress[rows], -1, 0)
         c, d = np.moveaxis(tangent, -1, 0)
         hoop = xx * c**2 + yy * d**2 + 2 * xy * c * d
-        values |= {"hoop": hoop, "normal": xx + yy - hoop, "shear": (yy - xx) * c * d + xy * (c**2 - d**2)}
+        stresses = {"hoop": hoop, "normal": xx + yy - hoop, "shear": (yy - xx) * c * d + xy * (c**2 - d**2)}
     shown = np.ones(rows.shape, dtype=bool)
     shown[:, 2] = ~joined
-    x, value = fields.coordinates[rows], _one(values, quantity, run)
-    return x[shown], s[shown], value[shown], None if angle is None else angle[shown]
+    values = _nodal(run, fields, quantity, rows, **stresses)
+    angle = np.degrees(s / radius)[shown] if radius else None
+    return fields.coordinates[rows][shown], s[shown], values[shown], angle
 
 
-def probe_line(run: Run, line: Sequence[float], quantity: str, step: int) -> Probe:
-    """One of `at_nodes` on the straight ``line`` from (x0, y0) to (x1, y1) where it is in a body before it is loaded,
-    linear between nodes. Raises `InputError`."""
+def _inside(run: Run, line: Sequence[float], quantity: str, step: int) -> tuple[Any, ...]:
+    """The points of the line that are in a body before it is loaded."""
     from matplotlib.tri import LinearTriInterpolator, Triangulation
 
     start, end, share = np.array(line[:2]), np.array(line[2:]), np.linspace(0, 1, _SAMPLES)
     fields, x = run.fields(step), start + share[:, None] * (end - start)
+    values = _nodal(run, fields, quantity)
     found: Array = np.full(_SAMPLES, np.nan)
-    values = _one(at_nodes(fields), quantity, run)
     for body in fields.bodies.values():
         triangles = Triangulation(*fields.coordinates.T, fields.triangles[fields.body == body].reshape(-1, 3))
         here = np.ma.filled(LinearTriInterpolator(triangles, values)(*x.T), np.nan)
@@ -150,28 +145,17 @@ def probe_line(run: Run, line: Sequence[float], quantity: str, step: int) -> Pro
     inside = ~np.isnan(found)
     if not inside.any():
         raise InputError(f"{run.folder}: no body lies on the line.")
-    points = x[inside], share[inside] * np.linalg.norm(end - start), found[inside]
-    return Probe("line", quantity, _unit(run, quantity), step, *_driving(run, step), *points)
+    return x[inside], share[inside] * np.linalg.norm(end - start), found[inside]
 
 
-def at_nodes(fields: Fields) -> dict[str, Array]:
-    """What there is to probe: values ``(n,)`` at the nodes by name; stresses only where `output.stress` wrote them."""
-    return fields.nodal_fields() | {"ux": fields.displacement[:, 0], "uy": fields.displacement[:, 1]}
-
-
-def _one(known: dict[str, Array], quantity: str, run: Run) -> Array:
+def _nodal(run: Run, fields: Fields, quantity: str, nodes: Any = ..., **more: Array) -> Array:
+    """The quantity at ``nodes``, any shape: a nodal field, or one ``more`` that is known there."""
+    known = fields.nodal_fields() | {"ux": fields.displacement[:, 0], "uy": fields.displacement[:, 1]}
+    known = {name: values[nodes] for name, values in known.items()} | more
     if quantity not in known:
         why = "" if run.scene.output.stress else " (the run was solved with output.stress = false)"
         raise InputError(f"{run.folder}: has no {quantity!r} there, but {', '.join(known)}{why}.")
     return known[quantity]
-
-
-def _unit(run: Run, quantity: str) -> str:
-    if quantity in ("ux", "uy", "gap"):
-        return run.scene.units.length
-    if quantity.startswith(("peeq", "plastic")):
-        return ""
-    return "rad" if quantity == "principal_angle" else run.scene.units.stress
 
 
 def _driving(run: Run, step: int) -> tuple[float, str]:
@@ -180,17 +164,31 @@ def _driving(run: Run, step: int) -> tuple[float, str]:
     if not run.is_joint:
         pulls = [load.name for load in run.scene.load if load.pressure is None and load.direction != "rotation"]
         names = {name: f"{name} force" for name in pulls}
-    forces = {by: np.array(run.columns[name]) for by, name in names.items()}
+    forces = {by: run.columns[name] for by, name in names.items()}
     by = max(forces, key=lambda name: abs(forces[name][step - 1]), default="")
-    force = forces.get(by, np.zeros(run.steps))
-    counts = abs(force[step - 1]) > _NOTHING * np.abs(force).max()
-    return float(force[step - 1]) / run.scene.thickness if counts else 0.0, by
+    force = forces.get(by, [0.0] * run.steps)
+    counts = abs(force[step - 1]) > _NOTHING * max(map(abs, force))
+    return force[step - 1] / run.scene.thickness if counts else 0.0, by
 
 
-def _oriented(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
+def _angle(x: Array, centre: Array) -> Array:
+    return np.degrees(np.arctan2(*(x - centre).T[::-1]))
+
+
+def _rising(angle: Array, begin: Array, end: Array) -> Array:
+    """Angles in degrees, risen so far that none is before the arcs of facets from ``begin`` to ``end`` ``(k,)``, which
+    start behind the largest gap between the facets, and at 0 on a whole circle."""
+    order = np.argsort(begin % 360)
+    gap = (begin[order] - np.roll(end[order], 1) + _GAP) % 360 - _GAP
+    start = begin[order[gap.argmax()]] if gap.max() > _GAP else 0.0
+    start = (start + _ROUND_OFF) % 360 - _ROUND_OFF
+    return start + (angle - start + _ROUND_OFF) % 360 - _ROUND_OFF
+
+
+def _along(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
     """Nodes ``(k, 3)`` along the facets of an ``edge``, piece by piece, with the body on the left, but on arcs
-    counterclockwise; of an arc also the angle ``(k,)`` at which each facet begins, and the radius (else 0)."""
-    from archord.geometry.curve import circle_through, in_pieces
+    counterclockwise; ``s`` ``(k, 3)`` of a `Probe` there, and the radius of an arc (else 0)."""
+    from archord.geometry.curve import Curve, circle_through, in_pieces
 
     rows = fields.facets()
     rows = rows[np.isin(rows[:, 1], fields.edges[edge][:, 1])]
@@ -199,26 +197,27 @@ def _oriented(fields: Fields, edge: str) -> tuple[np.ndarray, Array, float]:
     height = x[rows[:, 0]] @ [1.0, 1e-3]
     if (circle := circle_through(x[np.unique(rows)])) is not None:
         centre, radius = circle
-        ray, along = x[rows[:, 1]] - centre, x[rows[:, 2]] - x[rows[:, 0]]
-        if (ray[:, 0] * along[:, 1] - ray[:, 1] * along[:, 0]).sum() < 0:
-            rows = rows[:, ::-1]
-        height = (np.degrees(np.arctan2(*(x[rows[:, 0]] - centre).T[::-1])) + 1e-6) % 360 - 1e-6
+        begin, end = (_angle(x[rows[:, k]], centre) for k in (0, 2))
+        if ((end - begin + 180) % 360 - 180).sum() < 0:
+            rows, begin, end = rows[:, ::-1], end, begin
+        height = _rising(begin, begin, end)
     if len(np.unique(rows[:, 0])) < len(rows):
         raise InputError(f"edge {edge!r}: branches, or lies within a body, so that nothing can be said along it.")
     order = in_pieces(rows[:, 0], rows[:, 2], height)
-    return rows[order], height[order], radius
+    s = Curve(x, 2, rows[order]).arc_length(np.array([0.0, 0.5, 1.0]))
+    if radius:
+        s += radius * np.radians(height[order])[:, None] - s[:, :1]
+    return rows[order], s, radius
 
 
-def _tangents(curve: Curve) -> tuple[Array, np.ndarray]:
-    """Unit tangents ``(n, 3, 2)`` at both ends and the middle of each facet, those of two facets that meet without a
-    corner their mean; and which facets ``(n,)`` are so followed by the next."""
-    _, slopes = curve.shapes(np.array([0.0, 0.5, 1.0]))
-    tangent = np.einsum("qa,fai->fqi", slopes, curve.X[curve.connectivity])
+def _tangents(x: Array, rows: np.ndarray) -> tuple[Array, np.ndarray]:
+    """Unit tangents ``(k, 3, 2)`` at the nodes ``x`` ``(k, 3, 2)`` of facets, where two meet without a corner their
+    mean; and which facets ``(k,)`` are so followed by the next."""
+    tangent = np.einsum("qa,fai->fqi", [[-3, 4, -1], [-1, 0, 1], [1, -4, 3]], x)
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
-    here = np.flatnonzero(curve.after >= 0)
-    here = here[(tangent[here, 2] * tangent[curve.after[here], 0]).sum(axis=1) > _SMOOTH]
-    mean = tangent[here, 2] + tangent[curve.after[here], 0]
-    tangent[here, 2] = tangent[curve.after[here], 0] = mean / np.linalg.norm(mean, axis=1)[:, None]
-    joined = np.zeros(len(tangent), dtype=bool)
-    joined[here] = curve.after[here] == here + 1
-    return tangent, joined
+    here, after = np.nonzero(rows[:, 2:] == rows[:, 0])
+    smooth = (tangent[here, 2] * tangent[after, 0]).sum(axis=1) > _SMOOTH
+    here, after = here[smooth], after[smooth]
+    mean = tangent[here, 2] + tangent[after, 0]
+    tangent[here, 2] = tangent[after, 0] = mean / np.linalg.norm(mean, axis=1)[:, None]
+    return tangent, np.isin(np.arange(len(rows)), here[after == here + 1])

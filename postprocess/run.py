@@ -19,7 +19,7 @@ from archord.output.history import read_history
 from archord.postprocess.arc import read_arcs, read_surfaces
 from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
-from archord.postprocess.probe import Probe, probe_edge, probe_line
+from archord.postprocess.probe import Probe, probe
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
 from archord.scene.scene import Scene
@@ -138,12 +138,8 @@ class Run:
 
     def probe(self, edge: str = "", quantity: str = "", step: int | None = None, line: Sequence[float] = ()) -> Probe:
         """A ``quantity`` along an ``edge`` (the hoop stress) or a ``line`` x0, y0, x1, y1 (von Mises'): see
-        `probe_edge` and `probe_line`. Raises `InputError`."""
-        if bool(edge) == bool(line):
-            raise InputError("probe: give an edge or a line.")
-        if line:
-            return probe_line(self, line, quantity or "von_mises", self.number(step))
-        return probe_edge(self, edge, quantity or "hoop", self.number(step))
+        `archord.postprocess.probe.probe`. Raises `InputError`."""
+        return probe(self, edge, quantity, self.number(step), line)
 
     def number(self, step: int | None) -> int:
         """``step``, or that of the last accepted one. Raises `InputError` if the run has none such."""

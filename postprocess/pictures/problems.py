@@ -8,7 +8,7 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.postprocess.fields import Fields
-from archord.postprocess.probe import Probe, probe_edge
+from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
 
 _MAGNIFIED = 0.05  # largest displacement over the size of the bodies, as drawn, where nothing touches
@@ -57,7 +57,7 @@ def draw_lines(axes: Any, lines: list[Array], **style: Any) -> None:
 
 def contact_panel(axes: Any, run: Run) -> None:
     """Mean contact pressure of each facet at the last step, over the angle where all surfaces are arcs."""
-    probes = [probe_edge(run, name, "facet_pressure", run.number(None)) for name in run.contact()]
+    probes = [run.probe(name, "facet_pressure") for name in run.contact()]
     draw_probes(axes, probes, [probe.place for probe in probes])
     axes.set(title=f"contact pressure, step {run.steps}", ylim=(0, None))
 
