@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from archord.options import SCENE, argument, file, flag, output, overrides, pictures
 from archord.scene.errors import InputError
-
-if TYPE_CHECKING:
-    from archord.postprocess.decks.mesh import Elements
 
 
 @click.command()
@@ -128,15 +125,9 @@ def probe(folder: Path, angles: tuple[float, ...], over: float | None, output: P
 @click.command("export-deck")
 @SCENE
 @output("deck to write [<scene name>.inp]")
-@click.option(
-    "--elements",
-    type=click.Choice(["quadratic", "linear"]),
-    default="quadratic",
-    help="archord's own mesh, with midpoints on edges, or each element cut into four without",
-)
 @overrides()
 @flag("--force", "overwrite a file that is there")
-def export_deck(scene: Path, output: Path | None, elements: Elements, overrides: tuple[str, ...], force: bool) -> int:
+def export_deck(scene: Path, output: Path | None, overrides: tuple[str, ...], force: bool) -> int:
     """Write a scene as an input deck for CalculiX or Abaqus."""
     from archord.output.user_file import check_target, writing
     from archord.postprocess.decks.deck import deck, system_of
@@ -148,7 +139,7 @@ def export_deck(scene: Path, output: Path | None, elements: Elements, overrides:
     check_target(path, files_read(scene, overrides), force=force)
     system = system_of(checked)
     try:
-        text = deck(system, deck_mesh(system, elements), checked.targets, f"{scene.stem} in {checked.units.length}")
+        text = deck(system, deck_mesh(system), checked.targets, f"{scene.stem} in {checked.units.length}")
     except ValueError as error:
         raise InputError(f"{scene}: {error}.") from error
     with writing(path):

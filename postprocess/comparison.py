@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from archord.materials.material import Array
-from archord.postprocess.curve import RunCurve, first_loading, gap_name
+from archord.postprocess.curve import first_loading, gap_name
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import scene_keys
@@ -53,12 +53,7 @@ def compare_runs(runs: list[Run]) -> Comparison:
     """Compare ``runs`` with the first. Raises `InputError` for fewer than two, one without steps, or no common load."""
     if len(runs) < 2:
         raise InputError("compare: needs two runs or more.")
-    if any(run.is_joint for run in runs):
-        curves, labels, _ = comparable(runs)
-        labels["load"] = labels.pop("delta")
-        tables = [{"load": curve.delta} | {name: getattr(curve, name) for name in COMPARED} for curve in curves]
-    else:
-        tables, labels = _of_problems(runs)
+    tables, labels, _ = curves_of(runs)
     load = tables[0]["load"]
     margin = _SAME * np.abs(load).max()
     alike = [len(t["load"]) == len(load) and np.allclose(t["load"], load, rtol=0, atol=margin) for t in tables]
@@ -76,8 +71,32 @@ def compare_runs(runs: list[Run]) -> Comparison:
     return Comparison(runs, labels, all(alike), load, values, between)
 
 
-def _of_problems(runs: list[Run]) -> tuple[list[dict[str, Array]], dict[str, str]]:
-    """Columns of general ``runs`` that all have, and their labels."""
+def curves_of(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, str], Array]:
+    """What is compared of each run over its "load", ``(n,)`` by name; their labels; and what pressures are divided by.
+
+    Of joints P, p0 and eps, as they are where the units, R, dR and E* of all are the same, else over powers of E*, R
+    and the clearance. Raises `InputError` for general runs without a common quantity or unit.
+    """
+    if not any(run.is_joint for run in runs):
+        return _of_problems(runs)
+    curves, units = [run.curve for run in runs], [run.scene.units for run in runs]
+    sizes = np.array([[curve.R, curve.dR, curve.E_star] for curve in curves])
+    if all(unit == units[0] for unit in units) and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0):
+        one, per = units[0], np.ones((len(runs), 3))
+        labels = {"load": f"delta [{one.length}]", "P": f"P [{one.force}]", "p0": f"p0 [{one.stress}]"}
+    else:
+        gap = gap_name(min(curve.dR for curve in curves))
+        labels = {"load": f"delta/{gap}", "P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})"}
+        R, dR, E_star = np.abs(sizes).T
+        per = np.stack([dR, E_star * dR, E_star * dR / R], axis=1)
+    tables = [
+        {"load": c.delta / load, "P": c.P / force, "p0": c.p0 / pressure, "eps": c.eps}
+        for c, (load, force, pressure) in zip(curves, per, strict=True)
+    ]
+    return tables, labels | {"eps": "eps [rad]"}, per[:, 2]
+
+
+def _of_problems(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, str], Array]:
     units = runs[0].units
     names = [name for name in runs[0].columns if name.endswith(COMMON) and all(name in run.columns for run in runs)]
     for run in runs:
@@ -87,7 +106,7 @@ def _of_problems(runs: list[Run]) -> tuple[list[dict[str, Array]], dict[str, str
     if not names:
         raise InputError(f"{runs[0].folder}: shares no load with the others.")
     tables = [{"load": np.array(run.path)} | {name: np.array(run.columns[name]) for name in names} for run in runs]
-    return tables, {"load": "load factor"} | {name: runs[0].heading(name) for name in names}
+    return tables, {"load": "load factor"} | {name: runs[0].heading(name) for name in names}, np.ones(len(runs))
 
 
 def _at(load: Array, own: Array, values: Array, between: np.ndarray) -> Array:
@@ -98,24 +117,6 @@ def _at(load: Array, own: Array, values: Array, between: np.ndarray) -> Array:
 
         found[between] = PchipInterpolator(own, values)(load[between])
     return found
-
-
-def comparable(runs: Sequence[Run]) -> tuple[list[RunCurve], dict[str, str], list[float]]:
-    """The curves of ``runs``, the labels of their quantities, and what pressures are divided by: as they are where the
-    units, R, dR and E* of all are the same, else over powers of E*, R and the clearance."""
-    curves, units = [run.curve for run in runs], [run.scene.units for run in runs]
-    sizes = np.array([[curve.R, curve.dR, curve.E_star] for curve in curves])
-    if all(unit == units[0] for unit in units) and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0):
-        named = {"delta": units[0].length, "P": units[0].force, "p0": units[0].stress, "eps": "rad"}
-        return curves, {name: f"{name} [{unit}]" for name, unit in named.items()}, [1.0] * len(runs)
-    gap = gap_name(min(curve.dR for curve in curves))
-    labels = {"delta": f"delta/{gap}", "P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})", "eps": "eps [rad]"}
-    scales = [c.E_star * abs(c.dR) / c.R for c in curves]
-    scaled = [
-        replace(c, delta=c.delta / abs(c.dR), P=c.P / (p * c.R), p0=c.p0 / p)
-        for c, p in zip(curves, scales, strict=True)
-    ]
-    return scaled, labels, scales
 
 
 def differing_keys(scenes: Sequence[Any]) -> dict[str, list[str]]:

@@ -53,10 +53,6 @@ class RunCurve:
         """Plane of the analysis: "strain" or "stress"."""
         return self.scene.analysis.plane
 
-    def first_loading(self) -> RunCurve:
-        """The steps before the pin first goes back."""
-        return self._at(first_loading(self.delta))
-
     def loading(self) -> RunCurve:
         """The steps at which the pin is deeper in the hole than ever before; unloading and what it repeats left out.
 

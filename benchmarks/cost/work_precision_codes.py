@@ -85,8 +85,8 @@ def points(patterns: Sequence[str] = ()) -> list[Point]:
                     joint = {"growth": growth} | ({"edge_angle": given["edge_angle"]} if series.get("edge") else {})
                     analysis = {"degree": series.get("degree", 2)}
                     scene = paper_joint(size, steps, given.get("yield_stress"), joint=joint, analysis=analysis)
-                    prepare = partial(_calculix, scene, series["elements"]) if "elements" in series else None
-                    found.append(start(size, steps, prepare or partial(_archord, scene)))
+                    prepare = _calculix if series["code"] == "CalculiX" else _archord
+                    found.append(start(size, steps, partial(prepare, scene)))
         for peer in peers:
             for size, order in peer.series.get(case, ()):
                 prepare = partial(_peer, peer, case, size, order, given["steps"])
@@ -123,8 +123,8 @@ def _archord(scene: Scene, folder: Path) -> Process:
     return Process(OURS, command, folder, read)
 
 
-def _calculix(scene: Scene, elements: Any, folder: Path) -> Process:
-    process = calculix.process(scene, elements, folder)
+def _calculix(scene: Scene, folder: Path) -> Process:
+    process = calculix.process(scene, folder)
 
     def read() -> dict[str, Any]:
         opinion = process.read()

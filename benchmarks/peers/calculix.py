@@ -20,7 +20,7 @@ from archord.benchmarks.timing import Failure, Process, run_once
 from archord.geometry.basis import Array
 from archord.materials.elasticity import von_mises
 from archord.postprocess.decks.deck import deck, moved_sets, system_of, thickness
-from archord.postprocess.decks.mesh import DeckMesh, Elements, deck_mesh, label, surface_name
+from archord.postprocess.decks.mesh import DeckMesh, deck_mesh, label, surface_name
 from archord.postprocess.run import Run
 from archord.report.table import Table
 from archord.scene.file import AnyScene, load_scene
@@ -53,10 +53,10 @@ class SecondOpinion:
         return float(next(iter(self.forces.values()))[-1])
 
 
-def process(scene: AnyScene, elements: Elements, folder: Path) -> Process:
+def process(scene: AnyScene, folder: Path) -> Process:
     """CalculiX on the deck of ``scene``, which is written into ``folder``; its result is a `SecondOpinion`."""
     system = system_of(scene)
-    mesh = deck_mesh(system, elements)
+    mesh = deck_mesh(system)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.inp").write_text(deck(system, mesh, scene.targets), encoding="utf-8")
     old = tuple(f"deck.{kind}" for kind in ("dat", "frd", "sta", "cvg", "12d"))
@@ -141,10 +141,10 @@ def peeq_integral(printed: Printed, mesh: DeckMesh) -> float:
 
 
 def areas(x: Array) -> Array:
-    """Areas ``(m,)`` of elements by their nodes ``(m, 3, 4, 6 or 8, 2)``, counting curved edges' parabolic segments;
-    positive if counterclockwise."""
-    n = 3 if x.shape[1] in (3, 6) else 4
-    around = x.reshape(len(x), -1, n, 2).swapaxes(1, 2).reshape(x.shape)
+    """Areas ``(m,)`` of elements by their nodes ``(m, 6 or 8, 2)``, counting curved edges' parabolic segments; positive
+    if counterclockwise."""
+    n = x.shape[1] // 2
+    around = x.reshape(len(x), 2, n, 2).swapaxes(1, 2).reshape(x.shape)
     edges = (np.stack([p, np.roll(p, -1, axis=1)], axis=-1) for p in (x[:, :n], around))
     corners, whole = (np.linalg.det(both).sum(axis=1) / 2 for both in edges)
     return corners + 4 / 3 * (whole - corners)  # Archimedes: a segment has 4/3 of its triangle
@@ -169,7 +169,7 @@ def compare(scene: Path, folder: Path) -> Table:
     `InputError` and `Failure`."""
     command = (sys.executable, "-m", "archord", "solve", str(scene.resolve()), "-o", "run", "--force", "--quiet")
     ours = run_once(Process("archord", command, folder, lambda: Run(folder / "run")))
-    theirs = run_once(replace(process(load_scene(scene), "quadratic", folder / "calculix"), limit=_LONG))
+    theirs = run_once(replace(process(load_scene(scene), folder / "calculix"), limit=_LONG))
     table, run, opinion = Table("", "archord", "CalculiX", "difference", left=1), ours.result, theirs.result
 
     def add(what: str, one: float, other: float) -> None:

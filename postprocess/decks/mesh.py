@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal
 
 import basix
 import numpy as np
@@ -16,15 +15,11 @@ from archord.solver.problem import Interaction, Rigid
 from archord.solver.system import System
 
 Ints = npt.NDArray[np.int64]
-Elements = Literal["quadratic", "linear"]
 
 # Abaqus counts corners counterclockwise, then the midpoint behind each, then the centre; its edges begin at a corner.
 # These are basix' nodes of degree 2 in that order, and its facets as edges.
 _NODES = {basix.CellType.triangle: [0, 1, 2, 5, 3, 4], basix.CellType.quadrilateral: [0, 1, 3, 2, 4, 6, 7, 5, 8]}
 _EDGES = {basix.CellType.triangle: [1, 2, 0], basix.CellType.quadrilateral: [0, 3, 1, 2]}
-# Quarter k of an element has its corner k, and half of its edge k as edge k.
-_QUARTERS = {3: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
-             4: [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]]}  # fmt: skip
 _OF_MIDDLE = np.array([-0.25] * 4 + [0.5] * 4)  # the middle of a quadrilateral of 8 nodes by these
 _RIM = 0.8  # inner over outer radius of the ring that stands for a rigid disc
 
@@ -32,7 +27,7 @@ _RIM = 0.8  # inner over outer radius of the ring that stands for a rigid disc
 @dataclass(frozen=True)
 class Surface:
     """The ``elements`` ``(n,)`` behind a surface, their ``edges`` ``(n,)``, edge i going from corner i to the next, and
-    those edges' nodes ``(n, 2 or 3)``: start, end, midpoint."""
+    those edges' nodes ``(n, 3)``: start, end, midpoint."""
 
     elements: Ints
     edges: Ints
@@ -41,7 +36,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class DeckMesh:
-    """Nodes ``x`` ``(n, 2)`` and per body the nodes ``(m, 3, 4, 6 or 8)`` of its ``elements``, counterclockwise,
+    """Nodes ``x`` ``(n, 2)`` and per body the nodes ``(m, 6 or 8)`` of its ``elements``, counterclockwise,
     corners before midpoints; both are numbered from 0, elements through all bodies.
 
     ``node_sets`` ``(k,)`` and ``surfaces`` have the names of the problem's sets; the ring of elements that stands for a
@@ -76,10 +71,9 @@ def surface_name(interaction: Interaction, side: int) -> str:
     return f"{interaction.name} disc" if isinstance(given, Rigid) else given
 
 
-def deck_mesh(system: System, elements: Elements = "quadratic") -> DeckMesh:
-    """The mesh of ``system``, of degree 2 and on one rank, with midpoints on its curved edges, or each of its elements
-    cut into four without midpoints for ``linear`` elements."""
-    problem, V, linear = system.problem, system.V, elements == "linear"
+def deck_mesh(system: System) -> DeckMesh:
+    """The mesh of ``system``, of degree 2 and on one rank."""
+    problem, V = system.problem, system.V
     mesh, kind, x = V.mesh, V.mesh.basix_cell(), V.tabulate_dof_coordinates()[:, :2]
     corners, nodes = len(_EDGES[kind]), V.dofmap.list[:, _NODES[kind]].astype(np.int64)
     one, two, last = (x[nodes[:, i]] for i in (0, 1, corners - 1))
@@ -87,11 +81,10 @@ def deck_mesh(system: System, elements: Elements = "quadratic") -> DeckMesh:
     turned = [0, *range(corners - 1, 0, -1), *range(2 * corners - 1, corners - 1, -1), 8][: nodes.shape[1]]
     nodes[clockwise] = nodes[clockwise][:, turned]
     cells = {body.name: problem.mesh.cells_in(body.cells or body.name) for body in problem.bodies}
-    bodies, number = {}, np.full(len(nodes), -1)
-    number[np.concatenate(list(cells.values()))] = np.arange(sum(map(len, cells.values())))
-    for name, own in cells.items():
-        cut = nodes[own][:, np.array(_QUARTERS[corners])].reshape(-1, corners)
-        bodies[name] = cut if linear else nodes[own, : 2 * corners]
+    numbered = np.concatenate(list(cells.values()))
+    number = np.full(len(nodes), -1)
+    number[numbered] = np.arange(len(numbered))
+    bodies = {name: nodes[own, : 2 * corners] for name, own in cells.items()}
     mesh.topology.create_connectivity(2, 1)
     facets_of = mesh.topology.connectivity(2, 1).array.reshape(-1, corners)
 
@@ -99,12 +92,8 @@ def deck_mesh(system: System, elements: Elements = "quadratic") -> DeckMesh:
         cell, facet = np.nonzero(np.isin(facets_of, problem.mesh.facets_in(name)) & (number >= 0)[:, None])
         edge = np.array(_EDGES[kind])[facet]
         edge = np.where(clockwise[cell], corners - 1 - edge, edge)
-        start, end, middle = (nodes[cell, i] for i in (edge, (edge + 1) % corners, edge + corners))
-        if not linear:
-            return Surface(number[cell], edge, np.stack([start, end, middle], axis=1))
-        halves = np.append(4 * number[cell] + edge, 4 * number[cell] + (edge + 1) % corners)
-        ends = np.concatenate([np.stack([start, middle], axis=1), np.stack([middle, end], axis=1)])
-        return Surface(halves, np.append(edge, edge), ends)
+        along = np.stack([edge, (edge + 1) % corners, edge + corners], axis=1)
+        return Surface(number[cell], edge, nodes[cell[:, None], along])
 
     names = [name for i in problem.interactions for name in i.surfaces if not isinstance(name, Rigid)]
     surfaces = {name: surface(name) for name in names}
@@ -113,29 +102,27 @@ def deck_mesh(system: System, elements: Elements = "quadratic") -> DeckMesh:
         if isinstance(disc := i.surfaces[0], Rigid):
             start, end = x[surfaces[i.surfaces[1]].nodes[:, :2]].swapaxes(0, 1)
             n = int(np.ceil(2 * np.pi * disc.circle.radius / np.linalg.norm(end - start, axis=1).mean()))
-            rim, ring = _ring(disc.circle, n, linear)
+            name, (rim, ring) = surface_name(i, 0), _ring(disc.circle, n)
             ring, x, first = ring + len(x), np.concatenate([x, rim]), sum(map(len, bodies.values()))
-            name, outer = surface_name(i, 0), ring[:, [1, 2] if linear else [1, 2, 5]]
             bodies[name], node_sets[name] = ring, np.unique(ring)
-            surfaces[name] = Surface(first + np.arange(n), np.ones(n, dtype=np.int64), outer)
+            surfaces[name] = Surface(first + np.arange(n), np.ones(n, dtype=np.int64), ring[:, [1, 2, 5]])
     used = np.unique(np.concatenate([own.ravel() for own in bodies.values()]))
-    middles = nodes[np.concatenate(list(cells.values()))] if corners == 4 and not linear else np.zeros((0, 9), int)
     place = np.full(len(x), -1)
     place[used] = np.arange(len(used))
     return DeckMesh(
         x[used],
         used,
-        middles,
+        nodes[numbered] if corners == 4 else np.zeros((0, 9), int),
         {name: place[own] for name, own in bodies.items()},
         {name: place[own][place[own] >= 0] for name, own in node_sets.items()},
         {name: Surface(s.elements, s.edges, place[s.nodes]) for name, s in surfaces.items()},
     )
 
 
-def _ring(circle: RigidCircle, n: int, linear: bool) -> tuple[Array, Ints]:
+def _ring(circle: RigidCircle, n: int) -> tuple[Array, Ints]:
     """Nodes and ``n`` quadrilaterals of a ring below a circle, whose edges 1 lie on it."""
     angle, k = np.pi * np.arange(2 * n) / n, 2 * np.arange(n)
     ray, after = circle.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), (k + 2) % (2 * n)
     x = circle.centre + np.concatenate([r * ray for r in (_RIM, (1 + _RIM) / 2, 1.0)])
-    corners, middles = [k, 4 * n + k, 4 * n + after, after], [2 * n + k, 4 * n + k + 1, 2 * n + after, k + 1]
-    return x, np.stack(corners if linear else corners + middles, axis=1)
+    nodes = [k, 4 * n + k, 4 * n + after, after, 2 * n + k, 4 * n + k + 1, 2 * n + after, k + 1]
+    return x, np.stack(nodes, axis=1)

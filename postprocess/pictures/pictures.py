@@ -11,7 +11,8 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.output.user_file import writing
-from archord.postprocess.comparison import comparable, compare_runs
+from archord.postprocess.comparison import curves_of
+from archord.postprocess.curve import first_loading
 from archord.postprocess.pictures import joint, problems
 from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
@@ -21,7 +22,7 @@ from archord.scene.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_FEW = 10  # runs that get a colour of their own and a name in the legend
+_FEW = 10  # runs that get a name in the legend
 
 
 def save_figure(figure: Figure, target: Path) -> Path:
@@ -65,46 +66,32 @@ def draw_probe(probe: Probe, target: Path) -> Path:
 def draw_runs(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
     """Draw ``runs`` with their ``names`` over each other as ``target``; returns the file.
 
-    Of joints force, pressure at the last common displacement and contact angle, in the form of `comparable`; of more
-    than ten the colour runs with the order instead. Of general runs the first three quantities that all share, over the
-    load factor. Raises `InputError` if the file cannot be written or a run's contact cannot be read.
+    The first three of `curves_of` over the load, but of joints the pressure on the arc at the last common displacement
+    for p0. The colour runs with the order, which more than ten have in place of a legend. Raises `InputError` if the
+    file cannot be written or a run's contact cannot be read.
     """
     from matplotlib import colormaps
 
-    if not runs[0].is_joint:
-        return _draw_problems(runs, names, target)
-    many = len(runs) > _FEW
-    figure = new_figure(15, 4.6)
-    force, pressure, angle = panels = figure.subplots(1, 3)
-    curves, labels, scales = comparable(runs)
-    last = min(float(curve.first_loading().delta[-1]) for curve in curves)
-    for k, (run, curve, name) in enumerate(zip(runs, curves, names, strict=True)):
-        colour = colormaps["viridis"](k / (len(runs) - 1)) if many else f"C{k}"
-        style = {"color": colour, "lw": 1.3, "ls": "--" if k and not many else "-", "label": name}
-        force.plot([0, *curve.delta], [0, *curve.P], **style)
-        angle.plot(curve.delta, np.degrees(curve.eps), **style)
-        phi, p = _pressure_at(run, curve.first_loading().delta, last)
-        pressure.plot(np.degrees(phi), p / scales[k], **style)
-    force.set(xlabel=labels["delta"], ylabel=labels["P"], title="force of the joint")
-    pressure.set(xlabel="angle from the contact axis [°]", ylabel=labels["p0"].replace("p0", "p"), xlim=(0, None))
-    pressure.set(ylim=(0, None), title=f"contact pressure at {labels['delta']} = {last:.4g}")
-    angle.set(xlabel=labels["delta"], ylabel="contact semi-angle [°]", title="contact angle", ylim=(0, None))
-    for axes in panels:
+    tables, labels, scales = curves_of(runs)
+    shown = list(labels)[1:4]
+    figure = new_figure(5.0 * len(shown), 4.6)
+    panels = np.atleast_1d(figure.subplots(1, len(shown)))
+    rising = [table["load"][first_loading(table["load"])] for table in tables]
+    last, colours = min(float(load[-1]) for load in rising), colormaps["viridis"](np.linspace(0, 0.9, len(runs)))
+    for axes, quantity in zip(panels, shown, strict=True):
+        axes.set(xlabel=labels["load"], ylabel=labels[quantity])
         axes.grid(alpha=0.3)
-    if not many:
-        figure.legend(*force.get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
-    return save_figure(figure, target)
-
-
-def _draw_problems(runs: Sequence[Run], names: Sequence[str], target: Path) -> Path:
-    compared = list(compare_runs(list(runs)).labels.items())[1:4]
-    figure = new_figure(5.0 * len(compared), 4.4)
-    for axes, (column, label) in zip(np.atleast_1d(figure.subplots(1, len(compared))), compared, strict=True):
-        for run, name in zip(runs, names, strict=True):
-            axes.plot(run.path, run.columns[column], ".-", lw=1.3, label=name)
-        axes.set(xlabel="load factor", ylabel=label)
-        axes.grid(alpha=0.3)
-    axes.legend(frameon=False)
+        for k, (run, table, name) in enumerate(zip(runs, tables, names, strict=True)):
+            x, y = table["load"], table[quantity]
+            if quantity == "p0":
+                phi, p = _pressure_at(run, rising[k], last)
+                x, y = np.degrees(phi), p / scales[k]
+            axes.plot(x, y, lw=1.3, ls="--" if k else "-", color=colours[k], label=name)
+        if quantity == "p0":
+            axes.set(xlabel="angle from the contact axis [°]", ylabel=labels["p0"].replace("p0", "p"), xlim=(0, None))
+            axes.set(ylim=(0, None), title=f"contact pressure at {labels['load']} = {last:.4g}")
+    if len(runs) <= _FEW:
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
     return save_figure(figure, target)
 
 

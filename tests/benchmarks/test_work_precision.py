@@ -120,7 +120,7 @@ def test_every_series_makes_scenes(tmp_path, monkeypatch):
         assert all(scene.targets[-1] == pytest.approx(0.01) for scene in scenes)
         cells = [scene.joint.expected_cells for scene in scenes]
         assert cells == sorted(cells)
-    (deck,) = points(["elastic: CalculiX, CPE3, 0.06 R"])
+    (deck,) = points(["elastic: CalculiX, CPE6, 0.06 R"])
     process = deck.process(tmp_path, 20.0)
     assert (process.command, process.limit) == (("ccx", "deck"), 20.0)
     assert (process.folder / "deck.inp").is_file()

@@ -24,17 +24,16 @@ from archord.solver.system import System
 
 W, DR, STEPS = 4.0, 0.005, 3
 COARSE = {"element_size": 0.2, "block_size": W, "growth": 0.5}
-KINDS = ["quadratic", "linear"]
 
 
 def scene(yield_stress=0.002, **sections):
     return paper_joint(0.2, STEPS, yield_stress, **({"joint": COARSE} | sections))
 
 
-def written_deck(data, kind="linear"):
+def written_deck(data):
     """The deck of a scene, read back, and the mesh that it was written from."""
     system = system_of(data)
-    mesh = deck_mesh(system, kind)
+    mesh = deck_mesh(system)
     found = read(deck(system, mesh, data.targets))
     found.system, found.mesh = system, mesh
     return found
@@ -63,12 +62,9 @@ def read(text):
     return found
 
 
-@pytest.fixture(scope="module", params=KINDS)
-def written(request):
-    """The deck with one kind of elements, read back, the kind, and the mesh that it was written from."""
-    found = written_deck(scene(), request.param)
-    found.quadratic = request.param == "quadratic"
-    return found
+@pytest.fixture(scope="module")
+def written():
+    return written_deck(scene())
 
 
 def test_counts(written):
@@ -76,11 +72,11 @@ def test_counts(written):
     condition of docs/theory.md has its edges, and no line more than CalculiX reads."""
     elements = written.elements.values()
     assert {n for e in elements for n in e} == set(written.nodes)
-    assert {len(e) for e in elements} == {6 if written.quadratic else 3}
+    assert {len(e) for e in elements} == {6}
     corners = {n for e in elements for n in e[:3]}
     edges = {frozenset((e[i], e[(i + 1) % 3])) for e in elements for i in range(3)}
     assert len(corners) - len(edges) + len(elements) == 2
-    assert len(written.nodes) == len(corners) + (len(edges) if written.quadratic else 0)
+    assert len(written.nodes) == len(corners) + len(edges)
     assert set(written.bodies.values()) == {"PIN", "BLOCK"}
     assert set(written.sets) - {"ALL_NODES"} == {"PIN", "HOLE", "SYMMETRY", "BLOCK_HELD", "PIN_TOP"}
     for line in written.text.splitlines()[2:]:
@@ -94,13 +90,12 @@ def test_elements_turn_counterclockwise_and_fill_the_bodies(written):
     x = np.array([[written.nodes[n] for n in element] for element in written.elements.values()])
     sides = np.roll(x[:, :3], -1, axis=1) - x[:, :3]
     assert (np.linalg.det(sides[:, :2]) > 0).all()
-    if written.quadratic:
-        apart = np.linalg.norm(x[:, :3] + sides / 2 - x[:, 3:], axis=2)
-        assert (apart < 0.05 * np.linalg.norm(sides, axis=2)).all()
+    apart = np.linalg.norm(x[:, :3] + sides / 2 - x[:, 3:], axis=2)
+    assert (apart < 0.05 * np.linalg.norm(sides, axis=2)).all()
     exact = {"pin": math.pi / 4, "block": W**2 - math.pi / 4 * (1 + DR) ** 2}
     for body, area in exact.items():
         own = areas(written.mesh.x[written.mesh.elements[body]]).sum()
-        assert own == pytest.approx(area, rel=1e-4 if written.quadratic else 5e-3)
+        assert own == pytest.approx(area, rel=1e-4)
 
 
 def test_surfaces_cover_the_arcs(written):
@@ -111,7 +106,7 @@ def test_surfaces_cover_the_arcs(written):
         elements = [(written.elements[label], side) for label, side in written.surfaces[f"{name}_SURFACE"]]
         assert {written.bodies[label] for label, _ in written.surfaces[f"{name}_SURFACE"]} == {body}
         ends = [element[k % 3] for element, side in elements for k in (side - 1, side)]
-        middle = [element[side + 2] for element, side in elements] if written.quadratic else []
+        middle = [element[side + 2] for element, side in elements]
         assert {*ends, *middle} == written.sets[name]
         n = len(elements)
         chords = sum(math.dist(nodes[a], nodes[b]) for a, b in zip(ends[::2], ends[1::2], strict=True))
@@ -151,12 +146,12 @@ def test_materials_and_elements_of_the_plane(plane, family):
     """Each body its own constants; a hardening curve with the slope H; an elastic body has no *PLASTIC."""
     data = scene(None, block={"yield_stress": 0.003, "hardening": 0.1}, analysis={"plane": plane})
     found = written_deck(data).blocks
-    assert {p["TYPE"] for keyword, p, _ in found if keyword == "*ELEMENT"} == {family + "3"}
+    assert {p["TYPE"] for keyword, p, _ in found if keyword == "*ELEMENT"} == {family + "6"}
     materials = ("*SOLID SECTION", "*PLASTIC", "*ELASTIC")
     sections, ((first, second),), elastic = (
         [np.array(rows, float).tolist() for keyword, _, rows in found if keyword == name] for name in materials
     )
-    assert sections == [[[1.0 if plane == "strain" else pytest.approx(0.1 * data.joint.h / 2, rel=0.2)]]] * 2
+    assert sections == [[[1.0 if plane == "strain" else pytest.approx(0.1 * data.joint.h, rel=0.2)]]] * 2
     assert first == [0.003, 0]
     assert (second[0] - first[0]) / second[1] == pytest.approx(0.1)
     assert elastic == [[[data.pin.E, 0.3]], [[data.block.E, 0.3]]]
@@ -183,7 +178,7 @@ def test_a_rigid_pin_moves_as_a_whole():
     ring = {n for e in found.elements if found.bodies[e] == "CONTACT_DISC" for n in found.elements[e]}
     assert found.sets["CONTACT_DISC"] == ring
     radii = [math.dist(found.nodes[n], (0, -DR)) for n in ring]
-    assert sorted({round(r, 12) for r in radii}) == [0.8, 1.0]
+    assert sorted({round(r, 12) for r in radii}) == [0.8, 0.9, 1.0]
 
 
 def press_fit(drawn):
@@ -259,7 +254,7 @@ def test_the_deck_does_not_depend_on_the_unit_of_length(unit):
     """Nodes scale to the digits of the format, and the penetration with them."""
     lengths = {"radius": 1.0, "clearance": DR, "element_size": 0.2, "block_size": W}
     scaled = scene(joint={key: unit * value for key, value in lengths.items()} | {"growth": 0.5})
-    a, b = (written_deck(s, "quadratic") for s in (scene(), scaled))
+    a, b = (written_deck(s) for s in (scene(), scaled))
     np.testing.assert_allclose(np.array(list(b.nodes.values())) / unit, list(a.nodes.values()), rtol=0, atol=1e-12)
     stiff, stiffer = (contact_stiffness(d.system.problem, d.mesh, d.system.problem.interactions[0]) for d in (a, b))
     assert stiffer * unit == pytest.approx(stiff)
@@ -270,10 +265,10 @@ def test_the_command_writes_a_deck_and_nothing_over_what_is_there(tmp_path, monk
     """Named after the scene, refused where one is, and never over an input of the command."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "joint.toml").write_text(resolved(paper_joint(0.3, pin={"rigid": True})))
-    assert run(["export-deck", "joint.toml", "--elements", "linear", "--set", "load.steps=2"]) == 0
+    assert run(["export-deck", "joint.toml", "--set", "load.steps=2"]) == 0
     assert capsys.readouterr() == ("joint.inp\n", "")
     text = (tmp_path / "joint.inp").read_text()
-    assert (text.count("*STEP"), text.count("TYPE=CPE3"), text.count("TYPE=CPE4")) == (2, 1, 1)
+    assert (text.count("*STEP"), text.count("TYPE=CPE6"), text.count("TYPE=CPE8")) == (2, 1, 1)
     assert refused(["export-deck", "joint.toml"]).startswith("joint.inp: is there already; choose another file")
     cyclic = ["--set=block.yield_stress=300", "--set=block.back_stresses=[[1000, 10]]", "--force"]
     assert "the material of 'block' cannot be exported" in refused(["export-deck", "joint.toml", *cyclic])
