@@ -64,7 +64,7 @@ def compare_runs(runs: list[Run]) -> Comparison:
         load = tables[0]["load"]
         load = load[(load >= low - margin) & (load <= high + margin)]
         if not len(load):
-            raise InputError(f"{runs[0].folder}: shares no range of {runs[0].loads_said} with the others.")
+            raise InputError(f"{runs[0].folder}: shares no range of loads with the others.")
         between = np.array([np.abs(load[:, None] - t["load"]).min(axis=1) > margin for t in tables])
     pairs = list(zip(tables, between, strict=True))
     values = {name: np.array([_at(load, t["load"], t[name], k) for t, k in pairs]) for name in labels if name != "load"}

@@ -1,10 +1,4 @@
-"""The fields of a run at a step, as fields.h5 holds them, and the deformed joint drawn so that its clearance is seen.
-
-Displacements alone cannot be magnified: bodies that touch would overlap. So the clearance is magnified with them. Every
-point counts as displaced from its place in a joint without clearance, in which both arcs are the circle of radius R
-around the origin. Magnified by m, a gap is m times as wide, and what touches touches, but for ``(m s)^2/(2 R)`` where
-one body has slid by s along the other.
-"""
+"""The fields of a run at a step, as fields.h5 holds them, and the deformed joint with its clearance magnified."""
 
 from __future__ import annotations
 
@@ -12,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +24,7 @@ CELL_FIELDS = ("von_mises", "mean_stress", "peeq", "contact_state", "contact_pre
 # Of VTK's second-order cells by their nodes: straight triangles to draw them by, and the edges, each along it
 _SUBTRIANGLES = {
     6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
-    9: [[0, 4, 8], [4, 1, 8], [1, 5, 8], [5, 2, 8], [2, 6, 8], [6, 3, 8], [3, 7, 8], [7, 0, 8]],
+    9: [[a, b, 8] for a, b in pairwise([0, 4, 1, 5, 2, 6, 3, 7, 0])],
 }
 _EDGES = {6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]], 9: [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]]}
 _VISIBLE = 0.1  # clearance over R, as drawn
@@ -41,8 +36,8 @@ _NEAR = 3.0  # radii within which displacements count
 class Fields:
     """Bodies (of the paper's joint the half x >= 0) at one step: ``n`` nodes and ``m`` curved cells of second order.
 
-    ``cells`` has VTK's order: three or four corners, then the nodes between the first two, the next two, and the last
-    and the first, and that in the middle of four. Stress is positive in tension, contact pressure in compression; PEEQ
+    ``cells`` has VTK's order: corners, then the nodes between the first two, the next two, ..., and the last and the
+    first, and that in the middle of four corners. Stress is positive in tension, contact pressure in compression; PEEQ
     and plastic strain are None where no body can yield, and all that is recovered at nodes where `output.stress` is
     off. All in the scene's units.
     """
@@ -166,22 +161,14 @@ def magnification(scene: Scene, fields: Fields) -> float:
     return max(step * decade for step in (1, 2, 3, 5) if step * decade <= wanted * (1 + 1e-9))
 
 
-def nominal(scene: Scene, fields: Fields) -> Array:
-    """Places ``(n, 2)`` of the nodes in the joint without clearance."""
-    X, pin = fields.coordinates, fields.body_of_node == BODIES["pin"]
-    places = X * (1 - scene.joint.dR / np.maximum(np.hypot(*X.T), scene.joint.radius / 2))[:, None]
-    places[pin] = X[pin] + [0.0, scene.joint.pin_depth]
-    return places
-
-
 def magnified(scene: Scene, fields: Fields, factor: float, displaced: bool = True) -> Array:
-    """Points ``(n, 2)`` at which the nodes are drawn: with ``factor`` times their displacement from `nominal`; or the
-    joint before it is loaded, if not ``displaced``."""
-    start = nominal(scene, fields)
-    return start + factor * ((fields.deformed if displaced else fields.coordinates) - start)
+    """Points ``(n, 2)`` at which the nodes are drawn; of the joint before it is loaded, if not ``displaced``.
 
-
-def rigid_arc(scene: Scene, delta: float, factor: float) -> Array:
-    """Points ``(91, 2)`` along the quarter arc of a rigid pin pressed by ``delta``, as drawn."""
-    angle, R = np.linspace(0, math.pi / 2, 91), scene.joint.radius
-    return np.stack([R * np.sin(angle), -factor * (delta + scene.joint.pin_depth) - R * np.cos(angle)], axis=1)
+    Bodies that touch would overlap if displacements alone were magnified. So ``factor`` times the displacement is that
+    from the joint without clearance, in which both arcs are the circle of radius R around the origin: a gap is as many
+    times as wide, and what touches touches, but for ``(factor s)^2/(2 R)`` where one body slid by s along the other.
+    """
+    X, pin = fields.coordinates, fields.body_of_node == BODIES["pin"]
+    start = X * (1 - scene.joint.dR / np.maximum(np.hypot(*X.T), scene.joint.radius / 2))[:, None]
+    start[pin] = X[pin] + [0.0, scene.joint.pin_depth]
+    return start + factor * ((fields.deformed if displaced else X) - start)

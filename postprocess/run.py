@@ -123,11 +123,6 @@ class Run:
         """How far the load was at every step: delta of a joint, else the load factor."""
         return self.columns["delta" if self.is_joint else "load_factor"]
 
-    @property
-    def loads_said(self) -> str:
-        """What `path` holds, in words."""
-        return "displacements" if self.is_joint else "load factors"
-
     def heading(self, name: str) -> str:
         """The name of a column with its unit."""
         return f"{name} [{self.units[name]}]" if name in self.units else name

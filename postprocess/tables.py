@@ -17,9 +17,8 @@ from archord.report.table import Table
 from archord.scene.faults import shortened
 
 _MOST = 40  # rows of a table
-_LAST = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "steps", "iterations", "cutbacks", "seconds")
-_WHOLE = ("iterations", "cutbacks", "seconds")
-_OF_STEPS: tuple[str, ...] = ("step", "delta", "delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", *_WHOLE)
+_OF_A_JOINT = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max")
+_SHOWN = ("step", "load_factor", "delta", *_OF_A_JOINT, "steps", "iterations", "cutbacks", "seconds")
 _OF_A_RUN = {  # what a comparison tells of each run
     "status": lambda run: run.status,
     "steps": lambda run: f"{run.steps} of {len(run.scene.targets)}",
@@ -47,7 +46,7 @@ def sweep_text(sweep: Sweep) -> str:
     cases = sweep.cases
     if same := [f"{key} = {_cell(cases[key].iloc[0])}" for key in sweep.keys if key not in sweep.moving]:
         lines += [f"in all cases: {', '.join(same)}"]
-    names = ["case", "run", *sweep.moving, "status", *(name for name in _LAST if name in cases)]
+    names = ["case", "run", *sweep.moving, "status", *(name for name in _SHOWN if name in cases and name != "delta")]
     lines += ["", _thinned(_table_of(cases[names]), sweep.folder / "cases.csv")]
     said = zip(cases["case"], cases["message"], strict=True)
     return "\n".join([*lines, *(f"case {case}: {message}" for case, message in said if message)])
@@ -124,25 +123,21 @@ def _facts(run: Run) -> Iterable[tuple[str, str]]:
 
 def _history(run: Run) -> Table:
     """The steps: loads and forces, pressures, angle, plastic strain, cost."""
-    names, h = _OF_STEPS, run.columns
-    if not run.is_joint:
-        names = ("step", "load_factor", *(name for name in h if name.endswith((" displacement", *COMMON))), *_WHOLE)
-    table = Table(*("eps [°]" if name == "eps" else run.heading(name) for name in names))
-    for k in range(run.steps):
-        table.add(*(f"{math.degrees(h[name][k]) if name == 'eps' else h[name][k]:.6g}" for name in names))
-    return table
+    names = [name for name in _SHOWN if name in run.columns]
+    names[-3:-3] = [name for name in run.columns if name.endswith((" displacement", *COMMON))]
+    columns = ([f"{value:.6g}" for value in run.columns[name]] for name in names)
+    return Table(*map(run.heading, names), rows=zip(*columns, strict=True))
 
 
 def _peaks(run: Run) -> str:
     """Largest values over the run, and where it first yielded."""
     h, said = run.columns, []
-    names = (*COMPARED, "peeq_max") if run.is_joint else tuple(name for name in h if name.endswith(COMMON))
+    names = [name for name in h if name in (*COMPARED, "peeq_max") or name.endswith(COMMON)]
     for name in names:
         k = int(np.argmax(np.abs(h[name])))
         said.append(f"{name} = {h[name][k]:.6g} {run.units.get(name, '')}".rstrip() + f" at step {h['step'][k]:g}")
-    yields = np.any([h[name] for name in names if name.endswith("peeq_max")] or [[0.0]], axis=0)
-    if yields.any():
-        said.append(f"plastic strain first at step {h['step'][np.flatnonzero(yields)[0]]:g}")
+    yielded = np.flatnonzero(sum(np.array(h[name]) for name in names if name.endswith("peeq_max")))
+    said += [f"plastic strain first at step {h['step'][yielded[0]]:g}"] if len(yielded) else []
     return f"largest: {', '.join(said)}"
 
 
@@ -167,7 +162,7 @@ def _differences(comparison: Comparison, quantity: str, names: list[str]) -> Tab
         pairs = zip(marks[:, k], comparison.values[quantity][:, k], relative[:, k], strict=True)
         cells = [cell for mark, value, off in pairs for cell in (f"{mark}{value:.6g}", _percent(off))]
         table.add(f"{load:.6g}", cells[0], *cells[2:])
-    largest = np.abs(np.nan_to_num(relative[1:])).max(axis=1).tolist()
+    largest = np.abs(np.nan_to_num(relative[1:])).max(axis=1)
     table.add("", "largest difference", *(cell for size in largest for cell in ("", _percent(size))))
     return table
 
@@ -179,10 +174,9 @@ def _percent(relative: Any) -> str:
 
 def _note(comparison: Comparison) -> str:
     """How the runs were compared."""
-    loads = comparison.runs[0].loads_said
     if comparison.step_by_step:
-        return f"compared step by step: all runs went through the same {loads}."
-    note = f"compared over the first loading of all runs, at {loads} of the first"
+        return "compared step by step: all runs went through the same loads."
+    note = "compared over the first loading of all runs, at the loads of the first"
     return f"{note}; ~: between steps, by a monotone cubic." if comparison.interpolated.any() else f"{note}."
 
 

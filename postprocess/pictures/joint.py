@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.curve import gap_name
-from archord.postprocess.fields import magnification, magnified, rigid_arc
+from archord.postprocess.fields import magnification, magnified
 from archord.postprocess.pictures.problems import draw_cells, draw_lines, outline
 from archord.postprocess.run import Run
 from archord.scene.scene import Scene
@@ -20,7 +20,7 @@ def _load(scene: Scene, delta: float) -> str:
     return f"δ = {delta / abs(scene.joint.dR):.4g} {gap_name(scene.joint.dR, 'ΔR')}"
 
 
-def _over(divisor: float) -> dict[str, Any]:  # a second axis with the numbers of the first over the divisor
+def _over(divisor: float) -> dict[str, Any]:  # of a second axis with the numbers of the first over the divisor
     return {"functions": (lambda value: np.asarray(value) / divisor, lambda value: np.asarray(value) * divisor)}
 
 
@@ -35,10 +35,8 @@ def force_panel(axes: Any, run: Run) -> None:
         axes.legend(frameon=False, loc="upper left")
     axes.set(xlabel=f"δ [{scene.units.length}]", ylabel=f"P [{run.units['P']}]", title="force of the joint")
     axes.set(xlim=(min(delta), None), ylim=(min(P), None))
-    axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)
-    gap = gap_name(scene.joint.dR, "ΔR")
-    axes.secondary_xaxis("top", **_over(abs(scene.joint.dR))).set_xlabel(f"δ / {gap}")
+    axes.secondary_xaxis("top", **_over(abs(scene.joint.dR))).set_xlabel(f"δ / {gap_name(scene.joint.dR, 'ΔR')}")
     unit = scene.E_star * scene.joint.radius * scene.thickness
     axes.secondary_yaxis("right", **_over(unit)).set_ylabel("P / (E* R)")
 
@@ -48,15 +46,14 @@ def arc_panel(axes: Any, run: Run) -> None:
     dashed of the pin."""
     scene, shown = run.scene, {max(1, round(run.steps * k / _STEPS)) for k in range(1, _STEPS + 1)}
     for i, step in enumerate(sorted(shown)):
-        *others, last = run.contact(step).values()
-        for arc in others:
+        arcs = run.contact(step)
+        for side, arc in arcs.items():
             angle, p = arc.facet_means()
-            axes.plot(np.degrees(angle), p, "--", color=f"C{i}", lw=1.4)
-        angle, p = last.facet_means()
-        axes.plot(np.degrees(angle), p, color=f"C{i}", lw=1.4, label=_load(scene, run.columns["delta"][step - 1]))
+            label = None if side == "pin" and len(arcs) > 1 else _load(scene, run.path[step - 1])
+            axes.plot(np.degrees(angle), p, "-" if label else "--", color=f"C{i}", lw=1.4, label=label)
     reach = round(np.degrees(scene.joint.arc_end))
     axes.set(xlabel="angle from the contact axis [°]", ylabel=f"p [{scene.units.stress}]", xlim=(0, reach))
-    axes.set(ylim=(0, None), title=f"contact pressure on the arc{' (hole solid, pin dashed)' if others else ''}")
+    axes.set(ylim=(0, None), title=f"contact pressure on the arc{' (hole solid, pin dashed)' if len(arcs) > 1 else ''}")
     axes.set_xticks(np.arange(0, reach + 1, reach / 6))
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
@@ -77,13 +74,11 @@ def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
     # in a ring the core on which the load acts does not count for the range of colours
     away = np.hypot(*fields.coordinates[fields.cells[:, :3]].mean(axis=1).T) > (R / 2 if ring else 0)
     draw_cells(axes, run, fields, x, near, away)
-    for displaced, style in ((False, _BEFORE), (True, {"color": "black", "lw": 1.1})):
-        lines = outline(fields, magnified(scene, fields, factor, displaced))
-        arc = rigid_arc(scene, fields.delta if displaced else 0.0, factor)
-        draw_lines(axes, [*lines, *([arc] if scene.pin.rigid else [])], **style)
+    draw_lines(axes, outline(fields, magnified(scene, fields, factor, displaced=False)), **_BEFORE)
+    draw_lines(axes, outline(fields, x), color="black", lw=1.1)
     if scene.pin.rigid:
-        axes.fill(*np.concatenate([arc, [[0.0, arc[-1, 1]]]]).T, color="0.85", zorder=0)
-        axes.text(0.35 * R, arc[-1, 1] - 0.35 * R, "rigid pin", ha="center")
+        angle, centre = np.linspace(0, np.pi / 2), -factor * (fields.delta + scene.joint.pin_depth)
+        axes.fill([0, *R * np.sin(angle)], [centre, *centre - R * np.cos(angle)], fc="0.85", ec="black", zorder=0)
     length = scene.units.length
     axes.set(xlim=(0, right), ylim=(low, high), aspect="equal", xlabel=f"x [{length}]", ylabel=f"y [{length}]")
     what = "not magnified" if factor == 1 else f"displacement and clearance × {factor:g}"

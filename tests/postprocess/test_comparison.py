@@ -84,7 +84,7 @@ def test_unloading_counts_only_where_the_ways_are_the_same(runs, more):
     delta = np.array([1.0, 2.0, 3.0, 2.0, 1.0, 4.0])
     assert list(delta[first_loading(delta)]) == [1, 2, 3]
     stepped.curve = RunCurve("x", paper_joint(), *5 * [delta])
-    with pytest.raises(InputError, match="shares no range of displacements"):
+    with pytest.raises(InputError, match="shares no range of loads"):
         compare_runs([released, stepped])
 
 

@@ -181,7 +181,7 @@ def test_general_runs_are_shown_compared_and_exported(lug, tmp_path, capsys):
     out = capsys.readouterr().out
     assert "pull force [N/mm]" in out
     assert "largest difference" in out
-    assert "compared step by step: all runs went through the same load factors." in out
+    assert "compared step by step: all runs went through the same loads." in out
     assert " curved triangles of degree 2, " in out
     assert "plastic strain first" not in out
     assert len(export_csv(lug, tmp_path / "csv")) == 2
