@@ -47,20 +47,14 @@ def quarter_joint(
         sketch.face("pin", **{"pin": arc, "pin top": half}, symmetry=sketch.path("pin", middle, bottom))
         if whole_pin:
             sketch.point("pin", top)
-            back, line = (
-                sketch.path("pin", side, top, on=Circle("pin back", middle, 1.0)),
-                sketch.path("pin", top, middle),
-            )
-            sketch.face("pin", **{"pin back": back, "symmetry": line, "pin top": half})
+            back = sketch.path("pin", side, top, on=Circle("pin back", middle, 1.0))
+            sketch.face("pin", **{"pin back": back, "symmetry": sketch.path("pin", top, middle), "pin top": half})
     corners = (hole, 0), (width, 0), (width, -width), (0, -width)
     for place in ((0, 0), bottom, *corners):
         sketch.point("block", place)
-    arc, (held, *free) = (
-        sketch.path("block", bottom, corners[0], on=Circle("hole", (0, 0), hole)),
-        sketch.path("block", *corners),
-    )
-    line = sketch.path("block", corners[-1], bottom)
-    sketch.face("block", **{"hole": arc, "block held": [held], "": free, "symmetry": line})
+    arc = sketch.path("block", bottom, corners[0], on=Circle("hole", (0, 0), hole))
+    held, *free, line = sketch.path("block", *corners, bottom)
+    sketch.face("block", **{"hole": arc, "block held": [held], "": free, "symmetry": [line]})
     for body, name, on_arc in (("pin", "pin", size_ratio * size), ("block", "hole", size)):
         sketch.sizes[body] = f"{on_arc!r} + {growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
         if edge is None:
