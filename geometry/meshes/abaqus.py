@@ -8,27 +8,20 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
 from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order, one_kind, outer_sides
 
+Options, Rows = dict[str, str], list[list[str]]
+
 _KINDS = re.compile(r"(CP[ES][3468]|T[23]D[23])[A-Z]*")  # with the number of nodes
 _UNREAD = {"PART", "INSTANCE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY"}  # they move or make nodes
 _DEEPEST = 5  # files included in each other
-
-
-class _Block(NamedTuple):
-    keyword: str
-    options: dict[str, str]
-    rows: list[list[str]]
-
-    def values(self) -> list[str]:
-        return [value.upper() for row in self.rows for value in row if value]
 
 
 def _lines(path: Path, depth: int = 0) -> Iterator[str]:
@@ -44,128 +37,125 @@ def _lines(path: Path, depth: int = 0) -> Iterator[str]:
                 yield from _lines(path.parent / file[1].strip(' "'), depth + 1)
 
 
-def _blocks(path: Path) -> list[_Block]:
-    blocks = [_Block("", {}, [])]
+def _blocks(path: Path) -> list[tuple[str, Options, Rows]]:
+    """Keywords with their options, and the rows of data below them."""
+    blocks: list[tuple[str, Options, Rows]] = [("", {}, [])]
     for line in _lines(path):
         first, *others = (part.strip(' "') for part in line.strip(", ").split(","))
         if line.startswith("*"):
             options = {key.strip().upper(): value.strip(' "') for key, _, value in (o.partition("=") for o in others)}
-            blocks.append(_Block(first[1:].upper(), options, []))
+            blocks.append((first[1:].upper(), options, []))
         else:
-            blocks[-1].rows.append([first, *others])
+            blocks[-1][2].append([first, *others])
     return blocks
 
 
 class _Model:
-    """Nodes, plane elements by their number of nodes, lines by their ends, sets by kind and name in capitals, and
-    surfaces as elements and a face."""
+    """By their numbers, the places of nodes and the nodes of plane elements (``cells``) and of ``lines``; the numbers
+    of sets by kind and name, as it is first written; surfaces as elements and a face."""
 
     def __init__(self, path: Path) -> None:
-        self.nodes: np.ndarray = np.zeros(0, dtype=np.int64)
-        self.x: np.ndarray = np.zeros((0, 3))
-        self.elements: dict[int, np.ndarray] = {}
-        self.lines: np.ndarray = np.zeros((0, 3), dtype=np.int64)
-        self.sets: dict[str, dict[str, np.ndarray]] = {"NSET": {}, "ELSET": {}}
-        self.surfaces: dict[str, list[tuple[np.ndarray, str]]] = defaultdict(list)
-        self.spelling: dict[str, str] = {}
+        self.nodes: dict[int, list[float]] = {}
+        self.cells: dict[int, list[int]] = {}
+        self.lines: dict[int, list[int]] = {}
+        self.sets: dict[str, dict[str, list[int]]] = {"NSET": {}, "ELSET": {}}
+        self.surfaces: dict[str, list[tuple[list[int], str]]] = defaultdict(list)
+        self._names: dict[str, str] = {}
         take = {"NODE": self._node, "ELEMENT": self._element, "SURFACE": self._surface}
-        take |= dict.fromkeys(self.sets, self._set)
-        for block in _blocks(path):
-            if block.keyword in _UNREAD or block.options.get("SYSTEM", "R").upper() != "R":
+        for keyword, options, rows in _blocks(path):
+            if keyword in _UNREAD or options.get("SYSTEM", "R").upper() != "R":
                 raise ValueError(
-                    f"*{block.keyword} is not read as it stands; write all nodes and elements out, in rectangular "
+                    f"*{keyword} is not read as it stands; write all nodes and elements out, in rectangular "
                     "coordinates and without parts and instances (noPartsInputFile=ON)"
                 )
-            if block.keyword in take:
-                take[block.keyword](block)
+            if keyword in take:
+                take[keyword](options, rows)
+            elif keyword in self.sets:
+                self._set(keyword, options, rows)
 
-    def _node(self, block: _Block) -> None:
-        rows = np.array([[*row, "0", "0"][:4] for row in block.rows], dtype=float).reshape(-1, 4)
-        self.nodes = np.append(self.nodes, rows[:, 0].astype(np.int64))
-        self.x = np.concatenate([self.x, rows[:, 1:]])
-        self._add("NSET", block.options.get("NSET"), rows[:, 0])
+    def _node(self, options: Options, rows: Rows) -> None:
+        numbers = [int(row[0]) for row in rows]
+        for number, (_, *place) in zip(numbers, rows, strict=True):
+            if number in self.nodes:
+                raise ValueError(f"the node {number} is there twice")
+            self.nodes[number] = [float(value) for value in (*place, "0", "0")[:3]]
+        self._add("NSET", options.get("NSET"), numbers)
 
-    def _element(self, block: _Block) -> None:
-        kind, values = block.options.get("TYPE", "").upper(), block.values()
+    def _element(self, options: Options, rows: Rows) -> None:
+        kind, values = options.get("TYPE", "").upper(), [int(value) for row in rows for value in row if value]
         if not _KINDS.fullmatch(kind):
             raise ValueError(f"elements of type {kind} are not read, only CPS and CPE of 3, 4, 6 or 8 nodes")
-        n = int(kind[3])
-        if len(values) % (1 + n):
-            raise ValueError(f"elements of type {kind} have {len(values)} numbers, no multiple of {1 + n}")
-        rows = np.array(values, dtype=np.int64).reshape(-1, 1 + n)
-        if kind.startswith("T"):
-            self.lines = np.concatenate([self.lines, rows[:, [0, 1, -1]]])
-        else:
-            self.elements[n] = np.concatenate([self.elements.get(n, rows[:0]), rows])
-        self._add("ELSET", block.options.get("ELSET"), rows[:, 0])
+        size = 1 + int(kind[3])
+        if len(values) % size:
+            raise ValueError(f"elements of type {kind} have {len(values)} numbers, no multiple of {size}")
+        for start in range(0, len(values), size):
+            number, *nodes = values[start : start + size]
+            if number in self.cells or number in self.lines:
+                raise ValueError(f"the element {number} is there twice")
+            (self.lines if kind.startswith("T") else self.cells)[number] = nodes
+        self._add("ELSET", options.get("ELSET"), values[::size])
 
-    def _set(self, block: _Block) -> None:
-        kind, options = block.keyword, block.options
+    def _set(self, kind: str, options: Options, rows: Rows) -> None:
         if "GENERATE" in options:
-            elements = [rows[:, 0] for rows in (self.lines, *self.elements.values())]
-            there = self.nodes if kind == "NSET" else np.concatenate(elements)
-            ranges = [(*map(int, row), 1)[:3] for row in block.rows]
-            chosen = [there[(there >= a) & (there <= b) & ((there - a) % step == 0)] for a, b, step in ranges]
+            there = self.nodes.keys() if kind == "NSET" else self.cells.keys() | self.lines
+            ranges = [(*map(int, row), 1)[:3] for row in rows]
+            chosen = [n for a, b, step in ranges for n in there if a <= n <= b and (n - a) % step == 0]
         elif kind == "NSET" and "ELSET" in options:
-            named = self._chosen("ELSET", [options["ELSET"].upper()])
-            chosen = [np.unique(rows[np.isin(rows[:, 0], named), 1:]) for rows in self.elements.values()]
+            chosen = [n for element in self._chosen("ELSET", [options["ELSET"]]) for n in self.cells.get(element, ())]
         else:
-            chosen = [self._chosen(kind, block.values())]
-        self._add(kind, options.get(kind), np.concatenate(chosen))
+            chosen = self._chosen(kind, chain(*rows))
+        self._add(kind, options.get(kind), chosen)
 
-    def _surface(self, block: _Block) -> None:
-        name = block.options.get("NAME", "")
-        if block.options.get("TYPE", "").upper() == "NODE":
-            self._add("NSET", name, self._chosen("NSET", block.values()))
+    def _surface(self, options: Options, rows: Rows) -> None:
+        name = options.get("NAME", "")
+        if options.get("TYPE", "").upper() == "NODE":
+            self._add("NSET", name, self._chosen("NSET", chain(*rows)))
         else:
-            for item, *face in block.rows:
-                self.surfaces[name].append((self._chosen("ELSET", [item.upper()]), "".join(face).upper()))
+            self.surfaces[name] += [(self._chosen("ELSET", [item]), "".join(face).upper()) for item, *face in rows]
 
-    def _add(self, kind: str, name: str | None, numbers: np.ndarray) -> None:
+    def _add(self, kind: str, name: str | None, numbers: list[int]) -> None:
         if name:
-            known, name = self.sets[kind], self.spelling.setdefault(name.upper(), name)
-            known[name.upper()] = np.append(known.get(name.upper(), numbers[:0]), numbers).astype(np.int64)
+            self.sets[kind].setdefault(self._names.setdefault(name.upper(), name), []).extend(numbers)
 
-    def _chosen(self, kind: str, items: list[str]) -> np.ndarray:
+    def _chosen(self, kind: str, items: Iterable[str]) -> list[int]:
         """The numbers among ``items``, and those in the sets named there."""
-        names = sorted({item for item in items if not item.isdecimal()})
-        if lost := [name for name in names if name not in self.sets[kind]]:
-            raise ValueError(f"there is no *{kind} {lost[0]!r}")
-        numbers = np.array([item for item in items if item.isdecimal()], dtype=np.int64)
-        return np.concatenate([numbers, *(self.sets[kind][name] for name in names)])
+        chosen = []
+        for item in filter(None, items):
+            name = self._names.get(item.upper(), item)
+            if not item.isdecimal() and name not in self.sets[kind]:
+                raise ValueError(f"there is no *{kind} {name!r}")
+            chosen += [int(item)] if item.isdecimal() else self.sets[kind][name]
+        return chosen
 
 
 def read_abaqus(path: Path) -> PlaneMesh:
     """The mesh of an .inp file: its element sets, and as facet sets its surfaces, its sets of lines and what its node
     sets have of the boundary; other nodes of these are point sets. Raises ValueError."""
     model = _Model(path)
-    rows, lines = model.elements[one_kind(set(model.elements))], model.lines
-    for what, there in (("node", model.nodes), ("element", np.append(rows[:, 0], lines[:, 0]))):
-        number, count = np.unique(there, return_counts=True)
-        if (count > 1).any():
-            raise ValueError(f"the {what} {number[count > 1][0]} is there twice")
-    corners = _places(model.nodes, rows[:, 1:], "node")
+    kind = one_kind(set(map(len, model.cells.values())))
+    node, cell = ({number: k for k, number in enumerate(there)} for there in (model.nodes, model.cells))
+    corners = _places(node, chain(*model.cells.values()), "node").reshape(-1, kind)
     cell_sets, facet_sets, point_sets = {}, defaultdict[str, list[np.ndarray]](list), {}
-    for key, numbers in model.sets["ELSET"].items():
-        name, named = model.spelling[key], np.isin(lines[:, 0], numbers)
-        members = np.setdiff1d(numbers, lines[:, 0])
-        if len(members) or not named.any():
-            cell_sets[name] = _places(rows[:, 0], members, f"element of the set {name!r}")
-        if named.any():
-            facet_sets[name].append(_places(model.nodes, lines[named, 1:], "node"))
-    sides = 3 if corners.shape[1] in (3, 6) else 4
+    for name, numbers in model.sets["ELSET"].items():
+        ends = [model.lines[number][:: len(model.lines[number]) - 1] for number in numbers if number in model.lines]
+        members = sorted(set(numbers) - model.lines.keys())
+        if members or not ends:
+            cell_sets[name] = _places(cell, members, f"element of the set {name!r}")
+        if ends:
+            facet_sets[name].append(_places(node, chain(*ends), "node").reshape(-1, 2))
+    sides = 3 if kind in (3, 6) else 4
     faces = {f"S{k}": [k - 1, k % sides] for k in range(1, sides + 1)}
     for name, parts in model.surfaces.items():
         for elements, face in parts:
             if face not in faces:
                 raise ValueError(f"the surface {name!r} has the face {face!r}, which is none of S1 to S{sides}")
-            places = _places(rows[:, 0], elements, f"element of the surface {name!r}")
+            places = _places(cell, elements, f"element of the surface {name!r}")
             facet_sets[name].append(corners[places][:, faces[face]])
-    x, cells = in_basix_order(model.x, corners, perm_gmsh)
+    x, cells = in_basix_order(np.array(list(model.nodes.values())), corners, perm_gmsh)
     boundary, _ = outer_sides(cells)
-    for key, numbers in model.sets["NSET"].items():
-        if (name := model.spelling[key]) not in facet_sets:
-            nodes = _places(model.nodes, np.unique(numbers), f"node of the set {name!r}")
+    for name, numbers in model.sets["NSET"].items():
+        if name not in facet_sets:
+            nodes = _places(node, sorted(set(numbers)), f"node of the set {name!r}")
             edges = boundary[np.isin(boundary, nodes).all(axis=1)]
             if len(edges):
                 facet_sets[name].append(edges[:, :2])
@@ -176,10 +166,9 @@ def read_abaqus(path: Path) -> PlaneMesh:
     )
 
 
-def _places(numbers: np.ndarray, wanted: np.ndarray, what: str) -> np.ndarray:
-    """Where the ``wanted`` are among the ``numbers``. Raises ValueError."""
-    known = np.isin(wanted, numbers)
-    if not known.all():
-        raise ValueError(f"there is no {what} with the number {wanted[~known][0]}")
-    order = np.argsort(numbers, kind="stable")
-    return order[np.searchsorted(numbers, wanted, sorter=order)]
+def _places(known: dict[int, int], wanted: Iterable[int], what: str) -> np.ndarray:
+    """Where the numbers ``wanted`` are ``known`` to be. Raises ValueError."""
+    try:
+        return np.array([known[number] for number in wanted], dtype=np.int64)
+    except KeyError as lost:
+        raise ValueError(f"there is no {what} with the number {lost}") from None
