@@ -17,7 +17,8 @@ from dolfinx.cpp.io import perm_gmsh
 
 from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order, one_kind, outer_sides
 
-Options, Rows = dict[str, str], list[list[str]]
+Options = dict[str, str]
+Rows = list[list[str]]
 
 _KINDS = re.compile(r"(CP[ES][3468]|T[23]D[23])[A-Z]*")  # with the number of nodes
 _UNREAD = {"PART", "INSTANCE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY"}  # they move or make nodes
