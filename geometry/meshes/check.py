@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, compress, permutations
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -151,41 +152,26 @@ def _polygons(mesh: PlaneMesh, edges: np.ndarray) -> Array:
 
 def _overlaps(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], allowed: float) -> Iterator[str]:
     """Boundary vertices of a body, or middles of its cells there, that lie in another by more than is ``allowed``."""
-    outlines, probes = {}, {}
-    for body, cells in inside.items():
-        sides, behind = outer_sides(mesh.cells[cells])
-        outlines[body] = _polygons(mesh, sides)
-        probes[body] = np.concatenate([mesh.x[sides[:, 0]], mesh.x[mesh.cells[cells][behind]].mean(axis=1)])
-    for a, b in permutations(outlines, 2):
-        start, end = outlines[b][:, :-1].reshape(-1, 2), outlines[b][:, 1:].reshape(-1, 2)
-        points = probes[a]
-        points = points[((points > start.min(axis=0)) & (points < start.max(axis=0))).all(axis=1)]
-        spare = allowed + _INTO[mesh.edges.shape[1] > 2] * _PIECES * np.linalg.norm(end - start, axis=1)
-        for part in np.array_split(points, 1 + len(points) * len(start) // _AT_ONCE):
-            part = part[_within(part, start, end)]
-            depth, nearest = _distance(part, start, end)
-            depth[depth <= spare[nearest]] = 0.0
+    outer = {body: outer_sides(mesh.cells[cells]) for body, cells in inside.items()}
+    for (a, (sides, behind)), (b, (around, _)) in permutations(outer.items(), 2):
+        x = np.concatenate([mesh.x[sides[:, 0]], mesh.x[mesh.cells[inside[a]][behind]].mean(axis=1)])
+        polygon = _polygons(mesh, around)
+        start, along = polygon[:, :-1].reshape(-1, 2), np.diff(polygon, axis=1).reshape(-1, 2)
+        x = x[((x > start.min(axis=0)) & (x < start.max(axis=0))).all(axis=1)]
+        length = np.linalg.norm(along, axis=1)
+        spare = allowed + _INTO[mesh.edges.shape[1] > 2] * _PIECES * length
+        for part in np.array_split(x, 1 + len(x) * len(start) // _AT_ONCE):
+            to = part[:, None] - start
+            crosses = (to[..., 1] < 0) != (to[..., 1] < along[:, 1])  # of a ray to the right: an odd number from within
+            crosses &= (to[..., 0] * along[:, 1] < to[..., 1] * along[:, 0]) == (along[:, 1] > 0)
+            within = crosses.sum(axis=1) % 2 == 1
+            part, to = part[within], to[within]
+            xi = np.clip((to * along).sum(axis=2) / length**2, 0, 1)
+            away = np.linalg.norm(to - xi[..., None] * along, axis=2)
+            depth = np.where(away.min(axis=1) > spare[away.argmin(axis=1)], away.min(axis=1), 0.0)
             if depth.any():
-                at = _at(part[depth.argmax()])
-                yield f"the body {a!r} lies {depth.max():.3g} deep in the body {b!r} at {at}"
+                yield f"the body {a!r} lies {depth.max():.3g} deep in the body {b!r} at {_at(part[depth.argmax()])}"
                 break
-
-
-def _within(x: Array, start: Array, end: Array) -> np.ndarray:
-    """Whether a ray from each of ``x`` ``(m, 2)`` to the right crosses the polygon an odd number of times."""
-    y, along = x[:, 1, None], end - start
-    crosses = (start[:, 1] > y) != (end[:, 1] > y)
-    slope = along[:, 0] / np.where(along[:, 1] == 0, 1.0, along[:, 1])
-    right = x[:, 0, None] < start[:, 0] + (y - start[:, 1]) * slope
-    return (crosses & right).sum(axis=1) % 2 == 1
-
-
-def _distance(x: Array, start: Array, end: Array) -> tuple[Array, np.ndarray]:
-    """Distance ``(m,)`` of ``x`` from the nearest of the segments, and which one that is."""
-    along, to = end - start, x[:, None] - start
-    xi = np.clip((to * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
-    away = np.linalg.norm(to - xi[..., None] * along, axis=2)
-    return away.min(axis=1), away.argmin(axis=1)
 
 
 def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
@@ -225,7 +211,7 @@ def free_motions(
     Each body is ``held`` at points ``(k, 2)`` in directions ``(k, 2)``. Two bodies hold each other likewise by
     ``links``: contact without friction along its normals, ties in both directions.
     """
-    names, rows = list(held), [np.zeros((3 * len(held), len(held), 3))]
+    names, parts = list(held), [np.zeros((1, len(held), 3))]
     everything = [(a, a, x, n) for a, found in held.items() for x, n in found] + list(links)
     size = max((np.ptp(x, axis=0).max() for _, _, x, _ in everything), default=1.0) or 1.0
     centre = {name: next((x[0] for a, b, x, _ in everything if name in (a, b)), 0.0) for name in names}
@@ -234,11 +220,9 @@ def free_motions(
         for body, sign in {b: -1, a: 1}.items():
             X, Y = (x - centre[body]).T / size
             row[:, names.index(body)] = sign * np.column_stack([n, X * n[:, 1] - Y * n[:, 0]])
-        rows.append(row)
-    moves = np.zeros((len(names), 3), dtype=bool)
+        parts.append(row)
+    rows, moves = np.concatenate(parts), np.zeros((len(names), 3), dtype=bool)
     for kept in (3, 2):  # with rotations, of which others are a part, and without
-        matrix = np.concatenate(rows)[:, :, :kept].reshape(-1, kept * len(names))
-        _, value, modes = np.linalg.svd(np.linalg.qr(matrix, mode="r"))
-        free = modes[value <= _HELD * max(value.max(), 1.0)].reshape(-1, len(names), kept)
-        moves[:, :kept] = (np.abs(free) > _HELD).any(axis=0)
+        modes = null_space(np.linalg.qr(rows[:, :, :kept].reshape(len(rows), -1), mode="r"), rcond=_HELD)
+        moves[:, :kept] = (np.abs(modes) > _HELD).any(axis=1).reshape(-1, kept)
     return {name: list(compress(_MOTIONS, moved)) for name, moved in zip(names, moves, strict=True)}
