@@ -15,9 +15,8 @@ from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.half_ring import half_ring
 from archord.geometry.shapes.joint_mesh import refinements
-from archord.geometry.shapes.quarter_joint import quarter_joint
+from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 from archord.presets.arc import SYMMETRY
 from archord.report.timer import Timer
 from archord.scene.geometry import JointGeometry

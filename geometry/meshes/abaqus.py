@@ -101,8 +101,6 @@ class _Model:
             there = self.nodes.keys() if kind == "NSET" else self.cells.keys() | self.lines
             ranges = [(*map(int, row), 1)[:3] for row in rows]
             chosen = [n for a, b, step in ranges for n in there if a <= n <= b and (n - a) % step == 0]
-        elif kind == "NSET" and "ELSET" in options:
-            chosen = [n for element in self._chosen("ELSET", [options["ELSET"]]) for n in self.cells.get(element, ())]
         else:
             chosen = self._chosen(kind, chain(*rows))
         self._add(kind, options.get(kind), chosen)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -120,8 +121,9 @@ def own_gmsh() -> Iterator[Any]:
 def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None, cut: Cut | None = None) -> TaggedMesh:
     """The mesh that rank 0 ``made`` and its sets, on all ranks, whose own one is None; cut in `sectors`, if not as
     ``cut`` or ``partitioner`` say. Collective."""
-    nodes = comm.bcast(made and made.cells.shape[1])
-    made, (cell, order) = made or PlaneMesh.empty(nodes), cell_kind(nodes)
+    arrays = ("x", "cells", "bodies", "edges", "tags")
+    empty = comm.bcast(made and replace(made, **{name: getattr(made, name)[:0] for name in arrays}))
+    made, (cell, order) = made or empty, cell_kind(empty.cells.shape[1])
 
     def in_sectors(comm, n_parts: int, cell_types, cells) -> AdjacencyList_int32:
         vertices = cells[0].reshape(-1, len(basix.topology(cell)[0]))
@@ -136,8 +138,8 @@ def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None, cut: Cu
     edges, tags = distribute_entity_data(mesh, 1, made.edges, made.tags)
     mesh.topology.create_connectivity(1, 2)
     facets = meshtags_from_entities(mesh, 1, AdjacencyList_int32(edges), tags)
-    points = {name: made.x[nodes] for name, nodes in made.point_sets.items()}
-    return TaggedMesh(mesh, cells, facets, *comm.bcast((made.cell_sets, made.facet_sets, points)))
+    points = comm.bcast({name: made.x[nodes] for name, nodes in made.point_sets.items()} if comm.rank == 0 else None)
+    return TaggedMesh(mesh, cells, facets, made.cell_sets, made.facet_sets, points)
 
 
 def gathered(tagged: TaggedMesh) -> PlaneMesh | None:

@@ -33,13 +33,6 @@ class PlaneMesh:
     point_sets: dict[str, np.ndarray] = field(default_factory=dict)
 
     @classmethod
-    def empty(cls, nodes: int) -> PlaneMesh:
-        """No cells of so many ``nodes``: what the ranks have that did not make the mesh."""
-        none, order = np.zeros(0, dtype=np.int32), cell_kind(nodes)[1]
-        cells, edges = (np.zeros((0, a), dtype=np.int64) for a in (nodes, order + 1))
-        return cls(np.zeros((0, 2)), cells, none, edges, none)
-
-    @classmethod
     def from_gmsh(cls, gmsh) -> PlaneMesh:
         """What gmsh's model has in physical groups. Raises ValueError if that is not one kind of cells."""
         numbers, x, _ = gmsh.model.mesh.getNodes()

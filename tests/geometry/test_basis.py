@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis, lagrange_element, strain, strain_matrix
-from archord.geometry.shapes.quarter_joint import quarter_joint
+from archord.geometry.shapes.pin_in_block import quarter_joint
 
 
 def mesh_and_basis(X):

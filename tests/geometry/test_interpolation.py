@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.interpolation import Interpolation
-from archord.geometry.shapes.quarter_joint import quarter_joint
+from archord.geometry.shapes.pin_in_block import quarter_joint
 from tests.geometry.shapes.measures import Cells
 
 

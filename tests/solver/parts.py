@@ -17,7 +17,7 @@ from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.fenicsx import create_vector, gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.quarter_joint import quarter_joint
+from archord.geometry.shapes.pin_in_block import quarter_joint
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material

@@ -7,8 +7,7 @@ import pytest
 
 from archord.geometry.meshes import fenicsx, mesh_cache
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.shapes.half_ring import half_ring
-from archord.geometry.shapes.quarter_joint import quarter_joint
+from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 
 QUARTER = {"radius": 2.0, "clearance": 0.02, "block_size": 20.0, "element_size": 0.6, "growth": 1.0}
 RING = {"radius": 2.0, "clearance": 0.02, "outer_radius": 20.0, "element_size": 0.6, "growth": 1.0, "core_radius": 0.2}

@@ -5,8 +5,7 @@ import pytest
 from dolfinx.mesh import entities_to_geometry
 
 from archord.geometry.meshes.fenicsx import sectors
-from archord.geometry.shapes.half_ring import half_ring
-from archord.geometry.shapes.quarter_joint import quarter_joint
+from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 from tests.geometry.shapes.measures import Facets
 
 

@@ -148,7 +148,6 @@ two squares
  1, 2, 3, 21, 22
 *NSET, NSET=mixed
  1, 24, 25, 11, 13
-*NSET, NSET=rnodes, ELSET=Right
 *SURFACE, NAME=Top, TYPE=ELEMENT
  Both, S3
 *SURFACE, NAME=seam
@@ -199,9 +198,8 @@ def test_an_input_deck_of_sets_and_surfaces(comm, deck):
     assert found["facets", "floor"] == (2, pytest.approx(2.0))
     assert found["facets", "seam"][0] == 1
     assert found["facets", "mixed"][0] == 1
-    assert found["facets", "rnodes"][0] == 3
     assert sorted(map(tuple, mesh.point_sets["mixed"].tolist())) == [(0.5, 1.0), (2.0, 1.0)]
-    assert set(mesh.point_sets) == {"Nall", "mixed", "rnodes"}
+    assert set(mesh.point_sets) == {"Nall", "mixed"}
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, bulk_quadrature, cell_basis
-from archord.geometry.shapes.half_ring import half_ring
-from archord.geometry.shapes.quarter_joint import quarter_joint
+from archord.geometry.shapes.pin_in_block import half_ring, quarter_joint
 from archord.scene.geometry import JointGeometry
 from tests.geometry.shapes.measures import Cells, Facets
 

@@ -1,7 +1,6 @@
-"""The paper's quarter joint: a quarter pin of radius R in a quarter hole of radius R + dR, touching at the bottom.
+"""A pin of radius R in a block with a hole of radius R + dR: the joints that `[joint]` of a scene is about.
 
-The hole's centre is the origin and the symmetry axis is x = 0. The pin's centre is (0, -dR), so pin and hole touch at
-(0, -R - dR). The block reaches to x = W and y = -H; its top edge y = 0 is held, the pin's flat top is the loaded edge.
+The hole's centre is the origin, the symmetry axis is x = 0.
 """
 
 from __future__ import annotations
@@ -31,12 +30,15 @@ def quarter_joint(
     whole_pin: bool = False,
     **options,
 ) -> TaggedMesh:
-    """Mesh the quarter joint, with ``options`` as for `mesh_joint`. Lengths share one unit.
+    """Mesh the paper's joint, a quarter of pin and hole, with ``options`` as for `mesh_joint`. Lengths share one unit.
+
+    The pin's centre is (0, -dR), so pin and hole touch at (0, -R - dR). The block reaches to x = W and y = -H, both
+    ``block_size``; its top edge y = 0 is held, the pin's flat top is the loaded edge.
 
     ``element_size`` is the edge length on the hole's arc, ``size_ratio`` times that the one on the pin's; away from
     them it grows by ``growth`` per unit of distance. ``edge`` is an angle from the axis [rad] and the size to which
-    the elements shrink there, where the contact is to end. A rigid pin is not meshed; of a
-    whole one the upper half, free, is meshed with the rest, which is then pressed along a line inside it.
+    the elements shrink there, where the contact is to end. A rigid pin is not meshed; of a whole one the upper half,
+    free, is meshed with the rest, which is then pressed along a line inside it.
     """
     hole, width, size = 1.0 + clearance / radius, block_size / radius, element_size / radius
     sketch = Sketch(("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry", "pin back"))
@@ -63,4 +65,42 @@ def quarter_joint(
             x, y = hole * math.sin(edge[0]), hole * math.cos(edge[0])
             near_edge = f"{edge[1] / radius!r} + {_EDGE_GROWTH!r} * Sqrt((x - {x!r})^2 + (y + {y!r})^2)"
             sketch.sizes[body] = f"Min({sketch.sizes[body]}, {near_edge})"
+    return mesh_joint(comm, sketch, radius=radius, **options)
+
+
+def half_ring(
+    comm: MPI.Comm,
+    radius: float,
+    clearance: float,
+    outer_radius: float,
+    element_size: float,
+    growth: float,
+    core_radius: float,
+    *,
+    size_ratio: float = 1.0,
+    **options,
+) -> TaggedMesh:
+    """Mesh half of a whole pin in a whole ring, with ``options`` as for `mesh_joint`. Lengths share one unit. Persson
+    (1964) solved it, but for the finite material around the hole.
+
+    Pin and hole have one centre, also where they interfere; the ring's outer edge is held. Elements are
+    ``element_size`` long on the hole's arc and ``size_ratio`` times that on the pin's; away from the arcs they grow by
+    ``growth`` per unit of distance, to a third of ``core_radius`` at the pin's centre.
+    """
+    hole, outer, size, core = (1 + clearance / radius, *(v / radius for v in (outer_radius, element_size, core_radius)))
+    sketch = Sketch(("pin", "block"), ("pin", "hole", "pin top", "block held", "symmetry"))
+
+    def arcs(body: str, name: str, r: float) -> list[int]:
+        return sketch.path(body, (0, -r), (r, 0), (0, r), on=Circle(name, (0.0, 0.0), r))
+
+    sketch.point("pin", (0, 0))
+    sketch.face("pin", pin=arcs("pin", "pin", 1.0), symmetry=sketch.path("pin", (0, 1.0), (0, 0), (0, -1.0)))
+    round_lines = {name: arcs("block", name, r) for name, r in (("hole", hole), ("block held", outer))}
+    below, above = (sketch.path("block", *ends) for ends in (((0, -outer), (0, -hole)), ((0, hole), (0, outer))))
+    sketch.face("block", **round_lines, symmetry=below + above)
+    from_arc = f"{growth!r} * Abs(Sqrt(x*x + y*y) - {hole!r})"
+    from_core = f"{core / 3!r} + {growth!r} * Sqrt(x*x + y*y)"
+    for body, arc, on_arc in (("pin", "pin", size_ratio * size), ("block", "hole", size)):
+        sketch.sizes[body] = f"Min({on_arc!r} + {from_arc}, {from_core})"
+        sketch.parts |= dict.fromkeys(sketch.lines[arc], math.pi / 2 / on_arc)
     return mesh_joint(comm, sketch, radius=radius, **options)
