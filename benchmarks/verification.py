@@ -13,6 +13,7 @@ from pathlib import Path
 from time import perf_counter
 
 from archord.benchmarks.case import Case, paper_joint
+from archord.benchmarks.persson import UNLIKE, persson_joint, theory, unlike
 from archord.presets.measures import Measures
 from archord.report.table import Table
 from archord.scene.scene import Scene
@@ -54,6 +55,16 @@ def main() -> None:
     compare("small contact: p0/E*", math.sqrt(m.P / math.pi / radius), "Hertz", m.p0, cost)
     half_width = math.sqrt(4 * m.P * radius / math.pi)
     compare("small contact: half-width/R", half_width, "Hertz", m.contact_area / 2, "")
+    bodies, alpha = unlike(*UNLIKE)
+    for name, load, n, sections in (
+        ("", 0.5, 1, {}),
+        (", interference", -0.1, 4, {}),
+        (", unlike", 0.5, 1, bodies),
+    ):
+        found, cost = _solve(persson_joint(load, 0.04, n, **sections))
+        eps, peak = theory(load, alpha if sections else 0.0)
+        compare(f"pin in a ring{name}: R p0/P", peak, "Persson", found[-1].p0 / found[-1].P, cost)
+        compare(f"pin in a ring{name}: eps [rad]", eps, "Ciavarella, Decuzzi", found[-1].eps, "")
     print(table.markdown())
     force = max(m.force_balance for steps in runs for m in steps)
     energy = max(abs(m.work - m.elastic_energy - m.plastic_dissipation) / m.work for m in (steps[-1] for steps in runs))
