@@ -10,6 +10,7 @@ from time import perf_counter
 import click
 
 from archord.options import argument, output, quiet
+from archord.report.files import write_table
 from archord.scene.errors import InputError
 
 Say = Callable[[str], None]
@@ -120,7 +121,7 @@ def variants(group: str, output: Path, repeats: int, quiet: bool) -> int:
     from archord.benchmarks.cost import variants as table
 
     rows, faults = table.run(table.variants(group), output / "runs", repeats, _telling(quiet))
-    return _conclude(*table.write(rows, output), faults, quiet)
+    return _conclude(*write_table(output, "variants", rows), faults, quiet)
 
 
 @benchmark.command()
@@ -139,7 +140,7 @@ def accuracy(output: Path, only: str, quiet: bool) -> int:
     if not cases:
         raise InputError(f"--only {only}: must be part of {', '.join(case.name for case in table.CASES)}.")
     rows, faults = table.run(output / "runs", cases, _telling(quiet))
-    return _conclude(*table.write(rows, output), faults, quiet)
+    return _conclude(*write_table(output, "accuracy", rows), faults, quiet)
 
 
 @benchmark.command("work-precision")

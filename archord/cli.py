@@ -19,9 +19,8 @@ from archord.ranks import COLLECTIVE, launcher_rank, run_on_ranks
 from archord.scene.errors import InputError
 
 FILES = {
-    "solve_commands": ("solve", "scene"),
+    "solve_commands": ("solve", "scene", "mesh"),
     "result_commands": ("show", "compare", "export", "export-deck", "picture", "probe"),
-    "mesh_commands": ("mesh",),
     "sweep_commands": ("sweep",),
     "law_commands": ("laws", "law", "fit"),
     "benchmark_commands": ("reproduce", "benchmark"),
@@ -49,8 +48,7 @@ def app() -> None:
 
 
 def run(arguments: list[str], begun: float | None = None) -> int:
-    """Run the command line ``arguments``, ``begun`` at that time of `perf_counter`; returns the exit code. Only rank 0
-    prints."""
+    """The exit code of the command line ``arguments``, ``begun`` at that time of `perf_counter`; only rank 0 prints."""
     since = perf_counter() if begun is None else begun
     return run_on_ranks(_command(arguments), lambda: _run(arguments, since))
 

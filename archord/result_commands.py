@@ -67,19 +67,16 @@ def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
 @flag("--force", "overwrite files that are there")
 def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, force: bool) -> int:
     """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything else."""
+    from archord.postprocess.export import export_csv, export_vtk
     from archord.postprocess.run import Run
 
     if vtk is None and csv is None:
         raise InputError("export: give --vtk DIR, --csv DIR or both.")
     run = Run(folder)
     if vtk is not None:
-        from archord.postprocess.export import export_vtk
-
         collection, *files = export_vtk(run, vtk, step, force=force)
         print(f"{collection}\n{len(files)} .vtu files beside it, {files[0].name} to {files[-1].name}")
     if csv is not None:
-        from archord.postprocess.export import export_csv
-
         print(*export_csv(run, csv, force=force), sep="\n")
     return 0
 

@@ -1,4 +1,4 @@
-"""``archord solve`` and ``archord scene``."""
+"""``archord solve``; and ``archord scene`` and ``mesh``, which tell what there is to solve."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from archord.options import PATH, SCENE, flag, output, overrides, quiet
+from archord.options import PATH, SCENE, argument, flag, output, overrides, pictures, quiet
 
 if TYPE_CHECKING:
     from archord.scene.file import AnyScene
@@ -63,8 +63,7 @@ def solve(
 
 
 def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, quiet: bool, **options: Any) -> int:
-    """Solve the scene that ``load`` gives rank 0 into ``folder`` on all ranks and report; returns the exit code.
-    ``options`` as for `solve_and_report`."""
+    """`solve_and_report`, with its ``options``; returns the exit code."""
     from mpi4py import MPI
 
     from archord.progress import solve_and_report
@@ -110,4 +109,45 @@ def scene(example: bool, general: bool, reference: bool, materials: bool, expand
         print(pages.materials(), end="")
     else:
         print(pages.reference() if reference else pages.example(general), end="")
+    return 0
+
+
+@click.command()
+@argument("file", "FILE", "mesh (.msh, .inp, .xdmf), or scene (.toml)")
+@output("picture to draw [<name>.png]")
+@overrides()
+@pictures("the mesh with its named sets")
+def mesh(file: Path, output: Path | None, overrides: tuple[str, ...], pictures: bool) -> int:
+    """Print what is in a mesh: kind and order of its cells, named sets, circles and warnings; and draw it.
+
+    Keys of [mesh] may be set of a mesh file, too: --set mesh.scale=1000.
+    """
+    from mpi4py import MPI
+
+    from archord.geometry.meshes.fenicsx import gathered
+    from archord.output.user_file import check_target
+    from archord.postprocess.pictures.mesh import draw_mesh, mesh_text
+    from archord.presets.joint import joint_problem
+    from archord.presets.problem import as_input_error, scene_mesh
+    from archord.scene.file import load_scene, override_key
+    from archord.scene.problem import MeshScene
+    from archord.scene.scene import Scene
+
+    if file.suffix == ".toml":
+        scene: Any = load_scene(file, overrides)
+    else:
+        given: Any = {"mesh": {"file": str(file)}}
+        make: Any = MeshScene
+        scene = make(str(file), {override_key(given, o): f"--set {o}" for o in overrides}, **given)
+    if isinstance(scene, Scene):
+        whole = gathered(joint_problem(scene, MPI.COMM_SELF).mesh)
+    else:
+        with as_input_error(scene):
+            whole = gathered(scene_mesh(scene, MPI.COMM_SELF))
+    assert whole is not None  # this is rank 0
+    print(mesh_text(str(file), whole))
+    if pictures:
+        target = output or Path(f"{file.stem}.png")
+        check_target(target, [file])
+        print(f"\n{draw_mesh(whole, target)}")
     return 0

@@ -54,15 +54,21 @@ def sweep(
     comm = MPI.COMM_WORLD
     source = file / FILE if file.is_dir() else file
     folder = output or (file if file.is_dir() else Path("runs") / file.stem.removesuffix(".sweep"))
-    show = comm.rank == 0 and not quiet
+
+    def say(text: str) -> None:
+        """Print on rank 0; if nobody reads any more, that is no reason to stop, nor to leave other ranks waiting."""
+        try:
+            if comm.rank == 0 and not quiet:
+                print(text, flush=True)
+        except OSError:
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
 
     def prepared():
         design = read_sweep(source, overrides)
         mine = part_of(design.distinct, array)
-        if show:
-            minutes = sum(expected_seconds(case.scene) for case in design.distinct) / 60
-            distinct = f"{len(design.distinct)} of them distinct"
-            _say(f"{len(design.cases)} cases, {distinct}; about {minutes:.1f} min on one rank")
+        minutes = sum(expected_seconds(case.scene) for case in design.distinct) / 60
+        distinct = f"{len(design.distinct)} of them distinct"
+        say(f"{len(design.cases)} cases, {distinct}; about {minutes:.1f} min on one rank")
         if dry_run:
             print(_table(design))
             return design, mine, [], []
@@ -70,8 +76,8 @@ def sweep(
             raise InputError(f"{folder}: holds no sweep to gather.")
         claim(design, folder)
         ended, left = ([], []) if gather else open_cases(mine, folder, retry=retry)
-        if ended and show:
-            _say(f"{len(ended)} of {len(mine)} cases are there already")
+        if ended:
+            say(f"{len(ended)} of {len(mine)} cases are there already")
         return design, mine, ended, left
 
     found: list = []
@@ -82,10 +88,10 @@ def sweep(
 
     def ended(result: Result) -> None:
         results.append(result)
-        if show and result.status != "open":
+        if result.status != "open":
             done = f"{sum(result.status == 'done' for result in results)} of {len(mine)} done"
             word = f"{result.status}, {result.steps} steps in {result.seconds:.1f} s"
-            _say(f"{perf_counter() - begun:7.1f} s  {result.run} {word}; {done}")
+            say(f"{perf_counter() - begun:7.1f} s  {result.run} {word}; {done}")
 
     received = 0
     if comm.bcast(bool(cases)):
@@ -95,26 +101,16 @@ def sweep(
 
     def concluded() -> bool:
         known = tables.write(design, folder, results)
-        if show:
-            counts = Counter(result.status for result in known.values())
-            told = ", ".join(f"{n} {status}" for status, n in sorted(counts.items()))
-            _say(f"{told} in {perf_counter() - begun:.1f} s, tables in {folder}")
-        failed = [case for case in mine if known[case.run].status in ("stopped", "failed")]
-        for case in failed:
-            result = known[case.run]
+        counts = Counter(result.status for result in known.values())
+        told = ", ".join(f"{n} {status}" for status, n in sorted(counts.items()))
+        say(f"{told} in {perf_counter() - begun:.1f} s, tables in {folder}")
+        failed = [(case, known[case.run]) for case in mine if known[case.run].status in ("stopped", "failed")]
+        for case, result in failed:
             print(f"archord: case {case.number}, {case.run}: {result.status}: {result.message}.", file=sys.stderr)
         return bool(failed)
 
     failed = agreed(comm, concluded)
     return 128 + received if received else 3 * failed
-
-
-def _say(text: str) -> None:
-    """Print a line; if nobody reads any more, that is no reason to stop, nor to leave other ranks waiting."""
-    try:
-        print(text, flush=True)
-    except OSError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
 
 
 def _table(design) -> Table:

@@ -71,10 +71,7 @@ def halt(order: MeshOrder, scene: str, m: Any, step: Step, position: Position, w
 
 def resume(order: MeshOrder, path: Path, checkpoint: Checkpoint | None) -> tuple[dict[str, Any], Step, Position, Work]:
     """Give the system the state of ``checkpoint`` (needed on rank 0 only, read from ``path``); returns what `halt` was
-    given, the record of the step as a dictionary. Collective.
-
-    Raises `InputError` on every rank if it is of another mesh.
-    """
+    given, the record of the step as a dictionary. Raises `InputError` if it is of another mesh. Collective."""
     known = checkpoint and (checkpoint.mesh == order.mesh_digest(), checkpoint.scalars)
     same_mesh, scalars = order.system.comm.bcast(known)
     if not same_mesh:

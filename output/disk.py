@@ -21,11 +21,8 @@ def new_name(path: Path) -> Path:
 
 
 def replace_file(path: Path, content: bytes | str, *, durable: bool = False) -> None:
-    """Put a file with ``content`` in the place of ``path``, in one move.
-
-    ``durable`` waits until the disk has it, so that it also survives a power cut. Raises `OSError` naming ``path``,
-    which then is what it was.
-    """
+    """Put a file with ``content`` in the place of ``path``, in one move; if ``durable``, also a power cut then leaves
+    it. Raises `OSError` naming ``path``, which then is what it was."""
     new = new_name(path)
     try:
         with new.open("wb") as file:

@@ -114,16 +114,16 @@ class FieldWriter:
         n_nodes, n_cells, of_cell = self._sizes
         nodal, body = _data(f"{n_nodes} 3", step, "displacement"), _data(f"{n_cells}", 0, "mesh/body", "Int", 4)
         cells = _data(f"{n_cells} {of_cell}", 0, "mesh/cells", "Int")
+        shown = [("displacement", "Vector", "Node", nodal)]
+        shown += [(name, "Scalar", "Node", _data(f"{n_nodes}", step, name)) for name in of_nodes]
+        shown += [(name, "Scalar", "Cell", _data(f"{n_cells}", step, name)) for name in of_cells]
         lines = [
             f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>',
             f'<Topology TopologyType="{self._topology}" NumberOfElements="{n_cells}">{cells}</Topology>',
             f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", 0, "mesh/coordinates")}</Geometry>',
-            f'<Attribute Name="displacement" AttributeType="Vector" Center="Node">{nodal}</Attribute>',
         ]
-        scalars = [(name, "Node", _data(f"{n_nodes}", step, name)) for name in of_nodes]
-        scalars += [(name, "Cell", _data(f"{n_cells}", step, name)) for name in of_cells]
-        for name, centre, data in [*scalars, ("body", "Cell", body)]:
-            lines.append(f'<Attribute Name="{name}" AttributeType="Scalar" Center="{centre}">{data}</Attribute>')
+        for name, kind, centre, data in [*shown, ("body", "Scalar", "Cell", body)]:
+            lines.append(f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{data}</Attribute>')
         return "\n".join([*lines, "</Grid>\n"])
 
 

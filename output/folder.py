@@ -44,8 +44,7 @@ def occupied(folder: Path) -> Iterator[None]:
 
 
 def claim_folder(folder: Path, force: bool) -> None:
-    """Make ``folder`` ready for results. Raises `InputError` if it cannot be, or holds something already without
-    ``force``."""
+    """Make ``folder`` ready for results. Raises `InputError` if it cannot be, or holds something, without ``force``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         empty, fault = not any(folder.iterdir()), "" if os.access(folder, os.W_OK) else "Permission denied"

@@ -26,10 +26,8 @@ def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Any]) -
 
 
 def read_history(path: str | Path) -> dict[str, list[float]]:
-    """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E* R)"]``, ...
-
-    A last row that does not end in a line break (a copy cut short) is ignored.
-    """
+    """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E* R)"]``, ... A last row
+    that does not end in a line break (a copy cut short) is ignored."""
     text = Path(path).read_bytes().decode()
     heading, *rows = csv.reader(io.StringIO(text[: text.rfind("\n") + 1], newline=""))
     names = [h.split(" [")[0] for h in heading]

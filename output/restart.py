@@ -35,9 +35,7 @@ class Start:
 @dataclass
 class Plan:
     """The scene to solve and from where; no ``start`` means from the beginning, ``finished`` that nothing is to do.
-
-    ``said`` is a sentence for the user.
-    """
+    ``said`` is a sentence for the user."""
 
     scene: AnyScene
     start: Start | None

@@ -131,9 +131,9 @@ class _Output:
         with self.system.timer("output"):
             self._order = MeshOrder(self.system)
             if asked.fields:
-                from archord.output.fields import collect_mesh
+                from archord.output import fields as of_fields
 
-                self._mesh = collect_mesh(self._order, self._at_points)
+                self._of_fields, self._mesh = of_fields, of_fields.collect_mesh(self._order, self._at_points)
         self._fields: Any = None  # a `FieldWriter` with the first step, on rank 0
         self._contact: StepFile | None = None
         if comm.rank == 0:
@@ -178,16 +178,13 @@ class _Output:
         with self.system.timer("output"):
             warnings = account.step_warnings(m, profiles, step.residual)
             if scene.output.fields:
-                from archord.output.fields import FieldWriter, collect_fields
-
-                fields = collect_fields(self._order, self._at_points)
+                fields = self._of_fields.collect_fields(self._order, self._at_points)
 
             def write() -> None:
                 if scene.output.fields:
                     if not self._fields:
-                        self._fields = FieldWriter(
-                            self.folder, self._order, self._mesh, after, scene.steps_numbered, scene.output.points
-                        )
+                        how = after, scene.steps_numbered, scene.output.points
+                        self._fields = self._of_fields.FieldWriter(self.folder, self._order, self._mesh, *how)
                     self._fields.write(m.at, fields)
                 if not self._contact:
                     self._contact = StepFile(self.folder / "contact.h5", _arrays(profiles, account.fixed), after)

@@ -47,8 +47,7 @@ class StepFile:
             self._add_step(load, arrays)
 
     def write(self, load: float, arrays: Arrays) -> None:
-        """Add a step, reached at ``load``. Raises `OSError`: then the file is what it was, and this object of no
-        further use."""
+        """Add a step, reached at ``load``. Raises `OSError`: then the file is what it was, this object of no use."""
         self._add_step(load, arrays)
         replace_file(self.path, image(self._file))
 

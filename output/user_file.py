@@ -33,8 +33,7 @@ def check_target(path: Path, inputs: Iterable[Path] = (), *, force: bool = True)
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Around the writing of ``path``: `check_target` before, and `InputError` for what the system refuses all the
-    same."""
+    """`check_target` before the writing of ``path``, and `InputError` for what the system refuses all the same."""
     check_target(path)
     try:
         yield
