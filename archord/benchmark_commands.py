@@ -10,7 +10,6 @@ from time import perf_counter
 import click
 
 from archord.options import argument, output, quiet
-from archord.report.files import write_table
 from archord.scene.errors import InputError
 
 Say = Callable[[str], None]
@@ -118,6 +117,7 @@ def variants(group: str, output: Path, repeats: int, quiet: bool) -> int:
     GROUP is joint (one scene in variants), sweep (on two ranks and on one) or strategies (without each linear strategy,
     for hours). Exit code 0 only if none loads what it does not use.
     """
+    from archord.benchmarks.case import write_table
     from archord.benchmarks.cost import variants as table
 
     rows, faults = table.run(table.variants(group), output / "runs", repeats, _telling(quiet))
@@ -133,7 +133,7 @@ def accuracy(output: Path, only: str, quiet: bool) -> int:
 
     Exit code 0 only if all errors are below what was asked.
     """
-    from archord.benchmarks.case import matches
+    from archord.benchmarks.case import matches, write_table
     from archord.benchmarks.cost import accuracy as table
 
     cases = tuple(case for case in table.CASES if matches(only, case.name))

@@ -1,4 +1,4 @@
-"""The case of every benchmark: a named scene with what is expected of it; and the joint that most of them vary."""
+"""What benchmarks share: a named scene with what is expected of it, the joint that most of them vary, and tables."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from mpi4py import MPI
 
 from archord.output.folder import claim_folder
 from archord.output.run import Outcome
+from archord.report.files import Row, write_report
+from archord.report.table import Table
 from archord.scene.file import AnyScene, parse_scene, resolved
 from archord.scene.scene import Scene
 from archord.studies.accuracy import solve_to_accuracy
@@ -130,13 +132,6 @@ def quantities(scene: AnyScene, last: Any) -> dict[str, float]:
     }
 
 
-def driven(scene: AnyScene, m: Any) -> list[tuple[float, float]]:
-    """Force and displacement of every load at the step ``m``."""
-    if isinstance(scene, Scene):
-        return [(m.P, m.delta)]
-    return [(m.values[f"{load.name} force"], m.values[f"{load.name} displacement"]) for load in scene.load]
-
-
 def slug(name: str) -> str:
     """``name`` as the name of a folder."""
     return re.sub(r"[^\w.+-]+", "_", name.replace("%", "pc")).strip("_")
@@ -151,3 +146,9 @@ def side_by_side(comm: MPI.Comm, items: Sequence[Item], function: Callable[[Item
     """``function`` of every item, in order, the ranks taking turns; the same list on all ranks. Collective."""
     parts = comm.allgather([function(item) for item in items[comm.rank :: comm.size]])
     return [parts[k % comm.size][k // comm.size] for k in range(len(items))]
+
+
+def write_table(folder: Path, name: str, rows: Sequence[Row], below: str = "") -> tuple[str, list[Path]]:
+    """`write_report` of a table with a text ``below``; returns the Markdown and the files, nothing without rows."""
+    text = Table.of(rows).markdown() + below if rows else ""
+    return text, write_report(folder, name, rows, text) if rows else []

@@ -11,8 +11,6 @@ import numpy as np
 from archord.benchmarks.case import Case, E, paper_joint, varied
 from archord.output.run import Outcome
 from archord.postprocess.convergence import difference
-from archord.report.files import write_report
-from archord.report.table import Table
 from archord.scene.scene import Scene
 from archord.studies.mesh_family import RATIO, MeshFamily
 
@@ -45,14 +43,12 @@ CASES = (
 def run(
     folder: Path, cases: Sequence[Case], said: Callable[[str], None], asked: Sequence[float] = ()
 ) -> tuple[list[dict[str, object]], list[str]]:
-    """Solve ``cases`` below ``folder`` to the accuracies ``asked``, or those of their material, references
-    first; ``said`` follows each run.
+    """Solve ``cases`` below ``folder`` to the accuracies ``asked``, or those of their material, references first.
 
     Returns the entries of each accuracy by heading, with the true error of the curve, over its largest value, and a
     sentence for every estimate or error that is larger than what was asked. Raises `RuntimeError` if a run fails.
     """
-    rows: list[dict[str, object]] = []
-    faults = []
+    rows, faults = list[dict[str, object]](), []
     for case in cases:
         known = reference(case, folder, said)
         for wanted in asked or (PLASTIC if case.scene.plastic else ELASTIC):
@@ -103,9 +99,3 @@ def reference(case: Case, folder: Path, said: Callable[[str], None]) -> np.ndarr
 
 def _curve(scene: Scene, outcome: Outcome) -> list[float]:
     return [m.delta if scene.force_controlled else m.P for m in outcome.steps]
-
-
-def write(rows: Sequence[dict[str, object]], folder: Path) -> tuple[str, list[Path]]:
-    """Write accuracy.csv and accuracy.md into ``folder``; returns the table and the files."""
-    text = Table.of(rows).markdown()
-    return text, write_report(folder, "accuracy", rows, text)

@@ -2,8 +2,7 @@
 
 The paper's joint, refined everywhere alike, on one rank and on several. A cost is a dict: "name", "material", "dofs",
 "ranks", "iterations", "coarse iterations", "factorisations", "P" (over E* R), "total" (seconds of the whole process
-from outside), "parts" (seconds by part, as rank 0 spent them, which sum up to the total), "memory" (peak of each rank
-in bytes).
+from outside), "parts" (seconds by part, as rank 0 spent them, which sum up to it), "memory" (peak bytes of each rank).
 """
 
 from __future__ import annotations
@@ -18,11 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from archord.benchmarks.case import paper_joint
+from archord.benchmarks.case import paper_joint, write_table
 from archord.benchmarks.timing import Process, Said, Timing, time_all
-from archord.output.folder import claim_folder
-from archord.report.files import write_report
-from archord.report.table import Table
 from archord.scene.errors import InputError
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
@@ -44,6 +40,7 @@ PARTS = {
     "linear solve": ("linear solve",),
     "output": ("output", "checkpoint"),
 }
+_GROWING = ("time", "linear solve", "memory")
 _A_DAY = 86400.0  # seconds that a run may take
 
 
@@ -62,12 +59,10 @@ class Setting:
 
     def process(self, folder: Path) -> Process:
         """The run as a user would start it, in the existing ``folder``, whose result is its run.json."""
-        run, scene = folder.resolve() / self.name, folder.resolve() / f"{self.name}.toml"
-        claim_folder(run, force=True)
         steps, strength = (PLASTIC_STEPS, YIELD_STRESS) if self.material == "plastic" else (ELASTIC_STEPS, None)
-        scene.write_text(resolved(refined(SIZES[self.dofs], steps, strength)), encoding="utf-8")
-        command = (*launcher(self.ranks), sys.executable, "-m", "archord", "solve", str(scene), "-o", str(run))
-        read = (run / "run.json").read_text
+        scene, read = f"{self.name}.toml", (folder / self.name / "run.json").read_text
+        (folder / scene).write_text(resolved(refined(SIZES[self.dofs], steps, strength)), encoding="utf-8")
+        command = (*launcher(self.ranks), sys.executable, "-m", "archord", "solve", scene, "-o", self.name)
         command = (*command, "--force", "-q")
         return Process(self.name, command, folder, lambda: json.loads(read()), _A_DAY, kind=self.material)
 
@@ -87,12 +82,12 @@ def launcher(ranks: int) -> list[str]:
 
 
 def settings(largest: float, ranks: int) -> list[Setting]:
-    """All runs up to ``largest`` dofs, the smallest first: the elastic series on 1, 2, 4, ... up to ``ranks`` ranks,
-    the plastic one on one rank."""
-    counts = [1 << k for k in range(ranks.bit_length())]
-    elastic = [Setting(dofs, count) for dofs in SIZES for count in counts]
-    plastic = [Setting(dofs, 1, "plastic") for dofs in SIZES if dofs <= PLASTIC_LARGEST]
-    return sorted((s for s in (*elastic, *plastic) if s.dofs <= largest), key=lambda setting: setting.dofs)
+    """All runs up to ``largest`` dofs by size: elastic on 1, 2, 4, ... up to ``ranks`` ranks, plastic on one."""
+    found = []
+    for dofs in (dofs for dofs in SIZES if dofs <= largest):
+        found += [Setting(dofs, 1 << k) for k in range(ranks.bit_length())]
+        found += [Setting(dofs, 1, "plastic")] if dofs <= PLASTIC_LARGEST else []
+    return found
 
 
 def run(chosen: Sequence[Setting], folder: Path, repeats: int, said: Said) -> tuple[list[Cost], list[str]]:
@@ -134,17 +129,12 @@ def unlike(costs: Sequence[Cost]) -> list[str]:
 
 def _alone(cost: Cost, costs: Sequence[Cost]) -> Cost | None:
     """The same joint on one rank."""
-    return next((c for c in series(costs, cost["material"], 1) if c["dofs"] == cost["dofs"]), None)
-
-
-def series(costs: Sequence[Cost], material: str, ranks: int) -> list[Cost]:
-    """Runs of one material on ``ranks`` ranks by size."""
-    return sorted((c for c in costs if (c["material"], c["ranks"]) == (material, ranks)), key=lambda c: c["dofs"])
+    same = cost["material"], cost["dofs"], 1
+    return next((c for c in costs if (c["material"], c["dofs"], c["ranks"]) == same), None)
 
 
 def exponent(dofs: Sequence[float], values: Sequence[float]) -> float:
-    """The power of ``dofs``, at least two, with which ``values`` grow: slope of a least-squares line through their
-    logarithms."""
+    """The power of ``dofs``, at least two, with which ``values`` grow: least squares of their logarithms."""
     return float(np.polyfit(np.log(dofs), np.log(values), 1)[0])
 
 
@@ -162,20 +152,14 @@ def row(cost: Cost, costs: Sequence[Cost]) -> dict[str, object]:
 
 
 def write(costs: Sequence[Cost], folder: Path) -> tuple[str, list[Path]]:
-    """Write scaling.csv and scaling.md into ``folder``, if there is any cost; returns the table, with the
-    powers of N with which time and memory grow, and the files."""
-    if not costs:
-        return "", []
-    rows = [row(c, costs) for c in sorted(costs, key=lambda c: (c["material"], c["dofs"], c["ranks"]))]
-    text = Table.of(rows).markdown()
+    """`write_table` of ``costs``, with the powers of N with which time and memory grow below it."""
+    costs = sorted(costs, key=lambda c: (c["material"], c["dofs"], c["ranks"]))
+    text = ""
     for material in ("elastic", "plastic"):
-        if len(same := series(costs, material, 1)) > 1:
-            dofs = [cost["dofs"] for cost in same]
-            grown = {
-                "time": [cost["total"] for cost in same],
-                "linear solve": [cost["parts"]["linear solve"] for cost in same],
-                "memory": [max(cost["memory"]) for cost in same],
-            }
-            powers = ", ".join(f"{what} N^{exponent(dofs, values):.2f}" for what, values in grown.items())
-            text += f"\nLeast squares over {len(same)} sizes on one rank, {material}: {powers}.\n"
-    return text, write_report(folder, "scaling", rows, text)
+        same = [cost for cost in costs if (cost["material"], cost["ranks"]) == (material, 1)]
+        if len(same) > 1:
+            found = [(c["dofs"], c["total"], c["parts"]["linear solve"], max(c["memory"])) for c in same]
+            dofs, *grown = zip(*found, strict=True)
+            powers = (f"{what} N^{exponent(dofs, values):.2f}" for what, values in zip(_GROWING, grown, strict=True))
+            text += f"\nLeast squares over {len(same)} sizes on one rank, {material}: {', '.join(powers)}.\n"
+    return write_table(folder, "scaling", [row(cost, costs) for cost in costs], text)

@@ -18,13 +18,11 @@ from statistics import median
 from archord.benchmarks.case import paper_joint, slug
 from archord.benchmarks.cost.scaling import launcher
 from archord.benchmarks.timing import Process, Said, Timing, time_all
-from archord.report.files import Row, write_report
-from archord.report.table import Table
+from archord.report.files import Row
 from archord.scene.file import resolved
 from archord.scene.scene import Scene
 
 SETS = tomllib.loads(Path(__file__).with_name("variants.toml").read_text(encoding="utf-8"))["set"]
-GROUPS = tuple(dict.fromkeys(given["group"] for given in SETS))
 ABSENT = ("matplotlib", "pyvista", "scipy", "rich", "numba")  # from a solve
 WATCHED = (*ABSENT, "dolfinx", "archord.materials.j2", "archord.output.fields", "kernel radial_return",
            "kernel closest_point")  # fmt: skip
@@ -70,8 +68,7 @@ class Variant:
     unused: Sequence[str] = ()
 
     def process(self, folder: Path) -> Process:
-        """Its process in the existing ``folder``; the result is what it loaded, modules and kernels. Raises
-        `InputError` without mpirun."""
+        """Its process in the existing ``folder``; the result is what it loaded. Raises `InputError` without mpirun."""
         place, note = self.folder(folder), folder / "note.json"
         if self.picture_of:
             run = replace(self, name=self.picture_of).folder(folder)
@@ -82,9 +79,8 @@ class Variant:
             place.with_suffix(".toml").write_text(resolved(self.scene), encoding="utf-8")
             arguments = ["solve", f"{place.name}.toml", "-q", "-o", place.name]
         command = (*launcher(self.ranks), sys.executable, "-c", _PROBE, note.name, WITHOUT[self.without], *arguments)
-        # what is there already would not be solved again; what is compiled on first use is counted in no run
         read, name = (lambda: json.loads(note.read_text())), f"{self.case}, {self.name}"
-        return Process(name, command, folder, read, _A_DAY, (place.name,), kind=place.name)
+        return Process(name, command, folder, read, _A_DAY, clear=(place.name,), kind=place.name)
 
     def folder(self, parent: Path) -> Path:
         """Its output folder below ``parent``."""
@@ -103,8 +99,7 @@ def variants(group: str) -> list[Variant]:
         for name, own in given["variants"].items():
             solved = "scene" in given and "picture_of" not in own
             scene = paper_joint(**given["scene"] | own.get("scene", {})) if solved else None
-            keys = own | {"scene": scene, "sweep": given.get("sweep", "")}
-            found.append(Variant(given["name"], name, **keys))
+            found.append(Variant(given["name"], name, **own | {"scene": scene, "sweep": given.get("sweep", "")}))
     return found
 
 
@@ -146,11 +141,3 @@ def run(chosen: Sequence[Variant], folder: Path, repeats: int, said: Said) -> tu
 def ratio(one: Timing, other: Timing, what: str) -> float:
     """``what`` ("seconds" or "cpu") of the runs of ``one`` over those of ``other``: the median of the pairs."""
     return median(getattr(a, what) / getattr(b, what) for a, b in zip(one.runs, other.runs, strict=False))
-
-
-def write(rows: Sequence[Row], folder: Path) -> tuple[str, list[Path]]:
-    """Write variants.csv and variants.md into ``folder``, if there is any row; returns the table and the files."""
-    if not rows:
-        return "", []
-    text = Table.of(rows).markdown()
-    return text, write_report(folder, "variants", rows, text)

@@ -48,8 +48,7 @@ class Line:
 
 
 def run(folder: Path, only: Sequence[str], repeats: int, limit: float, said: Said) -> list[Line]:
-    """Time the points that fit ``only``, each ``repeats`` times and for ``limit`` seconds at most, in turn, below
-    ``folder``; ``said`` follows each run. Raises `InputError`."""
+    """Time the points that fit ``only`` below ``folder`` (see `time_all`), for ``limit`` seconds each at most."""
     chosen = points(only)
     timings = time_all([point.process(folder, limit) for point in chosen], repeats, said)
     return [Line(*pair) for pair in zip(chosen, timings, strict=True)]
@@ -74,34 +73,27 @@ def envelopes(lines: Sequence[Line]) -> dict[str, Pairs]:
     on from which its series stays below it."""
     found: dict[str, Pairs] = {}
     for (code, _), members in series_of(lines).items():
-        known = [(line.timing.median, line.errors["P"]) for line in members if "P" in line.errors]
-        errors = lasting([error for _, error in known])
-        found.setdefault(code, []).extend((seconds, e) for (seconds, _), e in zip(known, errors, strict=True))
-    return {code: envelope(pairs) for code, pairs in found.items() if pairs}
+        if known := [(line.timing.median, line.errors["P"]) for line in members if "P" in line.errors]:
+            seconds, errors = zip(*known, strict=True)
+            found[code] = [*found.get(code, []), *zip(seconds, lasting(errors), strict=True)]
+    return {code: envelope(pairs) for code, pairs in found.items()}
 
 
 def lasting(errors: Sequence[float]) -> list[float]:
-    """The errors of a series, coarse to fine, with each as large as any that follows on a finer mesh.
-
-    An error that happens to pass through zero on one mesh proves nothing of the method.
-    """
+    """The errors of a series, coarse to fine, each as large as any on a finer mesh: one that passes through zero on its
+    mesh proves nothing of the method."""
     return [max(errors[k:]) for k in range(len(errors))]
 
 
 def envelope(pairs: Iterable[tuple[float, float]]) -> Pairs:
     """Those of the pairs (seconds, error) that no other beats in both, in the order of their seconds."""
-    kept: Pairs = []
-    for seconds, error in sorted(pairs):
-        if not kept or error < kept[-1][1]:
-            kept.append((seconds, error))
-    return kept
+    ordered = sorted(pairs)
+    return [pair for k, pair in enumerate(ordered) if all(pair[1] < error for _, error in ordered[:k])]
 
 
 def seconds_at(error: float, kept: Pairs) -> float | None:
-    """Seconds to ``error`` along an envelope, straight in log-log; None if it does not get there.
-
-    Nothing is extrapolated: errors above that of the cheapest point cost what it costs.
-    """
+    """Seconds to ``error`` along an envelope, straight in log-log; None if it does not get there. Errors above that of
+    the cheapest point cost what it costs."""
     if not kept or error < kept[-1][1]:
         return None
     seconds, errors = np.log(np.maximum(kept, 1e-300)).T
@@ -154,16 +146,14 @@ def ratios(kept: dict[str, Pairs]) -> list[str]:
     if OURS not in kept or not others:
         return []
 
-    def cell(theirs: float | None, ours: float | None) -> str:
-        if theirs is None:
-            return "never"
-        return f"takes {theirs / ours:.2g} times as long" if ours else f"{theirs:.1f} s"
-
     table = Table("error of P", f"{OURS} [s]", *others)
     for level in LEVELS:
-        mine, times = seconds_at(level, kept[OURS]), [seconds_at(level, kept[code]) for code in others]
-        if any(time is not None for time in (mine, *times)):
-            table.add(f"{level:g}", f"{mine:.2f}" if mine else "never", *(cell(time, mine) for time in times))
+        ours, *times = (seconds_at(level, kept[code]) for code in (OURS, *others))
+        if ours or any(times):
+            told = (
+                f"takes {t / ours:.2g} times as long" if t and ours else f"{t:.1f} s" if t else "never" for t in times
+            )
+            table.add(f"{level:g}", f"{ours:.2f}" if ours else "never", *told)
     reached = ", ".join(f"{code} {kept[code][-1][1]:.1e}" for code in (OURS, *others))
     return [table.markdown(), f"Smallest errors of P reached: {reached}.\n"]
 
@@ -173,7 +163,7 @@ def draw(case: str, lines: Sequence[Line], file: Path) -> None:
     names, given = quantities(case), CASES[case]
     codes = list(dict.fromkeys((OURS, *(line.point.code for line in lines))))
     figure = new_figure(4.1 * len(names), 9)
-    panels = figure.subplots(2, len(names), sharey="col", squeeze=False)
+    panels = figure.subplots(2, len(names), sharey="col")
     for number, ((code, series), members) in enumerate(series_of(lines).items()):
         style = {"color": f"C{codes.index(code)}", "marker": "os^Dvph*"[number % 8], "label": f"{code}, {series}"}
         for k, name in enumerate(names):

@@ -43,10 +43,8 @@ _COLUMNS = {"P": "P/(E* R)", "p0": "p0/E*", "eps": "eps", "dissipation": "plasti
 
 @dataclass(frozen=True)
 class Point:
-    """``code`` on the mesh of element size ``size`` (over R) of a ``series`` of ``case``, in ``steps`` steps.
-
-    ``prepare`` writes what the code needs into a folder, and returns the process that solves there.
-    """
+    """``code`` on the mesh of element size ``size`` (over R) of a ``series`` of ``case``, in ``steps`` steps;
+    ``prepare`` writes what it needs into a folder, and returns the process that solves there."""
 
     case: str
     code: str
@@ -70,10 +68,8 @@ class Point:
 
 
 def points(patterns: Sequence[str] = ()) -> list[Point]:
-    """All points, or those whose name fits one of ``patterns``; CalculiX's and peers' where they are installed.
-
-    Raises `InputError` for a pattern that fits none.
-    """
+    """All points, or those whose name fits one of ``patterns``; CalculiX's and peers' where they are installed. Raises
+    `InputError` for a pattern that fits none."""
     versions, peers = {OURS: VERSION} | _calculix_version(), installed()
     found = []
     for case, given in CASES.items():

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.benchmarks.paper.figures import Part, X, Y, columns
+from archord.benchmarks.paper.figures import Part, X, Y, columns, strength
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, PLANES, Runs
 from archord.materials.material import Plane
 from archord.postprocess.arc import read_arcs
@@ -24,6 +24,7 @@ from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.report.table import Table
 
+TEXTS: dict[str, dict[str, str]] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 GOOD, FAIR = 0.05, 0.15
 _CORNER = 85  # degrees from the contact axis beyond which the block is held
 Tables = dict[str, list[Part]]  # of the figures, by name
@@ -50,7 +51,7 @@ def verdict(strain: dict[str, float], stress: dict[str, float]) -> str:
 def judged(runs: Runs, tables: Tables) -> Table:
     """All claims with what we find and the verdicts."""
     table = Table("claim", "figure", "the paper", *(f"ours, plane {plane}" for plane in PLANES), "verdict")
-    for name, claim in tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")).items():
+    for name, claim in TEXTS.items():
         (strain, off), (stress, off_in_stress) = (CLAIMS[name](runs, tables, plane) for plane in PLANES)
         table.add(name, claim["figure"], claim["text"], strain, stress, verdict(off, off_in_stress))
     return table
@@ -103,12 +104,11 @@ def elastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
 def yield_plateau(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C4."""
     run = runs.curve(FULL_YIELD, plane)
-    assert run.sigY is not None
     angle, pressure = read_arcs(run, len(run.delta))["hole"].facet_means()
-    middle = pressure[angle < 0.5 * run.eps[-1]] / run.sigY
+    middle = pressure[angle < 0.5 * run.eps[-1]] / strength(run)
     mean = columns(tables["fig5b"], plane=plane)["P/(A sigY)"][-1]
     return (
-        f"p0/sigY = {run.p0[-1] / run.sigY:.3f}; p over the inner half of the arc {middle.min():.2f} to "
+        f"p0/sigY = {run.p0[-1] / strength(run):.3f}; p over the inner half of the arc {middle.min():.2f} to "
         f"{middle.max():.2f} sigY; P/A = {mean:.3f} sigY"
     ), {"": float(max(abs(middle.max() - 1), abs(middle.min() - 1), mean - 1, 0))}
 
@@ -146,8 +146,7 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
     assert elastic.folder is not None
     fields = [read_fields(elastic.folder, elastic.scene, k + 1) for k in range(len(elastic.delta))]
     centroid = fields[0].coordinates[fields[0].cells[:, :3]].mean(axis=1)
-    stress = np.array([np.zeros(len(centroid)), *(field.von_mises for field in fields)])
-    delta = np.concatenate([[0.0], elastic.delta])
+    stress, delta = np.array([0 * centroid[:, 0], *(f.von_mises for f in fields)]), np.append(0.0, elastic.delta)
     above, cell = stress >= yield_stress, np.arange(len(centroid))
     step = np.maximum(above.argmax(axis=0), 1)
     low, high = stress[step - 1, cell], stress[step, cell]
@@ -159,8 +158,8 @@ def first_yield(elastic: RunCurve, yield_stress: float, near_contact: float = 2.
     angle = np.degrees(np.arctan2(centroid[:, 0], -centroid[:, 1]))
     when[(depth > near_contact) | ((angle > _CORNER) & (near_contact < 1))] = np.inf
     first = int(np.argmin(when))
-    body = "pin" if pin[first] else "block"
-    return FirstYield(float(when[first]) / elastic.dR, body, float(depth[first]), float(angle[first]))
+    found = float(when[first]) / elastic.dR, "pin" if pin[first] else "block"
+    return FirstYield(*found, float(depth[first]), float(angle[first]))
 
 
 def onset(runs: Runs, tables: Tables, plane: Plane) -> Found:
@@ -187,12 +186,7 @@ def force_over_angle(runs: Runs, tables: Tables, plane: Plane) -> Found:
     ), {"": float(max(law, abs(worst)))}
 
 
-CLAIMS: dict[str, Callable[[Runs, Tables, Plane], Found]] = {
-    "C1": chord_pressure,
-    "C2": peak_pressure,
-    "C3": elastic_force,
-    "C4": yield_plateau,
-    "C5": plastic_force,
-    "C6": onset,
-    "C7": force_over_angle,
-}
+_JUDGES: tuple[Callable[[Runs, Tables, Plane], Found], ...] = (
+    chord_pressure, peak_pressure, elastic_force, yield_plateau, plastic_force, onset, force_over_angle,
+)  # fmt: skip
+CLAIMS = dict(zip(TEXTS, _JUDGES, strict=True))

@@ -14,6 +14,7 @@ import numpy as np
 
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, MILD_YIELD, PLANES, Runs
 from archord.geometry.basis import Array
+from archord.materials.material import Plane
 from archord.postprocess.arc import read_arcs
 from archord.postprocess.chord import arc_angle, read_chord_pressure
 from archord.postprocess.curve import RunCurve
@@ -88,11 +89,15 @@ def curve(run: RunCurve) -> Part:
     return {"plane": run.plane, X: run.delta / run.dR, Y: run.P / (run.E_star * run.dR)}
 
 
-def chord_profile(run: RunCurve, step: int) -> tuple[float, Array, Array]:
-    """``eps``, ``x/l`` and chord pressure over facet means of the hole at ``step``; facets beyond the edge left out.
+def strength(run: RunCurve) -> float:
+    """The yield stress of a joint that has one."""
+    assert run.sigY is not None
+    return run.sigY
 
-    Means, because the pressure within plastic facets scatters.
-    """
+
+def chord_profile(run: RunCurve, step: int) -> tuple[float, Array, Array]:
+    """``eps``, ``x/l`` and chord pressure of the hole at ``step``: means of facets, as within plastic ones the pressure
+    scatters, without those beyond the edge."""
     assert run.folder is not None
     chord = read_chord_pressure(run.folder, step, "hole")
     points = read_arcs(run, step)["hole"].angle.shape[1]
@@ -101,103 +106,87 @@ def chord_profile(run: RunCurve, step: int) -> tuple[float, Array, Array]:
     return chord.eps, (weight * x).sum(1) / weight.sum(1), (weight * py).sum(1) / weight.sum(1)
 
 
-def fig2(runs: Runs) -> list[Part]:
+def fig2(runs: Runs, plane: Plane) -> list[Part]:
     """Chord pressure over x/l: ours, Persson's at the same angle, the parabola and Hertz's ellipse."""
-    parts = []
-    for run in (runs.curve("elastic", plane) for plane in PLANES):
-        for fraction in (2.0, 1.5, 1.0, 0.5):
-            k = int(np.argmin(np.abs(run.delta / run.dR - fraction)))
-            eps, x, py = chord_profile(run, k + 1)
-            phi = arc_angle(2 * np.sin(eps / 2) * x, eps, 1.0)
-            stretch = np.cos(eps / 2) / np.cos(phi - eps / 2) ** 2
-            pressure = persson_pressure(LawJoint.from_scene(run.scene), run.P[k], np.array(eps), phi)
-            shape = np.where(x < 1, 1 - x**2, 0.0)
-            ratios = {"py/p0": py / run.p0[k], "Persson": pressure * np.cos(phi) / stretch / run.p0[k]}
-            parts.append(
-                {"plane": run.plane, X: fraction, "x/l": x, **ratios, "parabola": shape, "ellipse": shape**0.5}
-            )
+    run, parts = runs.curve("elastic", plane), []
+    for fraction in (2.0, 1.5, 1.0, 0.5):
+        k = int(np.argmin(np.abs(run.delta / run.dR - fraction)))
+        eps, x, py = chord_profile(run, k + 1)
+        phi = arc_angle(2 * np.sin(eps / 2) * x, eps, 1.0)
+        stretch = np.cos(eps / 2) / np.cos(phi - eps / 2) ** 2
+        pressure = persson_pressure(LawJoint.from_scene(run.scene), run.P[k], np.array(eps), phi)
+        shape = np.where(x < 1, 1 - x**2, 0.0)
+        ratios = {"py/p0": py / run.p0[k], "Persson": pressure * np.cos(phi) / stretch / run.p0[k]}
+        parts.append({"plane": plane, X: fraction, "x/l": x, **ratios, "parabola": shape, "ellipse": shape**0.5})
     return parts
 
 
-def fig3(runs: Runs) -> list[Part]:
+def fig3(runs: Runs, plane: Plane) -> list[Part]:
     """Peak pressure over delta: ours, Winkler with k = 0.85, Johnson."""
-    parts = []
-    for run in (runs.curve("elastic", plane) for plane in PLANES):
-        joint, unit = LawJoint.from_scene(run.scene), run.E_star * run.dR
-        johnson = hertz(joint, law_force("johnson", run) * unit).peak_pressure / unit
-        ours = run.p0 * run.R / unit
-        winkler = find_law("paper").at_displacement(joint, run.delta).peak_pressure / unit
-        laws = {"Winkler, k = 0.85": winkler, "Johnson": johnson, "p0 R/(E* delta)": ours * run.dR / run.delta}
-        parts.append({"plane": run.plane, X: run.delta / run.dR, "p0 R/(E* dR)": ours, **laws})
-    return parts
+    run = runs.curve("elastic", plane)
+    joint, unit = LawJoint.from_scene(run.scene), run.E_star * run.dR
+    johnson = hertz(joint, law_force("johnson", run) * unit).peak_pressure / unit
+    ours = run.p0 * run.R / unit
+    winkler = find_law("paper").at_displacement(joint, run.delta).peak_pressure / unit
+    laws = {"Winkler, k = 0.85": winkler, "Johnson": johnson, "p0 R/(E* delta)": ours * run.dR / run.delta}
+    return [{"plane": plane, X: run.delta / run.dR, "p0 R/(E* dR)": ours, **laws}]
 
 
-def fig4(runs: Runs) -> list[Part]:
+def fig4(runs: Runs, plane: Plane) -> list[Part]:
     """Force over delta: ours, eq. 9, Johnson and Radzimovsky as printed and with the limit that the paper states."""
-    curves = [runs.curve("elastic", plane) for plane in PLANES]
-    return [curve(run) | {name: law_force(name, run) for name in LAYOUTS["fig4"]["laws"]} for run in curves]
+    run = runs.curve("elastic", plane)
+    return [curve(run) | {name: law_force(name, run) for name in LAYOUTS["fig4"]["laws"]}]
 
 
-def fig5(runs: Runs) -> list[Part]:
+def fig5(runs: Runs, plane: Plane) -> list[Part]:
     """Pressure over the yield stress along arc and chord at 2 dR."""
-    parts = []
-    for run in (runs.curve(FULL_YIELD, plane) for plane in PLANES):
-        assert run.sigY is not None
-        eps, x, py = chord_profile(run, len(run.delta))
-        angle, pressure = (v[: len(x)] for v in read_arcs(run, len(run.delta))["hole"].facet_means())
-        for side, at, p in (("arc", angle / eps, pressure), ("chord", x, py)):
-            parts.append({"plane": run.plane, "on": side, "phi/eps or x/l": at, "p/sigY": p / run.sigY})
-    return parts
+    run = runs.curve(FULL_YIELD, plane)
+    eps, x, py = chord_profile(run, len(run.delta))
+    angle, pressure = (v[: len(x)] for v in read_arcs(run, len(run.delta))["hole"].facet_means())
+    sides = ("arc", angle / eps, pressure), ("chord", x, py)
+    return [{"plane": plane, "on": side, "phi/eps or x/l": at, "p/sigY": p / strength(run)} for side, at, p in sides]
 
 
-def fig5b(runs: Runs) -> list[Part]:
+def fig5b(runs: Runs, plane: Plane) -> list[Part]:
     """The mean pressure over the projected area A over delta."""
-    parts = []
-    for run in (runs.curve(FULL_YIELD, plane) for plane in PLANES):
-        assert run.sigY is not None
-        mean = run.P / (2 * run.R * np.sin(run.eps))
-        parts.append({"plane": run.plane, X: run.delta / run.dR, "P/(A sigY)": mean / run.sigY})
-    return parts
+    run = runs.curve(FULL_YIELD, plane)
+    mean = run.P / (2 * run.R * np.sin(run.eps))
+    return [{"plane": plane, X: run.delta / run.dR, "P/(A sigY)": mean / strength(run)}]
 
 
-def fig7(runs: Runs) -> list[Part]:
+def fig7(runs: Runs, plane: Plane) -> list[Part]:
     """Force over delta of all pairs: ours and eqs 11, 12."""
     parts = []
     for joint in LAYOUTS["fig7"]["joints"]:
-        for run in (runs.curve(joint, plane) for plane in PLANES):
-            assert run.sigY is not None
-            unit, law = run.R * run.sigY, law_force("paper-plastic", run) * run.E_star * run.dR
-            named = {"dR/R [%]": JOINTS[joint][0], "sigY/E* [%]": JOINTS[joint][1], "plane": run.plane}
-            forces = {"P/(R sigY)": run.P / unit, "eq. 12": law / unit, "P/P(eq. 12)": run.P / law}
-            parts.append(named | {X: run.delta / run.dR} | forces)
+        run = runs.curve(joint, plane)
+        unit, law = run.R * strength(run), law_force("paper-plastic", run) * run.E_star * run.dR
+        named: Part = {"dR/R [%]": JOINTS[joint][0], "sigY/E* [%]": JOINTS[joint][1], "plane": plane}
+        forces = {"P/(R sigY)": run.P / unit, "eq. 12": law / unit, "P/P(eq. 12)": run.P / law}
+        parts.append(named | {X: run.delta / run.dR} | forces)
     return parts
 
 
-def fig8(runs: Runs) -> list[Part]:
+def fig8(runs: Runs, plane: Plane) -> list[Part]:
     """Force over delta: ours, ours without yielding, eq. 12."""
-    parts = []
-    for run, elastic in ((runs.curve(MILD_YIELD, plane), runs.curve("elastic_0.1", plane)) for plane in PLANES):
-        laws = {"elastic P/(E* dR)": curve(elastic)[Y], "eq. 12": law_force("paper-plastic", run)}
-        parts.append(curve(run) | laws | {"PEEQ max": run.peeq_max})
-    return parts
+    run, elastic = (runs.curve(joint, plane) for joint in LAYOUTS["fig8"]["joints"])
+    laws = {"elastic P/(E* dR)": curve(elastic)[Y], "eq. 12": law_force("paper-plastic", run)}
+    return [curve(run) | laws | {"PEEQ max": run.peeq_max}]
 
 
-def fig9(runs: Runs) -> list[Part]:
+def fig9(runs: Runs, plane: Plane) -> list[Part]:
     """Force over the contact angle: ours, Persson, eqs 9 and 12 with eq. 5 for the angle."""
     parts = []
-    for plane in PLANES:
-        for kind, joint, name in (("elastic", "elastic", "paper"), ("plastic", FULL_YIELD, "paper-plastic")):
-            run = runs.curve(joint, plane)
-            persson = persson_load(LawJoint.from_scene(run.scene), run.eps) / (run.E_star * run.dR)
-            delta = run.dR * (1 / np.cos(np.minimum(run.eps, 1.5)) - 1)  # eq. 5
-            laws = {"Persson": persson, "eq. 9 or 12 at the same angle": law_force(name, run, delta)}
-            parts.append({"joint": kind, "tan(eps/2)": np.tan(run.eps / 2)} | curve(run) | laws)
+    for kind, joint, name in (("elastic", "elastic", "paper"), ("plastic", FULL_YIELD, "paper-plastic")):
+        run = runs.curve(joint, plane)
+        persson = persson_load(LawJoint.from_scene(run.scene), run.eps) / (run.E_star * run.dR)
+        delta = run.dR * (1 / np.cos(np.minimum(run.eps, 1.5)) - 1)  # eq. 5
+        laws = {"Persson": persson, "eq. 9 or 12 at the same angle": law_force(name, run, delta)}
+        parts.append({"joint": kind, "tan(eps/2)": np.tan(run.eps / 2)} | curve(run) | laws)
     return parts
 
 
-FIGURES: dict[str, Callable[[Runs], list[Part]]] = {
-    made.__name__: made for made in (fig2, fig3, fig4, fig5, fig5b, fig7, fig8, fig9)
-}
+_MAKERS: tuple[Callable[[Runs, Plane], list[Part]], ...] = (fig2, fig3, fig4, fig5, fig5b, fig7, fig8, fig9)
+FIGURES = dict(zip(LAYOUTS, _MAKERS, strict=True))
 
 
 def draw_zones(runs: Runs, file: Path) -> Path:

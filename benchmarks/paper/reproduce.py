@@ -39,7 +39,7 @@ def reproduce(names: Sequence[str], folder: Path, comm: MPI.Comm, said: Callable
         raise RuntimeError("; ".join(complaints))
     if comm.rank != 0:
         return []
-    tables = {name: FIGURES[name](runs) for name in wanted}
+    tables = {name: [part for plane in PLANES for part in FIGURES[name](runs, plane)] for name in wanted}
     files = [file for name in wanted for file in write(tables[name], folder, name)]
     if "fig8" in wanted:
         files.append(draw_zones(runs, folder / "fig8_zones.png"))

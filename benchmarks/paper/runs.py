@@ -1,8 +1,7 @@
 """The runs behind the paper's figures: joints, planes and meshes; what is solved already is not solved again.
 
 Hu et al. give neither Poisson's ratio nor the ratio of the moduli: like bodies with nu = 0.3 are taken. The text names
-(dR/R, sigY/E*) = (0.5 %, 0.2 %) and (0.1 %, 0.1 %) and the ranges of figure 7; its other pairs are our choice within
-them.
+(dR/R, sigY/E*) = (0.5 %, 0.2 %) and (0.1 %, 0.1 %) and the ranges of figure 7, within which we chose the other pairs.
 """
 
 from __future__ import annotations
@@ -76,10 +75,8 @@ class Runs:
 
 
 def solve_missing(wanted: list[Case], folder: Path, comm: MPI.Comm, said: Callable[[str], None]) -> list[str]:
-    """Solve the cases that are not done yet into ``folder``, each on one rank, the ranks side by side.
-
-    ``said(sentence)`` follows each on the rank that solved it. Returns the complaints of all that failed. Collective.
-    """
+    """Solve the cases that are not done yet into ``folder``, each on one rank, which says so, the ranks side by side.
+    Returns the complaints of all that failed. Collective."""
 
     def complaint(number: int) -> str:
         try:

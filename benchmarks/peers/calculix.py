@@ -115,10 +115,8 @@ def read_printed(text: str) -> Printed:
 
 
 def step_forces(printed: Printed, nodes: str) -> Array:
-    """Forces ``(steps, 3)`` on the set ``nodes`` at the end of each step.
-
-    Steps last one unit of time. CalculiX prints increments too, and sometimes the end of a step twice: the last counts.
-    """
+    """Forces ``(steps, 3)`` on the set ``nodes`` at the end of each step, which lasts one unit of time. CalculiX prints
+    increments too, and sometimes the end of a step twice: the last counts."""
     forces = {}
     for quantity, name, time, rows in printed:
         if (quantity, name) == ("total force", nodes) and abs(time - round(time)) < 1e-4:
@@ -127,10 +125,8 @@ def step_forces(printed: Printed, nodes: str) -> Array:
 
 
 def peeq_integral(printed: Printed, mesh: DeckMesh) -> float:
-    """The integral of PEEQ over the deck's model at the last time printed.
-
-    Means of the elements times their areas: the points of a triangle have equal weights where its edges are straight.
-    """
+    """The integral of PEEQ over the deck's model at the last time printed: means of the elements times their areas, as
+    the points of a triangle have equal weights where its edges are straight."""
     latest = {name: rows for quantity, name, _, rows in printed if quantity == "equivalent plastic strain"}
     rows = np.concatenate([np.zeros((0, 3)), *latest.values()])
     area = np.concatenate([areas(mesh.x[nodes]) for nodes in mesh.elements.values()])

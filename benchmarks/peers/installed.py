@@ -32,16 +32,15 @@ class Peer:
     def command(self, case: str, size: float, order: int, steps: int, output: Path) -> list[str]:
         """The command line that solves ``case`` and writes its result, JSON, to ``output``."""
         options = {"--case": case, "--size": size, "--order": order, "--steps": steps, "--output": output}
-        return [self.python, self._path, *(str(word) for option in options.items() for word in option)]
+        return self._started(*(str(word) for option in options.items() for word in option))
 
-    @property
-    def _path(self) -> str:
-        return str(Path(__file__).with_name(self.script))
+    def _started(self, *words: str) -> list[str]:
+        return [self.python, str(Path(__file__).with_name(self.script)), *words]
 
     def probe(self) -> str | None:
         """The version of the code, None if it is not here."""
         with suppress(OSError, subprocess.SubprocessError):
-            command = [self.python, self._path, "--probe"]
+            command = self._started("--probe")
             return subprocess.run(command, capture_output=True, check=True, text=True, timeout=_LIMIT).stdout.strip()
         return None
 

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
-from archord.benchmarks.case import Case, Expected, driven, matches, quantities, side_by_side
+from archord.benchmarks.case import Case, Expected, matches, quantities, side_by_side
 from archord.benchmarks.stability.cases import FILE, FINE, Values, cases
 from archord.output.history import read_history
 from archord.output.step_file import all_arrays
@@ -161,11 +161,14 @@ def solve_case(case: Case, folder: Path) -> Result:
 def _energy_limit(scene: AnyScene, steps: list[Any]) -> float:
     """How far the trapezoidal rule can be from the work, over the work, where loads are monotonic between two steps:
     half the sum of |dP d delta|. That of interferences counts from their first step on; a single step tells nothing."""
-    fits = scene.joint.dR < 0 if isinstance(scene, Scene) else scene.fits
+    if isinstance(scene, Scene):
+        fits, path = scene.joint.dR < 0, np.array([[(m.P, m.delta)] for m in steps])
+    else:
+        fits, what = scene.fits, ("force", "displacement")
+        path = np.array([[[m.values[f"{load.name} {of}"] for of in what] for load in scene.load] for m in steps])
     if fits and len(steps) == 1:
         return math.inf
     largest = max((abs(m.work) for m in steps if m.contact_area), default=0.0)
-    path = np.array([driven(scene, m) for m in steps])  # loads, forces and displacements
     path = path if fits else np.concatenate([np.zeros_like(path[:1]), path])
     return float(np.abs(np.prod(np.diff(path, axis=0), axis=2)).sum() / 2 / largest) if largest else 0.0
 

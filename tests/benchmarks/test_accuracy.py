@@ -1,6 +1,7 @@
 """The benchmark of asked, estimated and true errors."""
 
-from archord.benchmarks.cost.accuracy import CASES, open_joint, run, write
+from archord.benchmarks.case import write_table
+from archord.benchmarks.cost.accuracy import CASES, open_joint, run
 
 
 def test_a_case_is_solved_and_judged(tmp_path):
@@ -8,7 +9,7 @@ def test_a_case_is_solved_and_judged(tmp_path):
     (row,), faults = run(tmp_path / "runs", [open_joint("quick", 2)], print, [0.01])
     assert 0 < float(row["true"]) < float(row["estimated"]) <= 0.01
     assert faults == []
-    text, files = write([row], tmp_path)
+    text, files = write_table(tmp_path, "accuracy", [row])
     assert text.count("\n") == 3
     assert all(file.read_text().count("quick") == 1 for file in files)
 

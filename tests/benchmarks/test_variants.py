@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from archord.benchmarks.case import varied
+from archord.benchmarks.case import varied, write_table
 from archord.benchmarks.cost import variants as module
-from archord.benchmarks.cost.variants import GROUPS, WATCHED, WITHOUT, Variant, ratio, run, variants, write
+from archord.benchmarks.cost.variants import WATCHED, WITHOUT, Variant, ratio, run, variants
 from archord.benchmarks.timing import Process, Run, Timing
 
 CHOSEN = (("elastic", "rigid pin"), ("elastic", "no fields"), ("plastic", "whole"), ("plastic", "picture"))
@@ -37,12 +37,12 @@ def test_what_is_used_is_loaded_and_nothing_else(tmp_path):
     assert float(bare["written [kB]"]) < 0.5 * float(plastic["written [kB]"])
     assert all(float(row["peak memory [MB]"]) > 50 and float(row["seconds"]) > 0 for row in rows)
     assert chosen[2].faults(("dolfinx", "scipy")) == ["plastic, whole: loads scipy, which it does not need"]
-    text, files = write(rows, tmp_path)
+    text, files = write_table(tmp_path, "variants", rows)
     assert text.count("\n") == 6
     assert {file.name for file in files} == {"variants.csv", "variants.md"}
 
 
-@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("group", ["joint", "sweep", "strategies"])
 def test_every_variant_can_be_run(group, tmp_path):
     """It has a scene or a sweep, of which there is a file; the first of a set is what the others are compared with."""
     found = variants(group)
@@ -82,7 +82,7 @@ def test_a_sweep_is_solved_on_each_number_of_ranks(tmp_path, monkeypatch):
     assert rows == []
     assert [fault.partition(":")[0] for fault in faults] == ["a, b", "a, 1 rank"]
     assert "none.sweep.toml" in faults[0]
-    assert write(rows, tmp_path) == ("", [])
+    assert write_table(tmp_path, "variants", rows) == ("", [])
 
 
 def test_ratios_are_those_of_the_pair_in_the_middle():
