@@ -17,7 +17,7 @@ from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
-from archord.scene.problem import LIVE, ProblemScene
+from archord.scene.problem import GIVEN, LIVE, ProblemScene
 from archord.scene.scene import plain
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def Problem(
         mesh = {"file": str(mesh)} if isinstance(mesh, (str, Path)) else plain(mesh)
         scene_file.find_mesh(mesh, Path())
     else:
-        name = f"mesh {len(LIVE) + 1} given from Python"
+        name = f"mesh {len(LIVE) + 1}{GIVEN}"
         LIVE[name], mesh = mesh, {"file": name}
     parts = {"body": bodies, "interaction": interactions, "coupling": couplings, "support": supports, "load": loads}
     sections |= {"mesh": mesh, **{name: list(part) for name, part in parts.items()}}

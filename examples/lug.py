@@ -24,6 +24,6 @@ problem = archord.Problem(
     loads=[archord.Load(name="pull", on="flat", direction="x", displacement=0.3)],
     path={"steps": 15},
 )
-run = archord.solve(problem, "runs/lug", force=True)
+run = archord.solve(problem, "runs/lug_from_gmsh", force=True)
 print(run.history[["pull displacement", "pull force"]])
-archord.draw_run(run, run.folder / "picture.png")
+archord.draw_run(run, "runs/lug_from_gmsh/picture.png")

@@ -11,19 +11,21 @@ import numpy as np
 import archord
 
 run = archord.load(sys.argv[1] if len(sys.argv) > 1 else "runs/lug")
-lug, body = run.scene.mesh.shape, run.scene.body[-1]
-R, W, e, fy = lug.radius, lug.width, lug.edge_distance, body.yield_stress
-D = 2 * (R + lug.clearance)
+shape = getattr(getattr(run.scene, "mesh", None), "shape", None)
+if getattr(shape, "kind", "") != "lug" or run.scene.body[-1].yield_stress is None:
+    sys.exit(f"{run.folder} is no run of a [lug] that can yield, whose sections are known here")
+lug, fy, t = shape.arguments(), run.scene.body[-1].yield_stress, run.scene.thickness
+R, D = lug["radius"], 2 * (lug["radius"] + lug["clearance"])
 
 hand = {
-    "net section": fy * (W - D),
-    "bearing": 1.5 * fy * 2 * R,
-    "shear-out": 2 * (e - D / 2 * cos(radians(40))) * fy / sqrt(3),
+    "net section": fy * (lug["width"] - D) * t,
+    "bearing": 1.5 * fy * 2 * R * t,
+    "shear-out": 2 * (lug["edge_distance"] - D / 2 * cos(radians(40))) * t * fy / sqrt(3),
 }
 history = run.history
 P, peeq = history["pull force"], history["lug peeq_max"]
 found = {
-    "first yield": np.interp(1e-9, peeq, P),
+    "last step without yielding": P[peeq == 0].max(),
     "PEEQ of 1 % at the hole": np.interp(0.01, peeq, P),
     "at the largest displacement": P.iloc[-1],
 }

@@ -18,7 +18,7 @@ from archord.materials.material import Array
 from archord.presets.joint import core_density, joint_mesh
 from archord.scene import parts
 from archord.scene.errors import InputError
-from archord.scene.problem import LIVE, ProblemScene
+from archord.scene.problem import GIVEN, LIVE, ProblemScene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
 from archord.solver.system import System
 
@@ -53,6 +53,10 @@ def scene_mesh(scene: ProblemScene, comm: MPI.Comm) -> TaggedMesh:
     from archord.geometry.meshes.read import read_mesh, tagged  # with scipy, which solves of presets do without
 
     source = LIVE.get(mesh.file or "", mesh.file)
+    if source == mesh.file and mesh.file.endswith(GIVEN):
+        raise ValueError(
+            f"{mesh.file}: is gone with the process that gave it: write such a mesh to a file, and name that"
+        )
     circles = [Circle(circle.facets, (circle.centre[0], circle.centre[1]), circle.radius) for circle in mesh.circle]
     given = tagged(*source) if isinstance(source, tuple) else source
     return read_mesh(given, comm, circles=circles, scale=mesh.scale, order=mesh.order, refine=mesh.refine)

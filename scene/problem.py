@@ -17,6 +17,7 @@ from archord.scene.sections import ProblemAnalysis, ProblemOutput, Stepping, Uni
 FORMAT = 2
 # parts whose names must differ, as results, reactions and drives are found by them
 _APART = {"body": (), "interaction": ("body", "coupling"), "coupling": (), "support": ("coupling", "load"), "load": ()}
+GIVEN = " given from Python"
 LIVE: dict[str, Any] = {}  # meshes given from Python, by what stands in the place of their file
 
 

@@ -34,7 +34,7 @@ def save_figure(figure: Figure, target: Path) -> Path:
         raise InputError(str(error)) from None
 
 
-def draw_run(run: Run, target: Path) -> Path:
+def draw_run(run: Run, target: Path | str) -> Path:
     """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``; returns the file. Raises
     `InputError`."""
     run.number(None)
@@ -46,7 +46,7 @@ def draw_run(run: Run, target: Path) -> Path:
     figure = new_figure(5.0 * len(widths), 4.4)
     for axes, draw in zip(np.atleast_1d(figure.subplots(1, len(widths), width_ratios=widths)), draws, strict=True):
         draw(axes, run)
-    return save_figure(figure, target)
+    return save_figure(figure, Path(target))
 
 
 def draw_probe(probe: Probe, target: Path) -> Path:
