@@ -14,6 +14,7 @@ from dolfinx.mesh import CellType, to_type
 from archord.geometry.basis import TRIANGLE, Array, cell_kind, lagrange_element
 
 _FAR = 1e30  # coordinates beyond overflow
+_INCOMPLETE = 20  # gmsh's number of triangles of third order without a node inside
 _THICK = 1e-6  # difference of z over the mesh's size
 
 
@@ -162,7 +163,9 @@ def _groups(gmsh, dim: int) -> dict[str, tuple[int, np.ndarray]]:
     for _, tag in gmsh.model.getPhysicalGroups(dim):
         nodes = []
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
-            _, numbers, found = gmsh.model.mesh.getElements(dim, entity)
+            kinds, numbers, found = gmsh.model.mesh.getElements(dim, entity)
+            if _INCOMPLETE in kinds:
+                raise ValueError("triangles of 9 nodes are not read; those of third order have 10, one of them inside")
             nodes += [of_kind.reshape(len(number), -1) for number, of_kind in zip(numbers, found, strict=True)]
         if nodes:
             one_kind({part.shape[1] for part in nodes})

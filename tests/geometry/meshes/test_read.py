@@ -250,6 +250,10 @@ def test_cells_of_two_kinds_and_other_files_are_refused(module, tmp_path, comm):
         with pytest.raises(ValueError, match=said):
             read_mesh(path, comm)
     draw(1)
+    gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
+    gmsh.model.mesh.setOrder(3)
+    with pytest.raises(ValueError, match="triangles of 9 nodes are not read"):
+        read_mesh(gmsh, comm)
     gmsh.model.mesh.clear()
     gmsh.model.mesh.setRecombine(2, 1)
     gmsh.model.mesh.generate(2)
