@@ -81,9 +81,8 @@ def bulk_quadrature_degree(cell: basix.CellType, degree: int) -> int:
 
     Plastic flow in plane strain keeps the volume at every point, which must be fewer conditions than a mesh has dofs
     (Nagtegaal, Parks and Rice 1974). A quadrilateral of degree p adds ``2 p^2`` dofs; the divergence on a parallelogram
-    spans ``(p + 1)^2 - 1`` functions, just 8 for p = 2. At ``p^2`` points the strains of three deformations would
-    vanish. Distorted, second-order ones have 9 conditions and are somewhat stiff where they are large: 1300 dofs put
-    the collapse pressure of a thick cylinder 0.1 % too high, triangles 0.01 %; both converge.
+    spans ``(p + 1)^2 - 1`` functions. At ``p^2`` points the strains of three deformations would vanish. Distorted
+    second-order ones have 9 conditions: somewhat stiff where they are large, but convergent.
     """
     return 2 * degree - 2 if cell == TRIANGLE else 2 * degree
 

@@ -129,12 +129,8 @@ def parts(cells: np.ndarray) -> np.ndarray:
     return connected_components(at_sides @ at_sides.T, directed=False)[1]
 
 
-def _facets(mesh: PlaneMesh, name: str) -> np.ndarray:
-    return mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])]
-
-
 def _of_surface(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], name: str) -> Iterator[str]:
-    edges, (outer, _) = _facets(mesh, name), outer_sides(mesh.cells)
+    edges, (outer, _) = mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])], outer_sides(mesh.cells)
     owners = [body for body, cells in inside.items() if np.isin(edges, mesh.cells[cells]).any()]
     if len(owners) > 1:
         yield f"the facet set {name!r} is of the bodies {' and '.join(map(repr, owners))}; a surface is of one"
@@ -188,13 +184,13 @@ def _sagitta(mesh: PlaneMesh, *pair: str | float) -> Iterator[str]:
     sagitta h^2/(8 R) spoils the clearance."""
     radii, deepest, names = [], 0.0, [name for name in pair if isinstance(name, str)]
     for name in names:
-        edges = _facets(mesh, name)
+        edges = mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])]
         if (circle := circle_through(mesh.x[np.unique(edges[:, :2])])) is None:
             return
         radii.append(circle[1])
-        side = _polygons(mesh, edges)
-        sagitta = ((side[:, -1] - side[:, 0]) ** 2).sum(axis=1) / (8 * circle[1])
-        bulge = np.linalg.norm(side[:, _PIECES // 2] - (side[:, 0] + side[:, -1]) / 2, axis=1)
+        start, middle, end = np.swapaxes(_polygons(mesh, edges)[:, :: _PIECES // 2], 0, 1)
+        sagitta = ((end - start) ** 2).sum(axis=1) / (8 * circle[1])
+        bulge = np.linalg.norm(middle - (start + end) / 2, axis=1)
         deepest = max(deepest, sagitta[bulge < sagitta / 2].max(initial=0.0))
     first, second = [*radii, *(radius for radius in pair if not isinstance(radius, str))]
     if deepest > _COARSE * abs(first - second):

@@ -1,8 +1,8 @@
 """A straight lug: a plate with a hole near its end, a clamp at the other, and a pin that pulls at it in +x.
 
 The hole's centre is the origin. The pin's centre is (dR, 0), so pin and hole touch at (R + dR, 0); for an interference
-both are drawn into each other around the origin. The plate reaches
-from the clamp x = -length to the apex x = edge distance of its end, and from y = -width/2 to width/2.
+both are drawn into each other around the origin. The plate reaches from the clamp x = -length to the apex x = edge
+distance of its end, and from y = -width/2 to width/2.
 """
 
 from __future__ import annotations
