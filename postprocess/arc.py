@@ -12,10 +12,10 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.output.step_file import step_name
-from archord.postprocess.curve import RunCurve
 from archord.presets.arc import ArcProfile
 from archord.presets.edge import PER_STEP, SurfaceProfile
 from archord.scene.errors import InputError
+from archord.scene.scene import Scene
 
 
 @contextmanager
@@ -34,27 +34,19 @@ def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
         raise InputError(f"{path}: cannot be read as the {name} of a run at step {step}.") from None
 
 
-def read_arcs(run: RunCurve, step: int) -> dict[str, ArcProfile]:
-    """The sides of ``run``, of a joint, at ``step`` (from 1); a side whose arc was not integrated is absent.
-
-    Raises `InputError` as `opened`.
-    """
-    radius = {"pin": run.R, "hole": run.R + run.dR}
-    found = _read(run.folder or Path(run.name), step, ("s", "weight"), PER_STEP)
-    return {side: ArcProfile(**found[side], radius=radius[side]) for side in radius if side in found}
-
-
-def read_surfaces(folder: Path, step: int) -> dict[str, SurfaceProfile]:
-    """The integrated surfaces of a general run at ``step``, by name. Raises `InputError` as `opened`."""
-    found = _read(folder, step, ("s", "weight", "X"), (*PER_STEP, "slip"))
-    return {name: SurfaceProfile(**arrays) for name, arrays in found.items()}
-
-
-def _read(folder: Path, step: int, fixed: tuple[str, ...], per_step: tuple[str, ...]) -> dict[str, dict[str, Array]]:
+def read_contact(folder: str | Path, scene: Any, step: int) -> dict[str, Any]:
+    """The integrated surfaces of the run of ``scene`` at ``step`` (from 1): `SurfaceProfile` by name, of a joint
+    `ArcProfile` of "pin" and "hole". Raises `InputError` as `opened`."""
+    joint = isinstance(scene, Scene)
+    fixed, per_step = ("s", "weight", *(() if joint else ("X",))), (*PER_STEP, *(() if joint else ("slip",)))
     names = {name: name for name in fixed} | {name: f"{name}/{step_name(step)}" for name in per_step}
     with opened(folder, "contact", step) as file:
         groups = {key: group for key, group in file.items() if isinstance(group, h5py.Group)}
-        return {key: {name: group[at][()] for name, at in names.items()} for key, group in groups.items()}
+        found = {key: {name: group[at][()] for name, at in names.items()} for key, group in groups.items()}
+    if not joint:
+        return {name: SurfaceProfile(**arrays) for name, arrays in found.items()}
+    radius = {"pin": scene.joint.radius, "hole": scene.joint.radius + scene.joint.dR}
+    return {side: ArcProfile(**found[side], radius=radius[side]) for side in radius if side in found}
 
 
 def undeformed(profile: ArcProfile | SurfaceProfile, side: str, scene: Any) -> Array:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
 Curve = Sequence[float] | np.ndarray
-Real = TypeVar("Real", float, Array)
 
 _ASSUMED = 1.0  # P converges faster, but peak pressures and perfect plasticity do not for certain
 _LOWEST, _HIGHEST = 0.5, 2.0  # below, extrapolation multiplies noise; above, the error would be told too small
@@ -29,17 +28,14 @@ _SLOWEST = 1.5  # order that `mesh_error` takes at least
 _USUAL = 3.0  # order of P on meshes that are refined everywhere (docs/accuracy.md)
 
 
-def richardson(difference: Real, ratio: float, order: float) -> Real:
+def richardson(difference: Any, ratio: float, order: float) -> Any:
     """Error of the finer of two results that differ by ``difference``, the element size by the factor ``ratio``."""
     return difference / (ratio**order - 1)
 
 
 def observed_order(sizes: Sequence[float], finer: float, coarser: float) -> float:
-    """Order p of three results of the rising ``sizes`` h, the two ``finer`` and the two ``coarser`` so far apart.
-
-    p of ``(h3^p - h2^p)/(h2^p - h1^p) = coarser/finer`` (Roache 1998, section 5.10); -inf below 0.05 and inf above 12,
-    which three meshes cannot show.
-    """
+    """Order p of three results of the rising ``sizes`` h, the two ``finer`` and the two ``coarser`` so far apart:
+    ``(h3^p - h2^p)/(h2^p - h1^p) = coarser/finer`` (Roache 1998, section 5.10); -inf below 0.05 and inf above 12."""
     from scipy.optimize import brentq
 
     h2, h3 = sizes[1] / sizes[0], sizes[2] / sizes[0]
@@ -50,8 +46,7 @@ def observed_order(sizes: Sequence[float], finer: float, coarser: float) -> floa
     return float(brentq(lambda p: (h3**p - h2**p) / (h2**p - 1) / goal - 1, *_SHOWN))
 
 
-@dataclass(frozen=True)
-class Order:
+class Order(NamedTuple):
     """Order of convergence taken for a curve, and in ``words`` where it comes from."""
 
     value: float
@@ -117,10 +112,9 @@ def _without_mesh(scene: Scene) -> tuple:
     """Everything of a scene but its element size and its words."""
     g, analysis = scene.joint, scene.analysis
     sizes = (g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.targets[-1])
-    rounded = tuple(float(f"{size:.9g}") for size in sizes)
-    return (*rounded, tuple(scene.load.stage_steps), tuple(scene.load.stages),
-            scene.pin.model_dump_json(), scene.block.model_dump_json(),
-            analysis.plane, analysis.kinematics, analysis.integration)  # fmt: skip
+    bodies = scene.pin.model_dump_json(), scene.block.model_dump_json()
+    how = analysis.plane, analysis.kinematics, analysis.integration
+    return *(f"{size:.9g}" for size in sizes), *scene.load.stage_steps, "to", *scene.load.stages, *bodies, *how
 
 
 def difference(one: Curve, other: Curve, largest: float) -> float:
@@ -132,11 +126,10 @@ def difference(one: Curve, other: Curve, largest: float) -> float:
 def mesh_error(curves: Sequence[Curve], ratio: float, highest: float = _HIGHEST) -> float | None:
     """Relative error of the last of ``curves``, from coarse to fine, the element size falling by ``ratio`` each time.
 
-    A curve is one number for each output step: the forces on a pin that is displaced, its displacements under forces.
-    The order of joints is 3 in the mean, but differences scatter by a factor of two or three, as the contact ends
-    anywhere in an element. So `richardson` takes that of the last two differences within 1.5 and ``highest``, which it
-    is if there is one; and where the last difference is small by luck, the one before, at order 3, says what the error
-    is at least. None with one curve.
+    A curve is one number for each output step. The order of joints is 3 in the mean, but differences scatter by a
+    factor of two or three, as the contact ends anywhere in an element. So `richardson` takes the order of the last two
+    within 1.5 and ``highest``, which it is with one difference; and where the last one is small by luck, the one
+    before, at order 3, says what the error is at least. None with one curve.
     """
     if len(curves) < 2:
         return None
@@ -150,6 +143,6 @@ def mesh_error(curves: Sequence[Curve], ratio: float, highest: float = _HIGHEST)
 
 
 def step_error(coarse: Curve, fine: Curve) -> float:
-    """Relative error of ``fine``, whose steps are half as long as those of ``coarse``, by backward Euler, of first
-    order: their difference. That of ``coarse`` is twice as much."""
+    """Relative error of ``fine``, whose steps are half as long as those of ``coarse``: their difference, as backward
+    Euler is of first order."""
     return difference(coarse, fine, float(np.abs(fine).max()))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +27,7 @@ class RunCurve:
     peeq_max: Array
     folder: Path | None = None
 
-    @cached_property
+    @property
     def E_star(self) -> float:
         """Contact modulus."""
         return self.scene.E_star
@@ -60,14 +59,11 @@ class RunCurve:
         beyond: the first step that counts again is one whose P is larger than ever before, too.
         """
         deepest, largest = (np.maximum.accumulate([0.0, *values])[:-1] for values in (self.delta, self.P))
-        deeper, stronger = self.delta > deepest * (1 + 1e-9), largest * (1 + _SAME) < self.P
-        first, going_on = np.zeros(len(self.delta), dtype=bool), True
-        for i in range(len(first)):
-            first[i] = going_on = deeper[i] and (going_on or stronger[i])
-        return self._at(first)
-
-    def _at(self, steps: np.ndarray | slice) -> RunCurve:
-        return replace(self, **{name: getattr(self, name)[steps] for name in CURVES})
+        first, going_on = [], True
+        for deeper, stronger in zip(self.delta > deepest * (1 + 1e-9), largest * (1 + _SAME) < self.P, strict=True):
+            going_on = bool(deeper and (going_on or stronger))
+            first.append(going_on)
+        return replace(self, **{name: getattr(self, name)[first] for name in CURVES})
 
 
 def first_loading(load: Array) -> slice:

@@ -16,7 +16,7 @@ import numpy as np
 
 from archord.output.folder import is_sweep
 from archord.output.history import read_history
-from archord.postprocess.arc import read_arcs, read_surfaces
+from archord.postprocess.arc import read_contact
 from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
 from archord.postprocess.probe import Probe, probe
@@ -89,7 +89,7 @@ class Run:
         step = self.number(step)
         if not self.has_contact:
             raise InputError(f"{self.folder}: has no contact: its scene has no interaction.")
-        return read_arcs(self.curve, step) if self.is_joint else read_surfaces(self.folder, step)
+        return read_contact(self.folder, self.scene, step)
 
     def arc(self, step: int | None = None, side: str | None = None) -> Any:
         """One ``side`` of `contact` (the last one: the hole). Raises `InputError` without such a step or side."""

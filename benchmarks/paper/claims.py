@@ -15,7 +15,6 @@ import numpy as np
 from archord.benchmarks.paper.figures import Part, X, Y, columns, strength
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, PLANES, Runs
 from archord.materials.material import Plane
-from archord.postprocess.arc import read_arcs
 from archord.postprocess.convergence import group
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.fields import BODIES, read_fields
@@ -104,7 +103,7 @@ def elastic_force(runs: Runs, tables: Tables, plane: Plane) -> Found:
 def yield_plateau(runs: Runs, tables: Tables, plane: Plane) -> Found:
     """C4."""
     run = runs.curve(FULL_YIELD, plane)
-    angle, pressure = read_arcs(run, len(run.delta))["hole"].facet_means()
+    angle, pressure = runs.run(FULL_YIELD, plane).arc(side="hole").facet_means()
     middle = pressure[angle < 0.5 * run.eps[-1]] / strength(run)
     mean = columns(tables["fig5b"], plane=plane)["P/(A sigY)"][-1]
     return (

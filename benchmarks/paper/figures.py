@@ -15,7 +15,7 @@ import numpy as np
 from archord.benchmarks.paper.runs import FULL_YIELD, JOINTS, MILD_YIELD, PLANES, Runs
 from archord.geometry.basis import Array
 from archord.materials.material import Plane
-from archord.postprocess.arc import read_arcs
+from archord.postprocess.arc import read_contact
 from archord.postprocess.chord import arc_angle, read_chord_pressure
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.elastic_laws import hertz, persson_load, persson_pressure
@@ -100,7 +100,7 @@ def chord_profile(run: RunCurve, step: int) -> tuple[float, Array, Array]:
     scatters, without those beyond the edge."""
     assert run.folder is not None
     chord = read_chord_pressure(run.folder, step, "hole")
-    points = read_arcs(run, step)["hole"].angle.shape[1]
+    points = read_contact(run.folder, run.scene, step)["hole"].angle.shape[1]
     whole = len(chord.x) // points * points
     weight, x, py = (v[:whole].reshape(-1, points) for v in (chord.weight, chord.x_over_l, chord.py))
     return chord.eps, (weight * x).sum(1) / weight.sum(1), (weight * py).sum(1) / weight.sum(1)
@@ -142,7 +142,7 @@ def fig5(runs: Runs, plane: Plane) -> list[Part]:
     """Pressure over the yield stress along arc and chord at 2 dR."""
     run = runs.curve(FULL_YIELD, plane)
     eps, x, py = chord_profile(run, len(run.delta))
-    angle, pressure = (v[: len(x)] for v in read_arcs(run, len(run.delta))["hole"].facet_means())
+    angle, pressure = (v[: len(x)] for v in runs.run(FULL_YIELD, plane).arc(side="hole").facet_means())
     sides = ("arc", angle / eps, pressure), ("chord", x, py)
     return [{"plane": plane, "on": side, "phi/eps or x/l": at, "p/sigY": p / strength(run)} for side, at, p in sides]
 

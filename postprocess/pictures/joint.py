@@ -8,7 +8,7 @@ import numpy as np
 
 from archord.postprocess.curve import gap_name
 from archord.postprocess.fields import magnification, magnified
-from archord.postprocess.pictures.problems import draw_cells, draw_lines, outline
+from archord.postprocess.pictures.problems import draw_cells, draw_outline
 from archord.postprocess.run import Run
 from archord.scene.scene import Scene
 
@@ -74,8 +74,8 @@ def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
     # in a ring the core on which the load acts does not count for the range of colours
     away = np.hypot(*fields.coordinates[fields.cells[:, :3]].mean(axis=1).T) > (R / 2 if ring else 0)
     draw_cells(axes, run, fields, x, near, away)
-    draw_lines(axes, outline(fields, magnified(scene, fields, factor, displaced=False)), **_BEFORE)
-    draw_lines(axes, outline(fields, x), color="black", lw=1.1)
+    draw_outline(axes, fields, magnified(scene, fields, factor, displaced=False), **_BEFORE)
+    draw_outline(axes, fields, x, color="black", lw=1.1)
     if scene.pin.rigid:
         angle, centre = np.linspace(0, np.pi / 2), -factor * (fields.delta + scene.joint.pin_depth)
         axes.fill([0, *R * np.sin(angle)], [centre, *centre - R * np.cos(angle)], fc="0.85", ec="black", zorder=0)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from archord.geometry.basis import Array, cell_kind
+from archord.geometry.basis import cell_kind
 from archord.geometry.curve import Curve, circle_through
 from archord.geometry.meshes.check import areas, cracks, parts
 from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_of
@@ -39,7 +39,8 @@ def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarra
     nodes, count = np.unique(edges[:, :2], return_counts=True)
     behind = sides_between(mesh.cells, edges[:, :2]) * len(mesh.cells) // len(sides_of(mesh.cells))
     owners = ", ".join(name for name, inside in cells.items() if inside[behind].any())
-    length, circle = _lengths(mesh, edges), circle_through(mesh.x[nodes]) if len(nodes) else None
+    ends = Curve(mesh.x, edges.shape[1] - 1, _along(edges)).arc_length(np.array([0.0, 1.0]))
+    length, circle = np.diff(ends)[:, 0], circle_through(mesh.x[nodes]) if len(nodes) else None
     said = ["closed"] if len(nodes) and (count == 2).all() else []
     if circle:
         (x, y), radius = circle[0].round(9) + 0.0, circle[1]
@@ -51,12 +52,6 @@ def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarra
 
 def _along(edges: np.ndarray) -> np.ndarray:
     return edges[:, [0, *range(2, edges.shape[1]), 1]]
-
-
-def _lengths(mesh: PlaneMesh, edges: np.ndarray) -> Array:
-    q, w = np.polynomial.legendre.leggauss(8)
-    _, slope = Curve(np.zeros((edges.shape[1], 2)), edges.shape[1] - 1).shapes((q + 1) / 2)
-    return np.linalg.norm(np.einsum("qa,kai->kqi", slope, mesh.x[_along(edges)]), axis=2) @ w / 2
 
 
 def draw_mesh(mesh: PlaneMesh, target: Path) -> Path:

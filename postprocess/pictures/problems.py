@@ -24,7 +24,7 @@ def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
     factor = max(float(f"{_MAGNIFIED * size / farthest:.0e}"), 1.0) if free else 1.0
     x, everywhere = fields.coordinates + factor * fields.displacement, np.ones(len(fields.cells), dtype=bool)
     draw_cells(axes, run, fields, x, everywhere, everywhere)
-    draw_lines(axes, outline(fields, x), color="black", lw=0.8)
+    draw_outline(axes, fields, x, color="black", lw=0.8)
     axes.set(aspect="equal", xlabel=f"x [{length}]", ylabel=f"y [{length}]")
     what = "not magnified" if factor == 1 else f"displacement × {factor:g}"
     axes.set_title(f"step {fields.step}, load factor {fields.delta:.4g}\n{what}", fontsize="medium")
@@ -43,16 +43,11 @@ def draw_cells(axes: Any, run: Run, fields: Fields, x: Array, shown: np.ndarray,
     axes.figure.colorbar(drawn, ax=axes, label=label, shrink=0.85, extend=cut)
 
 
-def outline(fields: Fields, x: Array) -> list[Array]:
-    """The boundary of the bodies with the nodes at ``x``: points ``(5, 2)`` along every edge, which is a parabola."""
-    return list(_EDGE @ x[fields.outline()])
-
-
-def draw_lines(axes: Any, lines: list[Array], **style: Any) -> None:
-    """Draw ``lines`` that leave the limits of the axes as they are."""
+def draw_outline(axes: Any, fields: Fields, x: Array, **style: Any) -> None:
+    """The boundary of the bodies with the nodes at ``x``, every edge a parabola; it leaves the limits as they are."""
     from matplotlib.collections import LineCollection
 
-    axes.add_collection(LineCollection(lines, **style), autolim=False)
+    axes.add_collection(LineCollection(list(_EDGE @ x[fields.outline()]), **style), autolim=False)
 
 
 def contact_panel(axes: Any, run: Run) -> None:
