@@ -77,13 +77,23 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, st
     Of joints P, p0 and eps, as they are where the units, R, dR and E* of all are the same, else over powers of E*, R
     and the clearance. Raises `InputError` for general runs without a common quantity or unit.
     """
+    units = [run.scene.units for run in runs]
     if not any(run.is_joint for run in runs):
-        return _of_problems(runs)
-    curves, units = [run.curve for run in runs], [run.scene.units for run in runs]
+        first, columns = runs[0], [set(run.columns) for run in runs]
+        names = [name for name in first.columns if name.endswith(COMMON) and name in set.intersection(*columns)]
+        for run in runs:
+            run.number(None)
+            if any(run.units.get(name) != first.units.get(name) for name in names):
+                raise InputError(f"{run.folder}: has other units than {first.folder}.")
+        if not names:
+            raise InputError(f"{first.folder}: shares no load with the others.")
+        tables = [{"load": np.array(run.path)} | {name: np.array(run.columns[name]) for name in names} for run in runs]
+        return tables, {"load": "load factor"} | {name: first.heading(name) for name in names}, np.ones(len(runs))
+    curves = [run.curve for run in runs]
     sizes = np.array([[curve.R, curve.dR, curve.E_star] for curve in curves])
     if all(unit == units[0] for unit in units) and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0):
         one, per = units[0], np.ones((len(runs), 3))
-        labels = {"load": f"delta [{one.length}]", "P": f"P [{one.force}]", "p0": f"p0 [{one.stress}]"}
+        labels = {"load": f"delta [{one.length}]", "P": f"P [{one.force_of(None)}]", "p0": f"p0 [{one.stress}]"}
     else:
         gap = gap_name(min(curve.dR for curve in curves))
         labels = {"load": f"delta/{gap}", "P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})"}
@@ -94,19 +104,6 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, st
         for c, (load, force, pressure) in zip(curves, per, strict=True)
     ]
     return tables, labels | {"eps": "eps [rad]"}, per[:, 2]
-
-
-def _of_problems(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, str], Array]:
-    units = runs[0].units
-    names = [name for name in runs[0].columns if name.endswith(COMMON) and all(name in run.columns for run in runs)]
-    for run in runs:
-        run.number(None)
-        if any(run.units.get(name) != units.get(name) for name in names):
-            raise InputError(f"{run.folder}: has other units than {runs[0].folder}.")
-    if not names:
-        raise InputError(f"{runs[0].folder}: shares no load with the others.")
-    tables = [{"load": np.array(run.path)} | {name: np.array(run.columns[name]) for name in names} for run in runs]
-    return tables, {"load": "load factor"} | {name: runs[0].heading(name) for name in names}, np.ones(len(runs))
 
 
 def _at(load: Array, own: Array, values: Array, between: np.ndarray) -> Array:
