@@ -66,11 +66,9 @@ class Refined:
         return (self.run, *self.coarser)
 
     def order(self, curves: Sequence[Array]) -> Order:
-        """Order of convergence of a curve, given on all meshes, finest first, each ``(n,)``.
-
-        `observed_order` of the three finest, from norms over the steps they have in common, bounded to 0.5 .. 2. The
-        first order is assumed with two meshes, and where the differences have no common sign or do not shrink.
-        """
+        """Order of convergence of a curve, given on all meshes, finest first, each ``(n,)``: `observed_order` of the
+        three finest, from norms over their common steps, bounded to 0.5 .. 2. The first order is assumed with two
+        meshes, and where the differences have no common sign or do not shrink."""
         found = math.inf
         if len(curves) > 2:
             n = min(map(len, curves[:3]))

@@ -1,8 +1,7 @@
 """A run as files for other programs: CSV tables for anything, and .vtu files for VTK's readers (ParaView, pyvista).
 
-In VTK the bodies keep their curved second-order cells (VTK_QUADRATIC_TRIANGLE, VTK_BIQUADRATIC_QUAD) with the nodal
-displacement and the means of the cells. The contact is a line through the integration points of each facet, undeformed
-like the mesh, with the pressure, the gap and the displacement of the points, so that the same filters deform both.
+In VTK the bodies keep their curved second-order cells. The contact is a line through the integration points of each
+facet, undeformed like the mesh, with the displacement of the points, so that the same filters deform both.
 """
 
 from __future__ import annotations
@@ -23,11 +22,9 @@ _DATA_OF_ARC = ("pressure", "raw_pressure", "gap", "angle", "s")
 
 
 def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
-    """Write history.csv and contact.csv (`Run.pressure` of all steps) into ``folder``; returns the files.
-
-    Columns are headed ``name [unit]``. Raises `InputError` if the run has no accepted step, a file of it is damaged, or
-    one that would be written is there already and ``force`` is not given.
-    """
+    """Write history.csv and contact.csv (`Run.pressure` of all steps), headed ``name [unit]``, into ``folder``; returns
+    the files. Raises `InputError` if the run has no accepted step, a file of it is damaged, or one that would be
+    written is there already and ``force`` is not given."""
     import pandas as pd
 
     from archord.postprocess.frames import with_headings
@@ -48,11 +45,9 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
 
 
 def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> list[Path]:
-    """Write all steps of ``run``, or one ``step`` alone, into ``folder``; returns the files, the .pvd first.
-
-    Time is delta, or the load factor; the number of the step, where that does not only grow. Raises `InputError` as
-    `export_csv`, and if the run wrote no fields.
-    """
+    """Write all steps of ``run``, or one ``step`` alone, into ``folder``; returns the files, the .pvd first. Time is
+    delta, or the load factor; the number of the step, where that does not only grow. Raises `InputError` as
+    `export_csv`, and if the run wrote no fields."""
     import meshio
 
     steps = [run.number(step)] if step is not None else range(1, run.number(None) + 1)

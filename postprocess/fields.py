@@ -123,17 +123,10 @@ def read_fields(folder: str | Path, scene: Scene, step: int, bodies: Mapping[str
                 found[name] = np.stack([file[f"{name}_{c}/{at}"][()] for c in COMPONENTS], axis=1)
         if f"peeq_nodal/{at}" in file:
             found["peeq_nodal"] = file[f"peeq_nodal/{at}"][()]
-        return Fields(
-            step,
-            float(file["load"][step - 1]),
-            mesh["coordinates"][:, :2],
-            mesh["cells"][()],
-            mesh["body"][()],
-            file[f"displacement/{at}"][:, :2],
-            **found,
-            bodies=bodies,
-            edges=dict(all_arrays(file["edges"])) if "edges" in file else {},
-        )
+        x, u, cells, body = mesh["coordinates"], file[f"displacement/{at}"], mesh["cells"][()], mesh["body"][()]
+        edges = dict(all_arrays(file["edges"])) if "edges" in file else {}
+        load = float(file["load"][step - 1])
+        return Fields(step, load, x[:, :2], cells, body, u[:, :2], **found, bodies=bodies, edges=edges)
 
 
 def read_points(folder: str | Path, scene: Scene, step: int) -> dict[str, Array]:

@@ -29,10 +29,8 @@ _SAMPLES = 201  # on a line
 
 @dataclass(frozen=True)
 class Probe:
-    """A ``quantity`` at ``n`` points of the edge or line ``place`` at a ``step``, in the scene's units.
-
-    ``force`` is the largest of those that drive the run then, per unit thickness, that of the load ``by``.
-    """
+    """A ``quantity`` at ``n`` points of the edge or line ``place`` at a ``step``, in the scene's units; ``force`` is
+    the largest of those that drive the run then, per unit thickness, that of the load ``by``."""
 
     place: str
     quantity: str

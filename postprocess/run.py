@@ -59,12 +59,6 @@ class Run:
         self.status, self.message, self.warnings = (self.summary[key] for key in ("status", "message", "warnings"))
         self.steps = len(self.columns["step"])
 
-    def __repr__(self) -> str:
-        """Folder, status and how far it came."""
-        name = "delta/dR" if self.is_joint else "load_factor"
-        end = f", {name} = {self.columns[name][-1]:g}" if self.steps else ""
-        return f"<Run {self.folder}: {self.status}, {self.steps} step{'s' if self.steps != 1 else ''}{end}>"
-
     @cached_property
     def history(self) -> pd.DataFrame:
         """history.csv: a row for each accepted step; ``history.attrs["units"]`` names the unit of every column."""

@@ -39,10 +39,6 @@ class Sweep:
         """Number of cases."""
         return len(self.cases)
 
-    def __repr__(self) -> str:
-        """Folder, keys and number of cases by status."""
-        return f"<Sweep {self.folder}: {len(self)} cases over {', '.join(self.keys)}; {self.states}>"
-
     @property
     def states(self) -> str:
         """Number of cases by status, in words."""

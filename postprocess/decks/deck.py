@@ -36,11 +36,8 @@ def system_of(scene: AnyScene) -> System:
 
 
 def contact_stiffness(problem: Problem, mesh: DeckMesh, interaction: Interaction) -> float:
-    """Slope of pressure over penetration, in stress per length.
-
-    The pressure of a conformal joint is about ``E* dR/R``; the slope lets it go 4e-4 dR deep: P is too small by 3e-4.
-    With stiffer contact CalculiX ends steps before what is in contact stands still, and P scatters by half a percent.
-    """
+    """Slope of pressure over penetration, in stress per length: the pressure of a conformal joint, about ``E* dR/R``,
+    goes 4e-4 dR deep. With stiffer contact CalculiX ends steps before the contact stands still, and P scatters."""
     names = [name for name in interaction.surfaces if not isinstance(name, Rigid)]
     size = min(np.ptp(mesh.x[mesh.surfaces[name].nodes.ravel()], axis=0).max() for name in names)
     materials = [problem.body_of(name).material for name in names]
@@ -48,10 +45,10 @@ def contact_stiffness(problem: Problem, mesh: DeckMesh, interaction: Interaction
 
 
 def thickness(problem: Problem, mesh: DeckMesh) -> float:
-    """Thickness of the deck's model, by which its forces are to be divided.
+    """Thickness of the deck's model, by which its forces are to be divided: one in plane strain.
 
-    One in plane strain. CalculiX makes bricks of plane elements, with faces free to move in plane stress; a thick one
-    resists, by shear, a thickness strain that varies in the plane. Only thin against the elements it is plane stress.
+    In plane stress CalculiX's bricks must be thin against the elements: thick ones resist, by shear, a thickness strain
+    that varies in the plane.
     """
     if problem.bodies[0].material.plane == "strain":
         return 1.0
@@ -101,9 +98,7 @@ def moved_sets(system: System, mesh: DeckMesh) -> list[Moved]:
 
 def deck(system: System, mesh: DeckMesh, targets: Sequence[float], heading: str = "") -> str:
     """The input deck of the problem of ``system`` on ``mesh`` with a step to each of the ``targets`` on the path.
-
-    Raises ValueError for what a deck cannot say.
-    """
+    Raises ValueError for what a deck cannot say."""
     names = {*mesh.elements, *mesh.node_sets, *mesh.surfaces}
     if len({label(name) for name in names}) < len(names):
         raise ValueError(f"names must differ in more than case and signs for a deck: {', '.join(sorted(names))}")
@@ -193,7 +188,9 @@ class _Writer:
         for m in self.hung:
             for k, node in enumerate(m.nodes):
                 terms = [(self.own[drive], 1, -rate[k]) for drive, rate in m.rates.items() if rate[k]]
-                yield from _equation([(node + 1, m.axis + 1, 1.0), *terms])
+                words = [f"{n}, {axis}, {number(factor)}" for n, axis, factor in [(node + 1, m.axis + 1, 1), *terms]]
+                yield from ("*EQUATION", str(len(words)))
+                yield from (", ".join(words[i : i + 4]) for i in range(0, len(words), 4))
         held = [row for m in self.held if not m.rates for row in m.boundary({})]
         yield from ["*BOUNDARY", *held] if held else []
 
@@ -253,13 +250,6 @@ def _material(name: str, material: Any) -> Iterator[str]:
         peeq = material.hardening.knots()
         for stress, at in zip(material.hardening.stress(peeq), peeq, strict=True):
             yield f"{number(stress)}, {number(at)}"
-
-
-def _equation(terms: Sequence[tuple[int, int, float]]) -> Iterator[str]:
-    """Terms whose sum is zero, four a line: node, component, factor."""
-    words = [word for node, axis, factor in terms for word in (str(node), str(axis), number(factor))]
-    yield from ("*EQUATION", str(len(terms)))
-    yield from (", ".join(words[i : i + 12]) for i in range(0, len(words), 12))
 
 
 def number(value: Any) -> str:

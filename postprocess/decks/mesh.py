@@ -109,14 +109,11 @@ def deck_mesh(system: System) -> DeckMesh:
     used = np.unique(np.concatenate([own.ravel() for own in bodies.values()]))
     place = np.full(len(x), -1)
     place[used] = np.arange(len(used))
-    return DeckMesh(
-        x[used],
-        used,
-        nodes[numbered] if corners == 4 else np.zeros((0, 9), int),
-        {name: place[own] for name, own in bodies.items()},
-        {name: place[own][place[own] >= 0] for name, own in node_sets.items()},
-        {name: Surface(s.elements, s.edges, place[s.nodes]) for name, s in surfaces.items()},
-    )
+    middles = nodes[numbered] if corners == 4 else np.zeros((0, 9), int)
+    elements = {name: place[own] for name, own in bodies.items()}
+    node_sets = {name: place[own][place[own] >= 0] for name, own in node_sets.items()}
+    surfaces = {name: Surface(s.elements, s.edges, place[s.nodes]) for name, s in surfaces.items()}
+    return DeckMesh(x[used], used, middles, elements, node_sets, surfaces)
 
 
 def _ring(circle: RigidCircle, n: int) -> tuple[Array, Ints]:

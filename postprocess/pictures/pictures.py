@@ -42,9 +42,8 @@ def draw_run(run: Run, target: Path | str) -> Path:
     if run.is_joint:
         draws = [joint.field_panel, joint.arc_panel, joint.force_panel]
     draws = list(compress(draws, (run.scene.output.fields, run.has_contact, True)))
-    widths = [1.0, 1.2, 1.1] if len(draws) == 3 else [1.2, 1.1][-len(draws) :]
-    figure = new_figure(5.0 * len(widths), 4.4)
-    for axes, draw in zip(np.atleast_1d(figure.subplots(1, len(widths), width_ratios=widths)), draws, strict=True):
+    figure = new_figure(5.0 * len(draws), 4.4)
+    for axes, draw in zip(np.atleast_1d(figure.subplots(1, len(draws))), draws, strict=True):
         draw(axes, run)
     return save_figure(figure, Path(target))
 
