@@ -22,7 +22,7 @@ from archord.scene.errors import InputError
 from archord.scene.file import scene_keys
 
 COMPARED = ("P", "p0", "eps")
-COMMON = (" force", " largest pressure", " peeq_max")  # ends of what general runs are compared by
+COMMON = (" force", " displacement", " largest pressure", " peeq_max")  # ends of what general runs are compared by
 _SAME = 1e-9  # relative difference up to which loads, or sizes of the joint, are the same
 _NOTHING = 1e-9  # part of the largest value below which a relative difference says nothing
 
@@ -80,7 +80,8 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, st
     units = [run.scene.units for run in runs]
     if not any(run.is_joint for run in runs):
         first, columns = runs[0], [set(run.columns) for run in runs]
-        names = [name for name in first.columns if name.endswith(COMMON) and name in set.intersection(*columns)]
+        shared = set.intersection(*columns) - {f"{load.name} {load.kind}" for load in first.scene.load}
+        names = [name for name in first.columns if name.endswith(COMMON) and name in shared]
         for run in runs:
             run.number(None)
             if any(run.units.get(name) != first.units.get(name) for name in names):

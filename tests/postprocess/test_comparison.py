@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import archord
 from archord.benchmarks.case import E, paper_joint
 from archord.cli import run as command
 from archord.postprocess.comparison import compare_runs, differing_keys
 from archord.postprocess.curve import RunCurve, first_loading
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
+from archord.scene.file import parse_any
 from tests.output.run_files import solved
 
 
@@ -93,3 +95,17 @@ def test_nothing_has_no_relative_difference(runs):
     values = np.array([[1e-14, 0.0, 1.0, 2.0], [-1e-14, 0.5, 1.1, 2.0]])
     changed = replace(compare_runs([Run(runs["coarse"])] * 2), values={"P": values})
     np.testing.assert_allclose(changed.relative("P")[1], [0, np.nan, 0.1, 0], atol=1e-12)
+
+
+def test_runs_under_a_force_are_compared_by_the_displacement(tmp_path):
+    """Not by the force, which the load prescribes: three times the force moves a body three times as stiff as far."""
+    runs = []
+    for name, modulus in (("soft", 70000.0), ("stiff", 210000.0)):
+        lug, steel = {"radius": 10.0, "clearance": 0.1, "width": 40.0, "element_size": 3.0}, {"E": modulus, "nu": 0.3}
+        load = {"force": modulus / 140, "steps": 2}
+        scene = parse_any({"lug": lug, "pin": steel, "plate": steel, "load": load})
+        runs.append(archord.solve(scene, tmp_path / name))
+    found = compare_runs(runs)
+    assert "pull force" not in found.values
+    np.testing.assert_allclose(found.relative("pull displacement")[1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(found.relative("pin in lug largest pressure")[1], 2.0, rtol=1e-6)
