@@ -1,12 +1,8 @@
 """Elastic theories of pin and hole: Hertz's contacts, half-spaces with a logarithm, and Persson's conformal contact.
 
 Johnson, Radzimovsky, ESDU 78035 and Dubowsky and Freudenstein are half-spaces under Hertz's pressure, ``delta = P/(pi
-E*) [ ln(A/P) + q ]``, and differ only in the load ``A`` and the number ``q``. Each ``P(delta)`` rises until
-``dP/d(delta)`` is infinite at
-
-    P = A e^(q - 1),   delta = P/(pi E*),
-
-and turns back there: the load limit. On the rising branch Lambert's function W_-1 inverts the law in closed form.
+E*) [ ln(A E* dR/P) + q ]``, and differ only in the numbers ``A`` and ``q``. Each ``P(delta)`` rises until
+``dP/d(delta)`` is infinite at ``P = A e^(q - 1) E* dR``, ``delta = P/(pi E*)``, and turns back there: the load limit.
 
 Persson's is the conformal contact of two elastic circles of nearly the same radius without friction, solved exactly for
 Dundurs' beta = 0. The angles: ``b = tan(eps/2)``, ``y = tan(phi/2)``, phi from the contact axis, eps the contact
@@ -18,17 +14,12 @@ P/R is the same for every alpha, and alpha moves only the load at which an angle
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import lambertw
 
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.postprocess.laws.law import NOTHING, ROUND_OFF, LawState, rising_root
-
-PRINTED_WIDTH = 1.6  # Radzimovsky's d over (R* P/E*)^(1/2): Hu et al., eq. 18
-ROARK_WIDTH = 1.6 * math.sqrt(2)  # Roark's 1.60 goes with K_D = D1 D2/(D1 - D2) = 2 R*
-IMPLIED_WIDTH = 4 * math.exp(-1 / 6) / math.sqrt(2.41)  # by the limit of 2.41 E* dR (Hu et al., below eq. 9)
 
 
 def hertz(joint: LawJoint, P: Array) -> LawState:
@@ -52,65 +43,37 @@ def lankarani_nikravesh(joint: LawJoint, delta: Array) -> LawState:
     return LawState(delta, spring * delta * root, 1.5 * spring * root, 2 / math.pi * joint.E_star * root / size)
 
 
-def lankarani_nikravesh_limit(joint: LawJoint) -> float:
-    """Displacement at which the radius of Hertz's contact circle, ``sqrt(R* delta)``, is R1/2."""
-    return (joint.radius / 2) ** 2 / joint.relative_radius
+def logarithm(joint: LawJoint, delta: Array, A: float, q: float) -> LawState:
+    """The rising branch: ``P = pi E* delta / y``, ``dP/d(delta) = pi E* / (y - 1)``, where the bracket in
+    the law, ``y = -W_-1(-delta/(e delta_limit))`` with Lambert's function, is 1 at the limit and infinite for no
+    displacement; nan beyond."""
+    spring, limit = math.pi * joint.E_star, turning_point(joint, A, q)
+    argument = -delta / (math.e * limit)
+    turning = argument <= -(1 - 1e-15) / math.e  # where round-off would give a complex W, or none
+    y = np.maximum(-lambertw(np.where(turning, -0.1, argument), -1).real, 1.0)
+    y = np.where(turning, 1.0, np.where(delta > 0, y, np.inf))
+    y = np.where(delta > limit * (1 + ROUND_OFF), np.nan, y)
+    with np.errstate(divide="ignore"):
+        return LawState(delta, spring * delta / y, spring / (y - 1))
 
 
-class Logarithm(NamedTuple):
-    """The law ``delta = P/(pi E*) [ ln(A/P) + q ]`` of one joint; P per unit length."""
-
-    E_star: float
-    A: float
-    q: float
-
-    @property
-    def delta_limit(self) -> float:
-        """Displacement at the load limit."""
-        return self.A * math.exp(self.q - 1) / (math.pi * self.E_star)
-
-    def displacement(self, P: float) -> float:
-        """``delta(P)`` of a positive load."""
-        return P / (math.pi * self.E_star) * (math.log(self.A / P) + self.q)
-
-    def state(self, delta: Array) -> LawState:
-        """The rising branch: ``P = pi E* delta / y``, ``dP/d(delta) = pi E* / (y - 1)``, where the bracket in the law,
-        ``y = -W_-1(-delta/(e delta_limit))``, is 1 at the limit and infinite for no displacement; nan beyond."""
-        spring, argument = math.pi * self.E_star, -delta / (math.e * self.delta_limit)
-        turning = argument <= -(1 - 1e-15) / math.e  # where round-off would give a complex W, or none
-        y = np.maximum(-lambertw(np.where(turning, -0.1, argument), -1).real, 1.0)
-        y = np.where(turning, 1.0, np.where(delta > 0, y, np.inf))
-        y = np.where(delta > self.delta_limit * (1 + ROUND_OFF), np.nan, y)
-        with np.errstate(divide="ignore"):
-            return LawState(delta, spring * delta / y, spring / (y - 1))
+def turning_point(joint: LawJoint, A: float, q: float) -> float:
+    """Displacement at the load limit of `logarithm`."""
+    return A * math.exp(q - 1) / math.pi * joint.clearance
 
 
-def johnson(joint: LawJoint) -> Logarithm:
-    """``delta = P/(pi E*) [ ln(4 pi E* dR/P) - 1 ]``: ``[ ln(4 R1/a) + ln(4 R2/a) - 1 ]`` with Hertz's half-width a."""
-    return Logarithm(joint.E_star, 4 * math.pi * joint.unit, -1.0)
-
-
-def radzimovsky(joint: LawJoint, width: float = PRINTED_WIDTH) -> Logarithm:
-    """``delta = P/(pi E*) [ 2/3 + ln(4 R1/d) + ln(4 R2/d) ]``, ``d = width (R* P/E*)^(1/2)``; R1 and R2 cancel."""
-    return Logarithm(joint.E_star, 16 * joint.unit / width**2, 2 / 3)
-
-
-def esdu(joint: LawJoint) -> Logarithm:
-    """``delta = F (s1 + s2)/L [ ln(4 L dR/(F (s1 + s2))) + 1 ]``, where ``s1 + s2 = 1/(pi E*)`` and F = P L."""
-    return Logarithm(joint.E_star, 4 * math.pi * joint.unit, 1.0)
-
-
-def dubowsky_freudenstein(joint: LawJoint) -> Logarithm:
-    """``delta = F (s1 + s2)/L [ ln(L^3 dR/(F R1 R2 (s1 + s2))) + 1 ]`` of a joint of length L: Lundberg's compression
-    of two half-spaces that touch along a strip of length L and Hertz's pressure across it."""
+def dubowsky_freudenstein(joint: LawJoint, delta: Array) -> LawState:
+    """``delta = F (s1 + s2)/L [ ln(L^3 dR/(F R1 R2 (s1 + s2))) + 1 ]``, ``s1 + s2 = 1/(pi E*)``, F = P L: Lundberg's
+    compression of two half-spaces that touch along a strip of length L and Hertz's pressure across it."""
     assert joint.length is not None
-    return Logarithm(joint.E_star, math.pi * joint.E_star * joint.length**2 / joint.relative_radius, 1.0)
+    return logarithm(joint, delta, math.pi * joint.length**2 / (joint.relative_radius * joint.clearance), 1.0)
 
 
 def dubowsky_freudenstein_limit(joint: LawJoint) -> float:
-    """Displacement at which Hertz's contact is as wide as the joint is long, ``P = A/16``: beyond, it is no strip."""
-    law = dubowsky_freudenstein(joint)
-    return law.displacement(law.A / 16)
+    """Displacement at which Hertz's contact is as wide as the joint is long, ``P = (pi/16) E* L^2/R*``: beyond, it is
+    no strip."""
+    assert joint.length is not None
+    return (1 + math.log(16)) * joint.length**2 / (16 * joint.relative_radius)
 
 
 def persson_pressure(joint: LawJoint, P: Array, eps: Array, phi: Array) -> Array:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -38,19 +37,18 @@ def _unlike(joint: LawJoint) -> str:
     return _thick(joint)
 
 
-def _logarithmic(make: Callable[..., elastic.Logarithm], *width: float, hertz: bool = True) -> dict[str, Any]:
-    """Half-spaces up to the law's load limit, with the pressure and contact angle of ``hertz`` in his range."""
+def _half_spaces(A: float, q: float, hertz: bool = True) -> dict[str, Any]:
+    """`elastic.logarithm` up to its load limit, with the pressure and contact angle of ``hertz`` in his range."""
 
     def state(joint: LawJoint, delta: Array) -> LawState:
-        found = make(joint, *width).state(delta)
+        found = elastic.logarithm(joint, delta, A, q)
         if not hertz:
             return found
         small = np.where(elastic.hertz_load_limit(joint) >= found.load, found.load, np.nan)
-        pressed = elastic.hertz(joint, small)
-        return found._replace(peak_pressure=pressed.peak_pressure, angle=pressed.angle)
+        return LawState(*found[:3], *elastic.hertz(joint, small)[3:])
 
     gives = {} if hertz else {"gives": ("displacement",)}
-    return {"state": state, "limit": lambda joint: make(joint, *width).delta_limit, **gives}
+    return {"state": state, "limit": lambda joint: elastic.turning_point(joint, A, q), **gives}
 
 
 _CHORD: dict[str, Any] = {"limit": _deepest, "unfit": _thick}
@@ -67,19 +65,22 @@ _FUNCTIONS: dict[str, dict[str, Any]] = {
     "paper-plastic": {"state": chord.plastic_winkler, "needs": ("yield_stress",), "plastic": True, **_CHORD},
     "winkler": {"state": chord.winkler, **_CHORD},
     "liu": {"state": chord.liu, **_CHORD},
-    "johnson": _logarithmic(elastic.johnson),
-    "radzimovsky": _logarithmic(elastic.radzimovsky),
-    "radzimovsky-width": _logarithmic(elastic.radzimovsky, elastic.ROARK_WIDTH),
-    "radzimovsky-2.41": _logarithmic(elastic.radzimovsky, elastic.IMPLIED_WIDTH),
-    "esdu-78035": _logarithmic(elastic.esdu, hertz=False),
+    "johnson": _half_spaces(4 * math.pi, -1.0),  # the bracket is ln(4 R1/a) + ln(4 R2/a) - 1 with Hertz's half-width a
+    # 2/3 + ln(4 R1/d) + ln(4 R2/d) with d = width (R* P/E*)^(1/2), so A = 16/width^2: R1 and R2 cancel
+    "radzimovsky": _half_spaces(16 / 1.6**2, 2 / 3),
+    "radzimovsky-width": _half_spaces(16 / (2 * 1.6**2), 2 / 3),  # Roark's K_D = D1 D2/(D1 - D2) is 2 R*
+    "radzimovsky-2.41": _half_spaces(2.41 * math.exp(1 / 3), 2 / 3),  # by the limit of 2.41 E* dR (below eq. 9)
+    "esdu-78035": _half_spaces(4 * math.pi, 1.0, hertz=False),
     "dubowsky-freudenstein": {
-        **_logarithmic(elastic.dubowsky_freudenstein, hertz=False),
+        "state": elastic.dubowsky_freudenstein,
         "limit": elastic.dubowsky_freudenstein_limit,
         "needs": ("length",),
+        "gives": ("displacement",),
     },
     "lankarani-nikravesh": {
         "state": elastic.lankarani_nikravesh,
-        "limit": elastic.lankarani_nikravesh_limit,
+        # where the radius of Hertz's contact circle, sqrt(R* delta), is R1/2
+        "limit": lambda joint: (joint.radius / 2) ** 2 / joint.relative_radius,
         "needs": ("length",),
         "gives": ("displacement", "pressure"),
     },

@@ -9,7 +9,6 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
-from archord.postprocess.laws import elastic_laws as log
 from archord.postprocess.laws.elastic_laws import hertz, persson_load, persson_pressure
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
@@ -93,10 +92,11 @@ def test_radzimovsky_means_the_width_of_the_contact():
     """Roark's d is twice Hertz's half-width to 0.3 %, the printed one is not; with it the law is near Johnson's."""
     P = np.array(0.1 * UNIT)
     width = 2 * half_width(P) / np.sqrt(JOINT.relative_radius * P / JOINT.E_star)
-    assert width == pytest.approx(log.ROARK_WIDTH, rel=3e-3)
-    assert width > 1.4 * log.PRINTED_WIDTH
-    gap = log.radzimovsky(JOINT, width).displacement(P) - log.johnson(JOINT).displacement(P)
-    assert gap * np.pi * JOINT.E_star / P == pytest.approx(5 / 3 - 2 * np.log(2), rel=1e-9)
+    assert width == pytest.approx(1.6 * 2**0.5, rel=3e-3)
+    assert width > 1.4 * 1.6
+    roark, johnson = (LAWS[name].displacement(JOINT, P) for name in ("radzimovsky-width", "johnson"))
+    gap = (roark - johnson) * np.pi * JOINT.E_star / P - 2 * np.log(width / (1.6 * 2**0.5))
+    assert gap == pytest.approx(5 / 3 - 2 * np.log(2), rel=1e-9)
 
 
 @pytest.mark.parametrize("P", UNIT * np.array([1e-4, 1e-3]))
