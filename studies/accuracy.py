@@ -29,8 +29,7 @@ from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.system import System
-from archord.studies.mesh_family import MeshFamily
-from archord.studies.problem_family import ProblemFamily
+from archord.studies.mesh_family import MeshFamily, ProblemFamily
 
 MOST_SUBSTEPS = 64
 
@@ -86,8 +85,7 @@ def solve_to_accuracy(
     if scene.analysis.accuracy is None or start is not None:
         return solve_scene(scene, folder, comm, start=start, interrupt=interrupt, on_start=on_start, **options)
     with nullcontext(interrupt) if interrupt else Interrupt() as interrupt:
-        asked, options = scene.analysis.accuracy, options | {"interrupt": interrupt}
-        search = _Search(scene, asked, folder, comm, on_start, on_level, options)
+        search = _Search(scene, folder, comm, interrupt, on_start, on_level, options)
         with suppress(_End):
             search.refine()
         return search.finish()
@@ -102,25 +100,24 @@ class _Search:
     """The way to the accuracy, the same on all ranks."""
 
     scene: AnyScene
-    asked: float
     folder: Path
     comm: MPI.Comm
+    interrupt: Interrupt
     on_start: Callable[[System], None]
     on_level: Callable[[Level], None]
     options: dict[str, Any]
+    outcome: Outcome | None = None
+    substeps: int = 1
+    mesh_error: float | None = None
 
     def __post_init__(self) -> None:
+        self.asked, self.begun, self.levels = self.scene.analysis.accuracy or 0.0, perf_counter(), list[Level]()
+        self.step_error = None if self.scene.plastic else 0.0
         self.family: MeshFamily | ProblemFamily
         if isinstance(self.scene, Scene):
             self.family = MeshFamily(self.scene, self.asked / 2 if self.scene.plastic else self.asked)
         else:
             self.family = ProblemFamily(self.scene)
-        self.begun = perf_counter()
-        self.levels: list[Level] = []
-        self.outcome: Outcome | None = None
-        self.substeps = 1
-        self.mesh_error: float | None = None
-        self.step_error: float | None = None if self.scene.plastic else 0.0
 
     def refine(self) -> None:
         """Solve until the estimate is as small as asked. Raises `_End` if there is no finer mesh, or a run stops."""
@@ -157,28 +154,29 @@ class _Search:
 
     def _solve(self, mesh: int, substeps: int) -> tuple[Curve | None, Level]:
         """The curve on ``mesh``, None where that hardly notices the contact. Raises `_End`."""
-        scene = self.family.scene_of(mesh, substeps)
-        if scene is None and self.outcome is None:
+        scene, before, begun = self.family.scene_of(mesh, substeps), self.outcome, perf_counter()
+        if scene is None and before is None:
             raise InputError("analysis.accuracy: no mesh within the limits of its element sizes would do.")
-        received = self.comm.allreduce(self.options["interrupt"].received, op=MPI.MAX)
-        if received and self.outcome is not None:
+        received = self.comm.allreduce(self.interrupt.received, op=MPI.MAX)
+        if received and before is not None:
             message = f"{Interrupted(received)} between two meshes"
-            self.outcome = replace(self.outcome, status="interrupted", message=message, signal=received)
+            self.outcome = replace(before, status="interrupted", message=message, signal=received)
+        if scene is None or (received and before is not None):
             raise _End
-        if scene is None:
-            raise _End
-        begun, (size, growth) = perf_counter(), self.family.sizes(scene)
-        self.outcome = outcome = solve_scene(scene, self.folder, self.comm, on_start=self._started, **self.options)
+
+        def started(system: System) -> None:
+            self.family.dofs = system.n_dofs
+            self.on_start(system)
+
+        options = {"interrupt": self.interrupt, "on_start": started, **self.options}
+        self.outcome = outcome = solve_scene(scene, self.folder, self.comm, **options)
         if outcome.status != "done" and outcome.message != UNSEEN:
             raise _End
         curve = self.comm.bcast(self.family.curve(outcome.steps))
         iterations, seconds = sum(m.iterations for m in outcome.steps), round(perf_counter() - begun, 4)
-        level = Level(mesh + 1, size, growth, substeps, self.family.dofs, curve[-1], seconds, iterations)
+        sizes = self.family.sizes(scene)
+        level = Level(mesh + 1, *sizes, substeps, self.family.dofs, curve[-1], seconds, iterations)
         return curve if self.family.resolved(scene, outcome.steps) else None, level
-
-    def _started(self, system: System) -> None:
-        self.family.dofs = system.n_dofs
-        self.on_start(system)
 
     def _tell(self, level: Level) -> None:
         self.levels.append(level)
@@ -191,31 +189,30 @@ class _Search:
         mesh, steps = (self.mesh_error, self.step_error) if done else (None, None)
         estimated = None if mesh is None or steps is None else mesh + steps
         accuracy = Accuracy(self.asked, estimated, mesh, steps, self.substeps, seconds, tuple(self.levels))
-        warnings = [*self.outcome.warnings]
+        outcome = replace(self.outcome, accuracy=accuracy)
         if done and (estimated is None or estimated > self.asked) and self.comm.rank == 0:
-            warnings.append(self._shortfall(accuracy))
-        outcome = replace(self.outcome, warnings=warnings, accuracy=accuracy)
+            outcome.warnings = [*outcome.warnings, self._shortfall(estimated)]
+
+        def note() -> None:
+            path = self.folder / "run.json"
+            content = json.loads(path.read_text(encoding="utf-8"))
+            content |= {"status": outcome.status, "message": outcome.message, "warnings": outcome.warnings}
+            content["accuracy"] = asdict(accuracy)
+            content["error_estimates"] |= {"mesh": mesh, "steps": steps}
+            replace_file(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
         try:
-            agreed(self.comm, lambda: self._note(outcome, accuracy))
+            agreed(self.comm, note)
         except WriteError as error:
             if done:
-                outcome = replace(outcome, status="stopped", message=str(error))
+                return replace(outcome, status="stopped", message=str(error))
         return outcome
 
-    def _note(self, outcome: Outcome, accuracy: Accuracy) -> None:
-        path = self.folder / "run.json"
-        content = json.loads(path.read_text(encoding="utf-8"))
-        content |= {"status": outcome.status, "message": outcome.message, "warnings": outcome.warnings}
-        content["accuracy"] = asdict(accuracy)
-        content["error_estimates"] |= {"mesh": accuracy.mesh_error, "steps": accuracy.step_error}
-        replace_file(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
-
-    def _shortfall(self, accuracy: Accuracy) -> str:
-        """Why the estimate is not as small as asked, and what to do."""
-        if accuracy.estimated is None:
-            said = "the error could not be estimated, as only one mesh within the limits resolves the contact"
-        else:
-            said = f"the error is estimated at {accuracy.estimated:.1e}, not below analysis.accuracy = {self.asked:g}"
-        if accuracy.step_error is not None and 2 * accuracy.step_error > self.asked:
+    def _shortfall(self, estimated: float | None) -> str:
+        """Why the error is not ``estimated`` as small as asked, and what to do."""
+        said = "the error could not be estimated, as only one mesh within the limits resolves the contact"
+        if estimated is not None:
+            said = f"the error is estimated at {estimated:.1e}, not below analysis.accuracy = {self.asked:g}"
+        if self.step_error is not None and 2 * self.step_error > self.asked:
             return f"accuracy: {said}: {self.substeps} steps an output step are too few; increase the number of steps"
         return f"accuracy: {said}: a finer mesh would be too large; ask for less accuracy"

@@ -1,7 +1,8 @@
-"""Meshes of a joint from coarse to fine, near and far elements alike, and the scene on each.
+"""Meshes of a scene from coarse to fine, near and far elements alike, and the scene on each.
 
-Lengths are in the size of the contact that is to be expected: a small contact in a large pin is resolved as a wide one
-is, by elements that are as much smaller as it is and grow as fast.
+Of a joint, lengths are in the size of the contact that is to be expected: a small contact in a large pin is resolved as
+a wide one is, by elements that are as much smaller as it is and grow as fast. Of a general scene, a shape gets smaller
+elements, and of a file the cells are cut in four.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from archord.presets.measures import Measures
+from archord.presets.measures import Measures, Record
 from archord.scene.file import AnyScene
 from archord.scene.geometry import JointGeometry
+from archord.scene.problem import ProblemScene
 from archord.scene.scene import Scene
 
 RATIO = 1.5  # of the element sizes from one mesh to the next
@@ -26,6 +28,9 @@ _MARGIN = 2.0  # an estimate over the error itself, where the order is 3 and the
 _SMALLEST = 1e-4  # element size over R that a scene may ask for
 _LEVELS = 3  # meshes that should do
 _FEWEST_FACETS = 3.0  # in contact: of a contact of fewer facets nothing can be learnt
+_OF_FILES = 2.0  # ratio of the element sizes of a file
+_FIRST_OF_SHAPE = 2.0  # first element size of a shape over that of its scene
+_MOST_DOFS = 1_500_000
 
 
 class MeshFamily:
@@ -71,6 +76,45 @@ class MeshFamily:
         area, joint = max(m.contact_area for m in steps), scene.joint
         facets = area / 2 / joint.h / max(1.0, joint.size_ratio)
         return facets >= _FEWEST_FACETS or max(m.delta for m in steps) <= 0
+
+
+class ProblemFamily:
+    """The meshes ``0, 1, 2, ...`` for ``scene`` (with ``analysis.accuracy``), each by ``ratio`` finer.
+
+    Its corners, as where an edge is clamped, let forces converge with the ``order`` 1.5 at the end, like their energy
+    (Williams 1952), and where bodies yield single differences are too small for more."""
+
+    order = 1.5
+
+    def __init__(self, scene: ProblemScene) -> None:
+        self.scene, self.shape = scene, scene.mesh.shape
+        self.ratio = _OF_FILES if self.shape is None else RATIO
+        self.dofs = 0  # of the last mesh that was solved
+
+    def scene_of(self, level: int, substeps: int) -> ProblemScene | None:
+        """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would be too large."""
+        if level and self.dofs * self.ratio**2 > _MOST_DOFS:
+            return None
+        changes: dict[str, Any] = {"refine": self.scene.mesh.refine + level}
+        if self.shape is not None:
+            factor = _FIRST_OF_SHAPE / self.ratio**level
+            sizes = {"element_size": rounded(factor * self.shape.h), "growth": rounded(factor * self.shape.growth)}
+            changes = {"shape": self.shape.model_copy(update=sizes)}
+        mesh = self.scene.mesh.model_copy(update=changes)
+        return self.scene.model_copy(update={"mesh": mesh} | chosen(self.scene, substeps))
+
+    def sizes(self, scene: Any) -> tuple[float, float]:
+        """Element size and growth of ``scene``; of a file, the size over that of its own cells."""
+        shape = scene.mesh.shape
+        return (0.5**scene.mesh.refine, 0.0) if shape is None else (shape.h, shape.growth)
+
+    def curve(self, steps: Sequence[Record]) -> list[float]:
+        """The force of the last load at every step, or its displacement where it is a force or a pressure."""
+        return [m.values[self.scene.accurate] for m in steps]
+
+    def resolved(self, scene: Any, steps: Sequence[Record]) -> bool:
+        """Whether something is in contact at the end, if anything is to be."""
+        return steps[-1].contact_area > 0 or not self.scene.interaction
 
 
 def expected_angle(scene: Scene) -> float:
