@@ -29,13 +29,14 @@ def clear(folder: Path) -> None:
 
 
 @contextmanager
-def occupied(folder: Path) -> Iterator[None]:
-    """Keep other processes from writing to ``folder``; a kill ends that, too. Raises `InputError` if one does."""
+def occupied(folder: Path, wait: bool = False) -> Iterator[None]:
+    """Keep other processes from writing to ``folder``; a kill ends that, too. If one does already, ``wait`` until it
+    has ended, or raise `InputError`."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         with suppress(OSError):  # a file system without locks
             try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             except BlockingIOError:
                 raise InputError(f"{folder}: another archord is solving into it.") from None
         yield

@@ -67,14 +67,11 @@ def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Res
     """Hand ``cases`` to the other ranks, and solve here from the end of the list."""
     lock = threading.Lock()
 
-    def finish(result: Result) -> None:
-        with lock:
-            report(result)
-
     def ended(future: Future) -> None:
         if not future.cancelled():
             error = future.exception()
-            finish(Result(of[future].run, "failed", f"{error}") if error else future.result())
+            with lock:
+                report(Result(of[future].run, "failed", f"{error}") if error else future.result())
 
     of = {executor.submit(solve_case, case, folder): case for case in cases}
     for future in of:
@@ -82,7 +79,9 @@ def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Res
     if MPI.Query_thread() == MPI.THREAD_MULTIPLE:  # else the manager's thread must be the only one that calls MPI
         for future, case in reversed(of.items()):
             if future.cancel():
-                finish(solve_case(case, folder))
+                result = solve_case(case, folder)
+                with lock:
+                    report(result)
 
 
 def solve_case(case: Case, folder: Path) -> Result:

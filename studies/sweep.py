@@ -6,10 +6,11 @@ import re
 from pathlib import Path
 
 from archord.output.disk import replace_file
+from archord.output.folder import occupied
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 from archord.studies.cases import Case, Sweep
-from archord.studies.tables import CASES, Result, alone, result_of
+from archord.studies.tables import CASES, Result, result_of
 
 FILE = "sweep.toml"
 _DOFS_PER_CELL = {2: 4.3, 3: 9.5}
@@ -24,7 +25,7 @@ def claim(sweep: Sweep, folder: Path) -> None:
         if folder.is_dir() and any(folder.iterdir()) and not (folder / FILE).exists():
             raise InputError(f"{folder}: is not empty and holds no sweep; choose another folder with -o.")
         (folder / CASES).mkdir(parents=True, exist_ok=True)
-        with alone(folder):
+        with occupied(folder / CASES, wait=True):
             held = {run.name for run in (folder / CASES).iterdir()}
             if held and held.isdisjoint(case.run for case in sweep.cases):
                 raise InputError(
@@ -48,14 +49,10 @@ def part_of(cases: list[Case], part: str) -> list[Case]:
 
 def open_cases(cases: list[Case], folder: Path, *, retry: bool) -> tuple[list[Result], list[Case]]:
     """What of ``cases`` has ended already, and those that are left; with ``retry`` also those that failed."""
-    ended, left = [], []
-    for case in cases:
-        result = result_of(case, folder)
-        if result.status == "done" or (result.ended and not retry):
-            ended.append(result)
-        else:
-            left.append(case)
-    return ended, left
+    over = ("done",) if retry else ("done", "stopped", "failed")
+    results = [result_of(case, folder) for case in cases]
+    left = [case for case, result in zip(cases, results, strict=True) if result.status not in over]
+    return [result for result in results if result.status in over], left
 
 
 def expected_seconds(scene: Scene) -> float:

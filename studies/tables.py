@@ -4,17 +4,16 @@ cases.csv (a row per case)."""
 from __future__ import annotations
 
 import csv
-import fcntl
 import io
 import json
-import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from archord.output.disk import replace_file
+from archord.output.folder import occupied
 from archord.scene.errors import InputError
 from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
@@ -38,11 +37,6 @@ class Result:
     steps: int = 0
     seconds: float = 0.0
 
-    @property
-    def ended(self) -> bool:
-        """Whether solving it again would give the same."""
-        return self.status in ("done", "stopped", "failed")
-
 
 def of_case(case: Case, folder: Path) -> Path:
     """The run folder of ``case`` in the sweep's ``folder``."""
@@ -51,11 +45,10 @@ def of_case(case: Case, folder: Path) -> Path:
 
 def report_of(folder: Path) -> dict[str, Any]:
     """The run.json of a case; empty if it has none that can be read."""
-    try:
-        report = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return report if isinstance(report, dict) else {}
+    with suppress(OSError, ValueError):
+        if isinstance(report := json.loads((folder / "run.json").read_text(encoding="utf-8")), dict):
+            return report
+    return {}
 
 
 def result_of(case: Case, folder: Path) -> Result:
@@ -76,7 +69,7 @@ def write(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> dict[st
     run ended. ``results`` of this process hold where a run folder says nothing. Raises `InputError`."""
     own = {result.run: result for result in results}
     try:
-        with alone(folder):
+        with occupied(folder / CASES, wait=True):
             found = {case.run: result_of(case, folder) for case in sweep.distinct}
             found |= {run: own[run] for run, result in found.items() if result.status == "open" and run in own}
             for name, rows in zip(("sweep.csv", "cases.csv"), _rows(sweep, folder, found), strict=True):
@@ -111,11 +104,9 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
 
 def _history(run: Path) -> list[Row]:
     """Heading and rows of history.csv; none if there is none."""
-    try:
-        text = (run / "history.csv").read_text(encoding="utf-8")
-    except OSError:
-        return []
-    return list(csv.reader(io.StringIO(text[: text.rfind("\n") + 1], newline="")))
+    with suppress(OSError), (run / "history.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))
+    return []
 
 
 def heading(key: str, scene: Scene) -> str:
@@ -123,10 +114,8 @@ def heading(key: str, scene: Scene) -> str:
     section, _, name = key.partition(".")
     extra = type(getattr(scene, section)).model_fields[name].json_schema_extra
     kind = extra.get("unit") if isinstance(extra, dict) else None
-    if not kind:
-        return key
-    unit = scene.units.force_of(scene.analysis.thickness) if kind == "force" else getattr(scene.units, str(kind))
-    return f"{key} [{unit}]"
+    known = {**scene.units.model_dump(), "force": scene.units.force_of(scene.analysis.thickness)}
+    return f"{key} [{known[kind]}]" if kind else key
 
 
 def shown(value: Any) -> str:
@@ -136,15 +125,3 @@ def shown(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.12g}"
     return value if isinstance(value, str) else toml_value(value)
-
-
-@contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Wait until no other process is here with this ``folder``: the last one to end gathers what all have done."""
-    descriptor = os.open(folder / CASES, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)

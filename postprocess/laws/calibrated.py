@@ -22,7 +22,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -118,8 +118,7 @@ def shipped_model() -> CalibratedModel:
     return CalibratedModel.from_json(TABLE.read_text(encoding="utf-8"))
 
 
-@dataclass(frozen=True)
-class Calibrated:
+class Calibrated(NamedTuple):
     """k and c of a joint (c infinite: elastic), ``outside``, what of the joint lies outside the range (empty: nothing),
     and the cross-validated errors of its kind: relative, rms and largest of k, c and P."""
 
@@ -164,9 +163,3 @@ def _stray(joint: LawJoint, pin_nu: float, m: float, bounds: dict[str, Any] | No
             upper = "and more" if math.isinf(high) else f"to {high:.4g}"
             return f"{name} = {value:.4g} is outside {low:.4g} {upper}"
     return ""
-
-
-def with_coefficients(joint: LawJoint) -> LawJoint:
-    """``joint`` with its k and c by the model of archord."""
-    found = calibrated(joint)
-    return replace(joint, k=found.k, c=found.c if math.isfinite(found.c) else 1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,24 +27,16 @@ class Calibration:
 
     def law(self) -> FittedLaw:
         """The law for the joint of the first scene, with k and c of all scenes."""
-        run, k = self.scenes[0].run, self.joint.k
-        c = self.joint.c if run.sigY else None
-        loads = np.concatenate([part.load for part in self.joint.residuals])
-        return FittedLaw(
-            k=k.value,
-            E_star=run.E_star,
-            R=run.R,
-            dR=run.dR,
-            k_error=k.error,
-            c=c.value if c else None,
-            sigY=run.sigY if c else None,
-            c_error=c.error if c else None,
-            fitted_range=(float(loads.min()), float(loads.max())),
-            plane=run.plane,
-            length_unit=run.scene.units.length,
-            force_unit=run.scene.units.force_of(None),
-            fitted_to=tuple(part.name for part in self.joint.residuals),
-        )
+        run, found, parts = self.scenes[0].run, self.joint.estimates, self.joint.residuals
+        numbers: dict[str, Any] = {name: getattr(run, name) for name in ("E_star", "R", "dR", "plane")}
+        if not run.sigY:
+            found.pop("c", None)
+        for name, estimate in found.items():
+            numbers |= {name: estimate.value, f"{name}_error": estimate.error}
+        loads, units = np.concatenate([part.load for part in parts]), run.scene.units
+        numbers |= {"sigY": run.sigY if "c" in found else None, "fitted_to": tuple(part.name for part in parts)}
+        numbers |= {"length_unit": units.length, "force_unit": units.force_of(None)}
+        return FittedLaw(**numbers, fitted_range=(float(loads.min()), float(loads.max())))
 
 
 def calibrate(runs: list[RunCurve], load_range: tuple[float, float] = (0.0, np.inf)) -> Calibration:
@@ -64,9 +57,8 @@ def check_compatible(runs: list[RunCurve]) -> None:
     """Raise `InputError` for runs that have no such law, or none in common."""
     for run in runs:
         if not run.scene.joint.is_block:
-            raise InputError(
-                f'{run.name}: joint.model = "{run.scene.joint.model}" has no law to fit; only "block" has.'
-            )
+            model = run.scene.joint.model
+            raise InputError(f'{run.name}: joint.model = "{model}" has no law to fit; only "block" has.')
         for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
             if not solid.perfectly_plastic:
                 said = f" = {solid.hardening:g}" if isinstance(solid.hardening, float) and solid.hardening else ""

@@ -67,7 +67,7 @@ def fit(
         raise ValueError("the points do not determine the parameters")
     errors = np.full(m, np.inf)
     errors[felt] = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)) * (best.fun @ best.fun) / (n - m)) / size[felt]
-    return [float(value) for value in best.x], [float(error) for error in errors]
+    return [*map(float, best.x)], [*map(float, errors)]
 
 
 @dataclass(frozen=True)
@@ -96,25 +96,12 @@ class CurveFit:
         return {"k": self.k} | ({"c": self.c} if self.c else {})
 
     @property
-    def relative(self) -> Array:
-        """``law/data - 1`` of all runs one after the other ``(n,)``."""
-        return np.concatenate([part.law / part.data - 1 for part in self.residuals])
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the relative residuals."""
-        return float(np.sqrt(np.mean(self.relative**2)))
-
-    @property
-    def largest(self) -> float:
-        """The largest relative residual, with its sign."""
-        return float(self.relative[np.abs(self.relative).argmax()])
-
-    @property
-    def r2(self) -> float:
-        """Coefficient of determination."""
+    def quality(self) -> tuple[float, float, float, int]:
+        """Of all runs one after the other, the coefficient of determination, root mean square and largest (with its
+        sign) of ``law/data - 1``, and the number of steps."""
         data, law = (np.concatenate([getattr(part, name) for part in self.residuals]) for name in ("data", "law"))
-        return 1 - float(((law - data) ** 2).sum() / ((data - data.mean()) ** 2).sum())
+        off, r2 = law / data - 1, 1 - ((law - data) ** 2).sum() / ((data - data.mean()) ** 2).sum()
+        return float(r2), float(np.sqrt(np.mean(off**2))), float(off[np.abs(off).argmax()]), len(off)
 
     @property
     def serial_correlation(self) -> float:
@@ -188,12 +175,11 @@ def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.
     touching = (run.P > 0) & (run.p0 > 0)
     if not touching.any():
         raise InputError(f"{run.name}: the bodies never touch in this run, so there is no law to fit to it.")
-    chosen = touching & (load >= load_range[0] * (1 - slack)) & (load <= load_range[1] * (1 + slack))
+    low, high = load_range
+    chosen = touching & (load >= low * (1 - slack)) & (load <= high * (1 + slack))
     if not chosen.any():
-        raise InputError(
-            f"{run.name}: has no step with contact from {load_range[0]:g} to {load_range[1]:g} clearances; "
-            f"its {len(load)} steps are from {load.min():g} to {load.max():g}."
-        )
+        raise InputError(f"{run.name}: has no step with contact from {low:g} to {high:g} clearances; its {len(load)} "
+                         f"steps are from {load.min():g} to {load.max():g}.")  # fmt: skip
     return chosen
 
 

@@ -25,10 +25,9 @@ def parameters(calibration: Calibration) -> list[dict[str, Any]]:
     named = [(fit.residuals[0].name, fit) for fit in calibration.each]
     named += [("all together", calibration.joint)] if len(calibration.scenes) > 1 else []
     for run, fit in named:
-        quality = (fit.r2, fit.rms, fit.largest, len(fit.relative))
         for name, found in fit.estimates.items():
             errors = (found.value, found.standard_error, found.discretisation_error, found.interval)
-            rows.append(dict(zip(_COLUMNS, (run, name, *errors, *quality), strict=True)))
+            rows.append(dict(zip(_COLUMNS, (run, name, *errors, *fit.quality), strict=True)))
     return rows
 
 
@@ -53,10 +52,9 @@ def notes(calibration: Calibration) -> list[str]:
     said += [f"mesh: {run.name} serves to estimate the discretisation error of {scene.run.name}."
              for scene in scenes for run in scene.coarser]  # fmt: skip
     if joint.serial_correlation > _BENT:
-        said.append(
-            f"s.e.: residuals of neighbouring steps are correlated ({joint.serial_correlation:.2f}): the law's shape "
-            "differs from the runs', and errors and intervals, which take residuals as independent, are too small."
-        )
+        said.append(f"s.e.: residuals of neighbouring steps are correlated ({joint.serial_correlation:.2f}): the law's "
+                    "shape differs from the runs', and errors and intervals, which take residuals as independent, are "
+                    "too small.")  # fmt: skip
     if joint.c is None and any(scene.run.sigY for scene in scenes):
         said.append("c: too few steps past yield in the range; elastic law.")
     if scenes[0].run.scene.pin.whole:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from archord.postprocess.laws import chord_laws as chord
 from archord.postprocess.laws import elastic_laws as elastic
-from archord.postprocess.laws.calibrated import calibrated, with_coefficients
+from archord.postprocess.laws.calibrated import calibrated
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.postprocess.laws.law import Law, LawState
 
@@ -24,6 +25,12 @@ _DEEPEST = 2.0  # displacement over clearance up to which Hu et al. compare thei
 
 def _deepest(joint: LawJoint) -> float:
     return _DEEPEST * joint.clearance
+
+
+def _calibrated(joint: LawJoint, delta: Array) -> LawState:
+    found = calibrated(joint)
+    known = replace(joint, k=found.k, c=found.c if math.isfinite(found.c) else 1.0)
+    return chord.plastic_winkler(known, delta)
 
 
 def _thick(joint: LawJoint) -> str:
@@ -55,7 +62,7 @@ _CHORD: dict[str, Any] = {"limit": _deepest, "unfit": _thick}
 _OF_LOAD = {"gives": ("pressure", "contact angle")}
 _FUNCTIONS: dict[str, dict[str, Any]] = {
     "calibrated": {
-        "state": lambda joint, delta: chord.plastic_winkler(with_coefficients(joint), delta),
+        "state": _calibrated,
         "limit": _deepest,
         "unfit": lambda joint: calibrated(joint).outside,
         "needs": ("plane", "nu"),

@@ -60,8 +60,8 @@ def fit_case(refined: Refined, load_range: tuple[float, float], name: str) -> di
     run = refined.run
     if run.scene.pin.whole:
         raise InputError(f"{run.name}: pin.whole = true does not fit: k and c of a sweep are those of half a pin.")
-    force = fit_curve([refined], load_range)
-    pin, block = run.scene.pin, run.scene.block
+    force, pin, block = fit_curve([refined], load_range), run.scene.pin, run.scene.block
+    _, rms, largest, _ = force.quality
     case = {
         "run": name,
         "plane": run.plane,
@@ -72,8 +72,8 @@ def fit_case(refined: Refined, load_range: tuple[float, float], name: str) -> di
         "clearance": run.dR / run.R,
         "strength": math.inf if run.sigY is None else run.sigY / run.E_star,
         "mesh": run.scene.joint.h / run.R,
-        "rms": force.rms,
-        "largest": force.largest,
+        "rms": rms,
+        "largest": largest,
         "load": force.residuals[0].load,
         "P": force.residuals[0].data,
     }

@@ -27,7 +27,7 @@ def test_exact_data_give_their_law_back(quantity, k, c, sigY):
     values = {name: estimate.value for name, estimate in found.estimates.items()}
     assert values == pytest.approx({"k": k} | ({"c": c} if c else {}), rel=1e-8)
     assert found.k.error < 1e-8
-    assert found.r2 == pytest.approx(1, abs=1e-12)
+    assert found.quality[0] == pytest.approx(1, abs=1e-12)
 
 
 @pytest.mark.parametrize(("quantity", "c", "sigY"), [("P", None, None), ("p0", None, None), ("P", 1.3, 0.002)])
@@ -52,8 +52,9 @@ def test_the_error_of_k_is_that_of_a_straight_line():
     k = (x @ y) / (x @ x)
     assert found.k.value == pytest.approx(k, rel=1e-8)
     assert found.k.error == pytest.approx(np.sqrt(((y - k * x) ** 2).sum() / 19 / (x @ x)), rel=1e-6)
-    assert found.relative == pytest.approx(k * x / y - 1, rel=1e-6)
-    assert found.r2 == pytest.approx(1 - ((y - k * x) ** 2).sum() / ((y - y.mean()) ** 2).sum(), rel=1e-9)
+    off, r2 = k * x / y - 1, 1 - ((y - k * x) ** 2).sum() / ((y - y.mean()) ** 2).sum()
+    quality = (r2, np.sqrt((off**2).mean()), max(off, key=abs), 20)
+    assert found.quality == pytest.approx(quality, rel=1e-6)
 
 
 @pytest.mark.parametrize("c", [None, 1.3])
