@@ -16,7 +16,7 @@ from archord.report.table import Table
 from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
-    from archord.studies.tables import Result
+    from archord.studies.sweep import Result
 
 
 @click.command()
@@ -47,9 +47,8 @@ def sweep(
     from mpi4py import MPI
 
     from archord.output.ranks import agreed
-    from archord.studies import tables
     from archord.studies.cases import read_sweep
-    from archord.studies.sweep import FILE, claim, expected_seconds, open_cases, part_of
+    from archord.studies.sweep import FILE, claim, expected_seconds, open_cases, part_of, write_tables
 
     comm = MPI.COMM_WORLD
     source = file / FILE if file.is_dir() else file
@@ -100,7 +99,7 @@ def sweep(
         received = solve_cases(comm, cases, folder, ended)
 
     def concluded() -> bool:
-        known = tables.write(design, folder, results)
+        known = write_tables(design, folder, results)
         counts = Counter(result.status for result in known.values())
         told = ", ".join(f"{n} {status}" for status, n in sorted(counts.items()))
         say(f"{told} in {perf_counter() - begun:.1f} s, tables in {folder}")
@@ -115,8 +114,7 @@ def sweep(
 
 def _table(design) -> Table:
     """A line for each case: what is varied, and what it may cost."""
-    from archord.studies.sweep import expected_seconds
-    from archord.studies.tables import heading, shown
+    from archord.studies.sweep import expected_seconds, heading, shown
 
     table = Table("case", "run", *(heading(key, design.cases[0].scene) for key in design.keys), "steps", "seconds")
     for case in design.cases:

@@ -20,6 +20,7 @@ from time import perf_counter
 from typing import Any
 
 from mpi4py import MPI
+from mpi4py.futures import MPICommExecutor
 
 from archord.output.disk import replace_file
 from archord.output.folder import claim_folder
@@ -29,7 +30,7 @@ from archord.scene.errors import InputError
 from archord.solver.interrupt import Interrupt
 from archord.studies.accuracy import solve_to_accuracy
 from archord.studies.cases import Case
-from archord.studies.tables import FAILURE, Result, of_case
+from archord.studies.sweep import FAILURE, Result, of_case
 
 _BACKOFF = 0.005  # seconds between two looks of idle ranks and of the manager
 _interrupt = Interrupt()  # of this rank
@@ -52,8 +53,6 @@ def solve_cases(comm: MPI.Intracomm, cases: list[Case], folder: Path, report: Ca
                 for case in cases:
                     report(solve_case(case, folder))
             else:
-                from mpi4py.futures import MPICommExecutor
-
                 with MPICommExecutor(comm, root=0, backoff=_BACKOFF) as executor:
                     if executor is not None:
                         _share(executor, cases, folder, report)

@@ -1,21 +1,72 @@
-"""A sweep's folder: sweep.toml and cases/, with a run folder for each case; what is left, and what it costs."""
+"""A sweep's folder: sweep.toml and cases/, with a run folder for each case; how they ended, what is left and what it
+costs, and the tables gathered from the run folders: sweep.csv (a row per case and step), cases.csv (a row per case)."""
 
 from __future__ import annotations
 
+import csv
+import io
+import json
 import re
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from archord.output.disk import replace_file
 from archord.output.folder import occupied
 from archord.scene.errors import InputError
+from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
 from archord.studies.cases import Case, Sweep
-from archord.studies.tables import CASES, Result, result_of
 
 FILE = "sweep.toml"
+CASES = "cases"  # the folder of all run folders
+FAILURE = "failure.txt"  # what raised in a case that failed: a sentence, and the traceback
+_COST = ("message", "steps", "seconds [s]", "iterations", "cutbacks", "cells", "dofs")
+_PER_STEP = ("step", "iterations", "cutbacks", "seconds [s]")  # of history.csv; cases.csv has sums of them
 _DOFS_PER_CELL = {2: 4.3, 3: 9.5}
 _STEP = {False: 1.7e-5, True: 2.8e-5}  # seconds per dof of an elastic and of a plastic output step
 _LINEAR = 3e4  # dofs up to which a step costs in proportion to them
+Row = list[str]
+
+
+@dataclass(frozen=True)
+class Result:
+    """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be written), "failed"
+    (an error), "interrupted", "busy" (another process solves it) or "open"; ``seconds`` are those of this process."""
+
+    run: str
+    status: str
+    message: str = ""
+    steps: int = 0
+    seconds: float = 0.0
+
+
+def of_case(case: Case, folder: Path) -> Path:
+    """The run folder of ``case`` in the sweep's ``folder``."""
+    return folder / CASES / case.run
+
+
+def report_of(folder: Path) -> dict[str, Any]:
+    """The run.json of a case; empty if it has none that can be read."""
+    with suppress(OSError, ValueError):
+        if isinstance(report := json.loads((folder / "run.json").read_text(encoding="utf-8")), dict):
+            return report
+    return {}
+
+
+def result_of(case: Case, folder: Path) -> Result:
+    """What the run folder of ``case`` in the sweep's ``folder`` says about it."""
+    run = of_case(case, folder)
+    with suppress(OSError):
+        return Result(case.run, "failed", (run / FAILURE).read_text(encoding="utf-8").partition("\n")[0])
+    report = report_of(run)
+    status, steps = report.get("status"), len(report.get("steps", []))
+    between_meshes = case.scene.analysis.accuracy is not None and status == "done" and "accuracy" not in report
+    if status in ("done", "stopped", "interrupted") and not between_meshes:
+        return Result(case.run, status, report.get("message", ""), steps)
+    return Result(case.run, "open", steps=steps)
 
 
 def claim(sweep: Sweep, folder: Path) -> None:
@@ -64,3 +115,66 @@ def expected_seconds(scene: Scene) -> float:
     dofs = _DOFS_PER_CELL[scene.analysis.degree] * scene.joint.expected_cells
     step = 0.02 + _STEP[scene.plastic] * dofs * max(1.0, (dofs / _LINEAR) ** 0.5)
     return 0.1 + 2e-5 * dofs + len(scene.targets) * step
+
+
+def write_tables(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> dict[str, Result]:
+    """Write both tables, from what is in the run folders now, several processes one after the other; returns how each
+    run ended. ``results`` of this process hold where a run folder says nothing. Raises `InputError`."""
+    own = {result.run: result for result in results}
+    try:
+        with occupied(folder / CASES, wait=True):
+            found = {case.run: result_of(case, folder) for case in sweep.distinct}
+            found |= {run: own[run] for run, result in found.items() if result.status == "open" and run in own}
+            for name, rows in zip(("sweep.csv", "cases.csv"), _rows(sweep, folder, found), strict=True):
+                text = io.StringIO(newline="")
+                csv.writer(text).writerows(rows)
+                replace_file(folder / name, text.getvalue())
+            (folder / "sweep.h5").unlink(missing_ok=True)  # version 0.1 had a third table: it would be out of date
+    except OSError as error:
+        raise InputError(f"{error.filename} cannot be written: {error.strerror}.") from None
+    return found
+
+
+def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Row], list[Row]]:
+    """Headings and rows of both tables."""
+    histories = {run: _history(folder / CASES / run) for run in found}
+    history = next((rows[0] for rows in histories.values() if rows), [])
+    last = [i for i, name in enumerate(history) if name not in _PER_STEP]
+    head = ["case", "run", "status", *(heading(key, sweep.cases[0].scene) for key in sweep.keys)]
+    steps, cases = [[*head, *history]], [[*head, *_COST, *(history[i] for i in last)]]
+    for case in sweep.cases:
+        result, rows = found[case.run], histories[case.run][1:]
+        first = [str(case.number), case.run, result.status, *(shown(case.value(key)) for key in sweep.keys)]
+        steps += [[*first, *row] for row in rows]
+        report = report_of(of_case(case, folder))
+        totals, mesh, seconds = (report.get(name, {}) for name in ("totals", "mesh", "seconds"))
+        costs = [result.steps, seconds.get("total"), totals.get("newton_iterations"), totals.get("cutbacks")]
+        costs += [mesh.get("cells"), mesh.get("dofs")]
+        final = [rows[-1][i] if rows else "" for i in last]
+        cases.append([*first, result.message, *map(shown, costs), *final])
+    return steps, cases
+
+
+def _history(run: Path) -> list[Row]:
+    """Heading and rows of history.csv; none if there is none."""
+    with suppress(OSError), (run / "history.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))
+    return []
+
+
+def heading(key: str, scene: Scene) -> str:
+    """The dotted ``key`` with its unit: ``joint.clearance [mm]``."""
+    section, _, name = key.partition(".")
+    extra = type(getattr(scene, section)).model_fields[name].json_schema_extra
+    kind = extra.get("unit") if isinstance(extra, dict) else None
+    known = {**scene.units.model_dump(), "force": scene.units.force_of(scene.analysis.thickness)}
+    return f"{key} [{known[kind]}]" if kind else key
+
+
+def shown(value: Any) -> str:
+    """A value as a table has it: nothing for None, lists as TOML."""
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return f"{value:.12g}"
+    return value if isinstance(value, str) else toml_value(value)

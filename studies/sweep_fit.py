@@ -8,7 +8,6 @@ from pathlib import Path
 
 from archord.output.folder import is_sweep
 from archord.postprocess.convergence import group
-from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.calibrated import CalibratedModel, shipped_model
 from archord.postprocess.laws.calibration import check_compatible
 from archord.postprocess.laws.joint import LawJoint
@@ -17,10 +16,9 @@ from archord.postprocess.laws.study_cases import Cases, case_table, fit_case, re
 from archord.postprocess.run import Run
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
-from archord.studies.cases import Case, read_sweep
-from archord.studies.tables import of_case, result_of
+from archord.studies.cases import read_sweep
+from archord.studies.sweep import FILE, of_case, result_of
 
-_FILE = "sweep.toml"
 _BLOCKS = "small blocks"
 _SOFTER = 0.01  # share of P that a block may cost without a word
 LeftOut = list[tuple[str, str]]  # runs with the reason
@@ -67,13 +65,18 @@ def fit_sweep(path: Path, load_range: tuple[float, float]) -> SweepFit:
 
 def _solved(folder: Path, load_range: tuple[float, float]) -> tuple[Cases, dict[str, str], LeftOut]:
     """Fit k and c to every distinct case, on its finest mesh; the first three of `SweepFit`."""
-    distinct = read_sweep(folder / _FILE).distinct
+    distinct = read_sweep(folder / FILE).distinct
     of: dict[str, str] = {}  # the names of the cases by those of their curves
     runs, fitted, left_out = [], [], LeftOut()
     for case in distinct:
+        result = result_of(case, folder)
         try:
-            runs.append(_run(case, folder))
-            of[runs[-1].name] = case.run
+            if result.status not in ("done", "stopped") or not result.steps:
+                raise InputError(f"{result.status}: {result.message}" if result.message else result.status)
+            curve = Run(of_case(case, folder)).curve.loading()
+            check_compatible([curve])
+            runs.append(curve)
+            of[curve.name] = case.run
         except InputError as error:
             left_out.append((case.run, str(error)))
     for refined in group(runs):
@@ -89,7 +92,7 @@ def _solved(folder: Path, load_range: tuple[float, float]) -> tuple[Cases, dict[
     meshes = sorted({f"{case['mesh']:.3g}" for case in fitted})
     notes = {
         "archord": VERSION,
-        "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / _FILE).read_bytes()).hexdigest()[:16]}",
+        "sweep": f"{folder.name}, sha256 {hashlib.sha256((folder / FILE).read_bytes()).hexdigest()[:16]}",
         "distinct cases": str(len(distinct)),
         "mesh": f"elements of {' and '.join(meshes)} R on the arcs",
     }
@@ -97,13 +100,3 @@ def _solved(folder: Path, load_range: tuple[float, float]) -> tuple[Cases, dict[
     if softer > _SOFTER:
         notes[_BLOCKS] = f"P up to about {softer:.1%} smaller than in a wide block, and k, which a model does not know"
     return *stored(fitted, notes), left_out
-
-
-def _run(case: Case, folder: Path) -> RunCurve:
-    """The curve of a ``case``. Raises `InputError` if it is not solved, or its joint has no such law."""
-    status = result_of(case, folder)
-    if status.status not in ("done", "stopped") or not status.steps:
-        raise InputError(f"{status.status}: {status.message}" if status.message else status.status)
-    curve = Run(of_case(case, folder)).curve.loading()
-    check_compatible([curve])
-    return curve

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from archord.output.user_file import writing
-from archord.postprocess.laws.calibration import Calibration
-from archord.postprocess.laws.curve_fit import dimensionless_law
+from archord.postprocess.laws.calibration import Calibration, dimensionless_law
 from archord.report.figure import new_figure, save
 from archord.report.table import Table
 

@@ -17,7 +17,7 @@ import pandas as pd
 
 from archord.postprocess.convergence import Refined
 from archord.postprocess.laws.calibrated import SOFT, SOFT_WORDS, UNFIT, equivalent_nu
-from archord.postprocess.laws.curve_fit import fit_curve
+from archord.postprocess.laws.calibration import fit_curve
 from archord.postprocess.laws.joint import LawJoint
 from archord.report.table import Table
 from archord.scene.errors import InputError

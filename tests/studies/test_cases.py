@@ -13,10 +13,8 @@ from hypothesis import strategies as st
 
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, resolved
-from archord.studies.cases import combinations, factors, read_sweep, run_name, samples
-from archord.studies.sweep import expected_seconds, part_of
-from archord.studies.sweep_file import LatinHypercube, SweepFile
-from archord.studies.tables import heading
+from archord.studies.cases import LatinHypercube, SweepFile, combinations, factors, read_sweep, run_name, samples
+from archord.studies.sweep import expected_seconds, heading, part_of
 
 SCENES = Path(__file__).parents[2] / "scenes"
 DOCS = SCENES.parent / "docs"

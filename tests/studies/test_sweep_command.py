@@ -7,7 +7,7 @@ import pytest
 from archord.cli import run
 from archord.output.history import read_history
 from archord.studies.cases import read_sweep
-from archord.studies.tables import result_of
+from archord.studies.sweep import result_of
 from tests.studies.parts import SOFT, STUCK, break_mesh, numbers, sweep, table, times, written
 
 

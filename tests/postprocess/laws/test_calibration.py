@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from archord.postprocess.convergence import group
-from archord.postprocess.laws.calibration import calibrate
-from archord.postprocess.laws.curve_fit import fit_curve
+from archord.postprocess.laws.calibration import calibrate, fit_curve
 from archord.postprocess.laws.fit_report import notes
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.run import Run
