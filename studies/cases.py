@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import tomli_w
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from archord.report.version import VERSION
@@ -109,18 +110,13 @@ class SweepFile(Section):
 
     def resolved(self) -> str:
         """The sweep as TOML with its base scene in it; it gives the same cases."""
-        import tomli_w
-
         return tomli_w.dumps(self.model_dump(by_alias=True, exclude_none=True, exclude_defaults=True))
 
 
 def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
     """Read and check the sweep file ``path``; ``base`` then is the base scene's table, with ``overrides`` like
-    ``"joint.radius=2"`` on top and the targets of its load.path, and other paths are absolute.
-
-    The scene itself is not checked, as it may be whole only with what is varied. Raises `InputError` with one sentence
-    per fault: file, key, value, and what is allowed.
-    """
+    ``"joint.radius=2"`` on top and the targets of its load.path, and other paths are absolute. It is not checked, as it
+    may be whole only with what is varied. Raises `InputError` with one sentence per fault."""
     data = read_toml(path)
     if "base" not in data and "joint" in data:
         raise InputError(f"{path}: is a scene, not a sweep; solve it by archord solve, or name it as a base.")
@@ -290,7 +286,6 @@ def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:
     data = copy.deepcopy(base)
     for key in sorted(overrides, key=set_later):
         section, _, name = key.partition(".")
-        value = overrides[key]
-        put(data, section, name, None if isinstance(value, str) and value == ABSENT else value, key)
+        put(data, section, name, None if overrides[key] == ABSENT else overrides[key], key)
     read_targets(data, path)
     return parse_scene(data, str(path))

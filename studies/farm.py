@@ -85,9 +85,7 @@ def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Res
 
 def solve_case(case: Case, folder: Path) -> Result:
     """Solve ``case`` into its run folder on this rank alone, or finish what is there; after a signal begin nothing.
-
-    Whatever goes wrong in a case is its result.
-    """
+    Whatever goes wrong in a case is its result."""
     if _interrupt.received:
         return Result(case.run, "open")
     begun, run = perf_counter(), of_case(case, folder)

@@ -34,10 +34,8 @@ _MOST_DOFS = 1_500_000
 
 
 class MeshFamily:
-    """The meshes ``0, 1, 2, ...`` for ``scene`` (with ``analysis.accuracy``) that are to make the error of the mesh
-    fall below ``accuracy`` with the third, or with the second if that is coarse; each by ``ratio`` finer.
-
-    Whoever solves them notes their ``dofs``."""
+    """The meshes ``0, 1, 2, ...`` for ``scene`` that are to make the error of the mesh fall below ``accuracy`` with the
+    third, or with the second if that is coarse; each by ``ratio`` finer. Whoever solves them notes their ``dofs``."""
 
     ratio, order, dofs = RATIO, 2.0, 0
 
@@ -79,17 +77,15 @@ class MeshFamily:
 
 
 class ProblemFamily:
-    """The meshes ``0, 1, 2, ...`` for ``scene`` (with ``analysis.accuracy``), each by ``ratio`` finer.
+    """The meshes ``0, 1, 2, ...`` for ``scene``, each by ``ratio`` finer. Its corners, as where an edge is clamped, let
+    forces converge with the ``order`` 1.5 at the end, like their energy (Williams 1952), and where bodies yield single
+    differences are too small for more. Whoever solves them notes their ``dofs``."""
 
-    Its corners, as where an edge is clamped, let forces converge with the ``order`` 1.5 at the end, like their energy
-    (Williams 1952), and where bodies yield single differences are too small for more."""
-
-    order = 1.5
+    order, dofs = 1.5, 0
 
     def __init__(self, scene: ProblemScene) -> None:
         self.scene, self.shape = scene, scene.mesh.shape
         self.ratio = _OF_FILES if self.shape is None else RATIO
-        self.dofs = 0  # of the last mesh that was solved
 
     def scene_of(self, level: int, substeps: int) -> ProblemScene | None:
         """The scene on mesh ``level`` in ``substeps`` steps an output step; None if the mesh would be too large."""

@@ -173,8 +173,6 @@ def heading(key: str, scene: Scene) -> str:
 
 def shown(value: Any) -> str:
     """A value as a table has it: nothing for None, lists as TOML."""
-    if value is None:
-        return ""
-    if isinstance(value, float):
-        return f"{value:.12g}"
-    return value if isinstance(value, str) else toml_value(value)
+    if value is None or isinstance(value, str):
+        return value or ""
+    return f"{value:.12g}" if isinstance(value, float) else toml_value(value)

@@ -1,20 +1,14 @@
 """k and c of the plastic-Winkler law where nobody has solved the joint: a compact model over what decides a joint.
 
-`calibrated` gives the numbers of the model that comes with archord, ``LAWS["calibrated"]`` the law. The model with its
-ranges and errors is data, calibrated_law.json, the cases that it was fitted to are calibrated_rows.csv;
-docs/calibration.md says how to solve and fit them again, study.py fits.
-
-Elastic: 1/k is the sum of what pin and block yield, each in its share of the compliance 1/E*. A joint in plane stress
-is one in plane strain with other constants, so ``n = nu/(1 - nu)`` (plane strain) or ``n = nu`` (plane stress) and
-Dundurs' alpha stand for the materials in either plane:
+The model that comes with archord is data with its ranges and errors, calibrated_law.json; the cases that it was fitted
+to are calibrated_rows.csv. docs/calibration.md says how to solve and fit them again, study.py fits. A joint in plane
+stress is one in plane strain with other constants: ``n = nu/(1 - nu)`` (plane strain) or ``n = nu`` (plane stress)
 
     1/k_e = polynomial of p = (1 - alpha)/2, q = (1 + alpha)/2, m = n of the pin, n = n of the block
-
-Plastic: k tends to the elastic one as the joint yields later and later: ``s/k_e``, ``s = sigY R/(E* dR)``, is the
-displacement, in clearances, at which the elastic law's peak pressure reaches sigY. c is a power of s with an exponent
-and a factor that depend on the materials. For each plane and kind of yielding
-
     ln(k/k_e) = A exp(-b s/k_e),    ln c = C,    A and C polynomials of x = ln(s/0.4), p, q, m, n and d = 100 dR/R
+
+with Dundurs' alpha and ``s = sigY R/(E* dR)``; A, b and C for each plane and kind of yielding. ``s/k_e`` is the
+displacement, in clearances, at which the elastic law's peak pressure reaches sigY.
 """
 
 from __future__ import annotations
@@ -22,6 +16,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -101,14 +96,12 @@ class CalibratedModel:
     @classmethod
     def from_json(cls, text: str) -> CalibratedModel:
         """The model in ``text``, written by `to_json`. Raises ValueError."""
-        try:
+        with suppress(ValueError, KeyError, TypeError, AttributeError):
             model = cls(json.loads(text))
             for kind in model.data["bounds"]:
                 model.coefficients(kind, Points(*np.full((5, 1), 0.3)))
             if {"load_range", "errors", "provenance"} <= model.data.keys():
                 return model
-        except (ValueError, KeyError, TypeError, AttributeError):
-            pass
         raise ValueError("law: is not a calibrated law, as archord fit SWEEP --law writes it.")
 
 
@@ -139,10 +132,9 @@ def calibrated(joint: LawJoint, model: CalibratedModel | None = None) -> Calibra
     m, n = equivalent_nu(joint.plane == "strain", np.array([pin_nu, joint.nu]))
     points = joint.dundurs_alpha, m, n, joint.onset, joint.clearance / joint.radius
     k, c = model.coefficients(kind, Points(*map(np.asarray, points)))
-    outside = "" if elastic else UNFIT.get(joint.yielding, "")
+    unfit, bounds = "" if elastic else UNFIT.get(joint.yielding, ""), model.data["bounds"].get(kind)
     errors = model.data["errors"].get("cross-validated", {}).get(kind, {})
-    bounds = model.data["bounds"].get(kind)
-    return Calibrated(float(k), float(c), outside or _stray(joint, pin_nu, float(m), bounds), errors)
+    return Calibrated(float(k), float(c), unfit or _stray(joint, pin_nu, float(m), bounds), errors)
 
 
 def _stray(joint: LawJoint, pin_nu: float, m: float, bounds: dict[str, Any] | None) -> str:

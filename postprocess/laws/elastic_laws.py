@@ -70,8 +70,7 @@ def dubowsky_freudenstein(joint: LawJoint, delta: Array) -> LawState:
 
 
 def dubowsky_freudenstein_limit(joint: LawJoint) -> float:
-    """Displacement at which Hertz's contact is as wide as the joint is long, ``P = (pi/16) E* L^2/R*``: beyond, it is
-    no strip."""
+    """Displacement at which Hertz's contact is as wide as the joint is long, no strip: ``P = (pi/16) E* L^2/R*``."""
     assert joint.length is not None
     return (1 + math.log(16)) * joint.length**2 / (16 * joint.relative_radius)
 

@@ -16,7 +16,6 @@ from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.postprocess.laws.law import LawState, rising_root
 
-_TEMPLATE = Path(__file__).with_suffix(".toml")
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -77,7 +76,7 @@ class FittedLaw(BaseModel):
     def to_python(self) -> str:
         """Source of a Python module with ``force(delta)`` and ``stiffness(delta)``, which needs only ``math``."""
         low, high = self.fitted_range
-        numbers = {name: getattr(self, name) for name in ("k", "c", "sigY", "E_star", "R", "dR")}
+        numbers = self.model_dump(include={"k", "c", "sigY", "E_star", "R", "dR"})
         values = {name: "math.inf" if value is None else repr(value) for name, value in numbers.items()} | {
             "note": "plastic-Winkler law" if self.c is not None else "Winkler law",
             "k_error": f"{self.k_error:.2g}",
@@ -87,5 +86,5 @@ class FittedLaw(BaseModel):
             "sources": json.dumps(", ".join(self.fitted_to)),
             "plane": self.plane,
         }
-        template = tomllib.loads(_TEMPLATE.read_text(encoding="utf-8"))["module"]
+        template = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["module"]
         return Template(template).substitute(values)

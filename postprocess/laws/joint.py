@@ -13,7 +13,6 @@ from archord.materials.material import Plane
 from archord.scene.scene import Scene
 
 Array = npt.NDArray[np.floating]
-YIELDING = ("both", "block", "pin", "unlike")
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are
 _SOFTER, _SOFTEST = 1.4, 2.5  # fall of P in a block of W, times (W/R)^2: of like elastic bodies, and of any
 
@@ -23,14 +22,13 @@ class LawJoint:
     """A pin of radius ``radius`` (R1) in a hole of radius R2 = R1 + ``clearance``, in any consistent units.
 
     ``E_star`` is the contact modulus of the plane, ``yield_stress`` that of the weaker body, ``k`` Winkler's
-    coefficient (0.85: Hu et al., eq. 6), ``c`` the plateau of the pressure over the yield stress (1: Hu et al., eq.
-    10), ``length`` the length of the joint along its axis. ``dundurs_alpha`` =
-    (E1' - E2')/(E1' + E2') is positive where the pin is the stiffer body, ``dundurs_beta`` goes with it; both are zero
-    for like bodies. Only the calibrated law asks for the rest: ``plane`` ("strain" or "stress"), ``nu`` of the block,
-    ``pin_nu`` of the pin (None: the block's, or rigid), and which bodies have the yield stress, ``yielding``: "both",
-    "block", "pin", or "unlike" where each has its own. Laws of P(delta) are for a pin in a wide block, and say so of a
-    ``ring``, or where ``block_size`` (None: wide) is small, or the pin is ``whole``, not cut at the pressed diameter;
-    those with yielding say so where a body ``hardens``. Raises ValueError for values that make no joint.
+    coefficient and ``c`` the plateau of the pressure over the yield stress (Hu et al., eqs 6 and 10), ``length`` along
+    the axis. ``dundurs_alpha`` = (E1' - E2')/(E1' + E2') is positive where the pin is the stiffer body,
+    ``dundurs_beta`` goes with it; both are zero for like bodies. Only the calibrated law asks for ``plane``, ``nu`` of
+    the block, ``pin_nu`` (None: the block's, or rigid), and which bodies have the yield stress, ``yielding`` ("unlike":
+    each its own). Laws of P(delta) are for a pin in a wide block, and say so of a ``ring``, where ``block_size`` (None:
+    wide) is small, or the pin is ``whole``, not cut at the pressed diameter; those with yielding say so where a body
+    ``hardens``. Raises ValueError for values that make no joint.
     """
 
     radius: float
@@ -63,7 +61,7 @@ class LawJoint:
         for name, value in (("nu", self.nu), ("pin_nu", self.pin_nu)):
             if value is not None and not -1 < value < 0.5:
                 raise ValueError(f"{name} = {value:g} must be between -1 and 0.5.")
-        for name, known in (("plane", (None, "strain", "stress")), ("yielding", YIELDING)):
+        for name, known in (("plane", (None, "strain", "stress")), ("yielding", ("both", "block", "pin", "unlike"))):
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} = {getattr(self, name)!r} must be one of {', '.join(filter(None, known))}.")
 

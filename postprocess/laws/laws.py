@@ -23,10 +23,6 @@ _ALIKE = 0.01  # Dundurs' beta that counts as zero
 _DEEPEST = 2.0  # displacement over clearance up to which Hu et al. compare their law with finite elements
 
 
-def _deepest(joint: LawJoint) -> float:
-    return _DEEPEST * joint.clearance
-
-
 def _calibrated(joint: LawJoint, delta: Array) -> LawState:
     found = calibrated(joint)
     known = replace(joint, k=found.k, c=found.c if math.isfinite(found.c) else 1.0)
@@ -58,12 +54,13 @@ def _half_spaces(A: float, q: float, hertz: bool = True) -> dict[str, Any]:
     return {"state": state, "limit": lambda joint: elastic.turning_point(joint, A, q), **gives}
 
 
-_CHORD: dict[str, Any] = {"limit": _deepest, "unfit": _thick}
+_DEEP: dict[str, Any] = {"limit": lambda joint: _DEEPEST * joint.clearance}
+_CHORD = {**_DEEP, "unfit": _thick}
 _OF_LOAD = {"gives": ("pressure", "contact angle")}
 _FUNCTIONS: dict[str, dict[str, Any]] = {
     "calibrated": {
         "state": _calibrated,
-        "limit": _deepest,
+        **_DEEP,
         "unfit": lambda joint: calibrated(joint).outside,
         "needs": ("plane", "nu"),
         "plastic": True,

@@ -53,10 +53,8 @@ _SHORT = 0.99  # of the largest load of the sweep, that a case must have reached
 
 
 def fit_case(refined: Refined, load_range: tuple[float, float], name: str) -> dict[str, Any]:
-    """Fit k and c to P(delta) of a joint, over ``load_range`` in clearances: a case called ``name``.
-
-    Raises `InputError` where the range or the steps do not allow a fit.
-    """
+    """Fit k and c to P(delta) of a joint, over ``load_range`` in clearances: a case ``name``. Raises `InputError`
+    where the range or the steps do not allow a fit."""
     run = refined.run
     if run.scene.pin.whole:
         raise InputError(f"{run.name}: pin.whole = true does not fit: k and c of a sweep are those of half a pin.")
