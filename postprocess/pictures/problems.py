@@ -54,7 +54,8 @@ def contact_panel(axes: Any, run: Run) -> None:
     """Mean contact pressure of each facet at the last step, over the angle where all surfaces are arcs."""
     probes = [run.probe(name, "facet_pressure") for name in run.contact()]
     draw_probes(axes, probes, [probe.place for probe in probes])
-    axes.set(title=f"contact pressure, step {run.steps}", ylim=(0, None))
+    pressure = f"pressure [{run.scene.units.stress}]"
+    axes.set(title=f"contact pressure, step {run.steps}", ylabel=pressure, ylim=(0, None))
 
 
 def draw_probes(axes: Any, probes: list[Probe], labels: list[str]) -> None:

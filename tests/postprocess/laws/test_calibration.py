@@ -53,7 +53,7 @@ def test_the_error_of_k_is_that_of_a_straight_line():
     assert found.k.error == pytest.approx(np.sqrt(((y - k * x) ** 2).sum() / 19 / (x @ x)), rel=1e-6)
     off, r2 = k * x / y - 1, 1 - ((y - k * x) ** 2).sum() / ((y - y.mean()) ** 2).sum()
     quality = (r2, np.sqrt((off**2).mean()), max(off, key=abs), 20)
-    assert found.quality == pytest.approx(quality, rel=1e-6)
+    assert found.quality == pytest.approx(quality, rel=1e-9)
 
 
 @pytest.mark.parametrize("c", [None, 1.3])
