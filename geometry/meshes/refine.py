@@ -40,7 +40,9 @@ def refined(mesh: PlaneMesh, times: int = 0, order: int | None = None, circles: 
         if off.max() > _OFF_CIRCLE * circle.radius:
             x, y = mesh.x[nodes[off.argmax()]]
             said = f"the node ({x:g}, {y:g}) of the facet set {circle.facets!r} is {off.max():.3g} off its circle"
-            raise ValueError(f"{said}, whose centre or radius {circle.radius:g} must be wrong")
+            said += f", whose centre or radius {circle.radius:g} must be wrong"
+            small = np.ptp(mesh.x[nodes], axis=0).max() < circle.radius / 100
+            raise ValueError(f"{said}; or is the mesh in metres? Then give mesh.scale = 1000" if small else said)
 
     def settled(mesh: PlaneMesh) -> PlaneMesh:
         return on_circles(mesh, circles).centred() if circles else mesh

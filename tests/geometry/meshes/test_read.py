@@ -315,8 +315,14 @@ def test_a_mesh_is_gathered_as_it_was_read(comm, deck):
 
 def test_wrong_circles_and_orders_are_refused(comm, deck):
     path = deck()
-    with pytest.raises(ValueError, match=r"node \(2, 0\) of the facet set 'floor' is 1.8 off its circle"):
+    with pytest.raises(
+        ValueError, match=r"node \(2, 0\) of the facet set 'floor' is 1.8 off its circle, .* must be wrong$"
+    ):
         read_mesh(path, comm, circles=[Circle("floor", (0.5, 1.0), 1e-3)])
+    with pytest.raises(
+        ValueError, match=r"radius 1000 must be wrong; or is the mesh in metres. Then give mesh.scale = "
+    ):
+        read_mesh(path, comm, circles=[Circle("floor", (0.0, 0.0), 1e3)])
     with pytest.raises(ValueError, match=r"no facet set 'flor' .did you mean 'floor'"):
         read_mesh(path, comm, circles=[Circle("flor", (0.5, 1.0), 1.0)])
     with pytest.raises(ValueError, match="of order 2, which cannot be lowered to 1"):
