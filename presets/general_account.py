@@ -49,7 +49,7 @@ class GeneralAccount:
             self.system = System(problem, timer=timer)
             require_mirrored(scene, self.system)
             if scene.mesh.shape is None:
-                require_facing(self.system)
+                self._warnings += require_facing(self.system)
         self._supports = list(dict.fromkeys(s.name for s in problem.supports if s.name not in self.system.drive_names))
 
     def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:

@@ -32,10 +32,9 @@ def check(scene: ProblemScene, problem: Problem) -> list[str]:
     smooth = [part for part in scene.interaction if part.law != "tied"]
     pairs += [[*part.surfaces, *([part.rigid.radius] if part.rigid else [])] for part in smooth]
     warnings = check_mesh(mesh, cells, pairs, overlap, in_mm)
-    whole, failure = gathered(mesh), ""
+    whole = gathered(mesh)
     owner = {name: problem.body_of(name).name for part in scene.interaction for name in part.surfaces}
-    if whole is not None:
-        failure = next(_loose(scene, whole, cells, owner), "")
+    failure = next(_loose(scene, whole, cells, owner), "") if whole is not None else ""
     if failure := mesh.mesh.comm.bcast(failure):
         raise ValueError(failure)
     return warnings
@@ -67,14 +66,18 @@ def _loose(scene: ProblemScene, whole: PlaneMesh, cells: dict[str, str], owner: 
                 held[owner[part.surfaces[-1]]].append((middle, direction))
             else:
                 links.append((owner[part.surfaces[0]], owner[part.surfaces[1]], middle, direction))
-    for body, motions in free_motions(held, links).items():
+    moves = free_motions(held, links)
+    for body, motions in moves.items():
         if free := [motion for motion in motions if motion != "rotation" or body not in owner.values()]:
-            yield f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a [[support]]"
+            others = [repr(other) for other, its in moves.items() if other != body and not {*free}.isdisjoint(its)]
+            where = f" to it, or to a body that it touches: {', '.join(others)}" if others else ""
+            yield f"nothing holds the body {body!r}: it is free in {' and '.join(free)}; add a [[support]]{where}"
 
 
-def require_facing(system: System) -> None:
-    """Raise ValueError where surfaces of an interaction as drawn do not face each other, or a tie has nothing to tie.
-    Collective."""
+def require_facing(system: System) -> list[str]:
+    """Warnings of overlaps that are not drawn. Collective; raises ValueError where surfaces of an interaction as drawn
+    do not face each other, or a tie has nothing to tie."""
+    warnings: dict[str, str] = {}
     for interface in system.contact.interfaces:
         part = interface.interaction
         for pair in interface.pairs:
@@ -87,6 +90,10 @@ def require_facing(system: System) -> None:
                 raise ValueError(f"{said} lies up to {-lowest:g} behind the opposite one: they must face each other")
             if nearest > allowed and not pair.law.slides:
                 raise ValueError(f"{said} is nowhere near the one that it is tied to")
+            if part.overlap and -part.overlap / 2 < lowest < np.inf:
+                drawn = f"drawn {abs(lowest):.3g} {'apart' if lowest >= 0 else 'deep in each other'}"
+                warnings[part.name] = f"the surfaces of {part.name!r} are {drawn}, but its overlap is {part.overlap:g}"
+    return [*warnings.values()]
 
 
 def _nodes(whole: PlaneMesh, name: str, of_cells: bool = False) -> np.ndarray:

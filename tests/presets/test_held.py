@@ -52,14 +52,17 @@ def test_two_squares_are_no_fault(squares):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"support": []}, "nothing holds the body 'lower': it is free in x; add"),
+        (
+            {"support": []},
+            "'lower': it is free in x; add a ..support.. to it, or to a body that it touches: 'upper'",
+        ),
         (
             {"support": [{"name": "base", "on": "lower b", "fixed": ["y"]}]},
             "nothing holds the body 'lower': it is free in x",
         ),
         (
             {"support": [{"name": "base", "on": "lower b", "fixed": ["x", "y"]}]},
-            "nothing holds the body 'upper': it is free in x; add a ..support",
+            "nothing holds the body 'upper': it is free in x; add a ..support...$",
         ),
         ({"body": [{"name": "lower"} | STEEL]}, "the facet set .upper .. is of no body; is one missing.$"),
         ({"interaction": [{"name": "c", "surfaces": ["lower t", "upper bb"]}]}, "'upper bb' .did you mean 'upper b'"),
@@ -86,6 +89,17 @@ def test_a_hinge_does_not_hold_a_rotation(squares, turned):
     else:
         with pytest.raises(InputError, match="nothing holds the body 'lower': it is free in rotation"):
             account(squares, **given)
+
+
+def test_an_overlap_that_is_not_drawn_is_told(squares):
+    """Here with a disc above the upper square; drawn as it says, it is not."""
+    disc = {"name": "disc", "surfaces": ["upper t"], "rigid": {"centre": [5.0, 20020.05], "radius": 20000.0}}
+    load = [{"name": "press", "on": "disc", "direction": "y", "displacement": -0.1}]
+    tie = {"name": "contact", "surfaces": ["lower t", "upper b"], "law": "tied"}
+    (said,) = account(squares, interaction=[tie, disc | {"overlap": 0.01}], load=load).warnings()
+    assert said == "the surfaces of 'disc' are drawn 0.05 apart, but its overlap is 0.01"
+    disc["rigid"]["centre"][1] = 20019.99
+    assert account(squares, interaction=[tie, disc | {"overlap": 0.01}], load=load).warnings() == []
 
 
 def test_a_file_that_is_not_there():
