@@ -73,7 +73,8 @@ class Progress:
         if self.by_mesh:
             self.print(f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value")
             costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
-            self.print(f" mesh  elements/R  growth  {costs}")
+            sizes = "elements/R" if isinstance(scene, Scene) or scene.mesh.shape else "size/file"
+            self.print(f" mesh  {sizes:>10s}  growth  {costs}")
 
     def show(self, load: float, iterations: int) -> None:
         """Show on a terminal the load that was tried last, and the Newton iterations so far."""

@@ -100,9 +100,9 @@ class ProblemFamily:
         return self.scene.model_copy(update={"mesh": mesh} | chosen(self.scene, substeps))
 
     def sizes(self, scene: Any) -> tuple[float, float]:
-        """Element size and growth of ``scene``; of a file, the size over that of its own cells."""
+        """Element size over R and growth of ``scene``; of a file, the size over that of its own cells."""
         shape = scene.mesh.shape
-        return (0.5**scene.mesh.refine, 0.0) if shape is None else (shape.h, shape.growth)
+        return (0.5**scene.mesh.refine, 0.0) if shape is None else (shape.h / shape.radius, shape.growth)
 
     def curve(self, steps: Sequence[Record]) -> list[float]:
         """The force of the last load at every step, or its displacement where it is a force or a pressure."""

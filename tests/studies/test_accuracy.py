@@ -15,12 +15,13 @@ from archord.benchmarks.case import Case, paper_joint
 from archord.benchmarks.cost.work_precision_codes import CASES
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
+from archord.progress import Progress
 from archord.scene import geometry as scene_geometry
 from archord.scene.errors import InputError
-from archord.scene.file import load_scene, parse_scene, resolved
+from archord.scene.file import load_scene, parse_any, parse_scene, resolved
 from archord.studies import mesh_family
 from archord.studies.accuracy import solve_to_accuracy
-from archord.studies.mesh_family import MeshFamily
+from archord.studies.mesh_family import MeshFamily, ProblemFamily
 from tests.output.run_files import accepted_steps, same_run
 
 
@@ -42,6 +43,18 @@ def accurate(scene, folder, comm=MPI.COMM_SELF, **hooks):
 def known_force(case):
     """P at 2 dR in units of E* R, from meshes of up to 400 thousand dofs (docs/work_precision.md)."""
     return CASES[case]["current"]["P"][0]
+
+
+@pytest.mark.parametrize(("shape", "heading", "size"), [(True, "elements/R", 0.04), (False, "size/file", 1.0)])
+def test_sizes_of_general_meshes_have_their_heading(capsys, shape, heading, size):
+    """Those of shapes are over R as those of joints, those of files over the file's."""
+    mesh = {"shape": {"kind": "lug", "radius": 5.0, "clearance": 0.1, "width": 20.0}} if shape else {"file": "x.msh"}
+    press = {"name": "press", "on": "flat", "direction": "x", "displacement": 0.1}
+    data = {"mesh": mesh, "body": [{"name": "lug", "E": 1.0, "nu": 0.3}], "load": [press]}
+    scene = parse_any(data | {"analysis": {"accuracy": 0.01}})
+    Progress(scene, silent=False)
+    assert f" mesh  {heading:>10s}  growth" in capsys.readouterr().out
+    assert ProblemFamily(scene).sizes(scene)[0] == pytest.approx(size)
 
 
 @pytest.fixture(scope="module")
