@@ -110,9 +110,12 @@ def _joint(
     if "nu" in values:
         values["pin_nu"] = None  # one for both
     if scene is not None:
-        from archord.scene.file import load_joint
+        from archord.scene.file import load_scene
+        from archord.scene.scene import Scene
 
-        loaded = load_joint(scene, overrides)
+        loaded = load_scene(scene, overrides)
+        if not isinstance(loaded, Scene):
+            raise InputError(f"{scene}: must be the scene of a [joint]; this is a general one.")
         units, thick = loaded.units.model_dump(), loaded.analysis.thickness
         units["force"] = loaded.units.force_of(thick)
         units["stiffness"] = units["stress"] if thick is None else f"{units['force']}/{units['length']}"

@@ -10,6 +10,8 @@ from typing import Any, get_args
 from archord.scene.keys import Fault, Section, toml_value
 
 _MOST_SENTENCES = 20
+_ELSEWHERE = {"lug.pin": "pin.whole", "bushing.pin": "pin.whole", "bushing.rings": "[[sleeve]] and [housing]"}
+_ELSEWHERE |= {"load.steps": "path.steps"}
 _KINDS = {"number", "list", "law", "lug", "bushing", "joint"}  # of values, in pydantic's places
 _PHRASES = {
     "missing": "is missing",
@@ -39,7 +41,10 @@ def in_sentences(
     errors: list[Any], data: dict[str, Any], model: type[Section], source: str, origin: dict[str, str]
 ) -> str:
     """The first ``errors`` of checking ``data`` against ``model``, a line each; ``origin`` says which keys are not from
-    ``source``, and where they are from."""
+    ``source``, and where they are from. Of a misspelled key it is not said that it is missing, too."""
+    unknown = [error["loc"] for error in errors if error["type"] == "extra_forbidden"]
+    meant = {(*place[:-1], _known_keys(model, place)["near"]) for place in unknown}
+    errors = [error for error in errors if error["type"] != "missing" or error["loc"] not in meant]
     return "\n".join(_sentence(error, data, model, source, origin) for error in errors[:_MOST_SENTENCES])
 
 
@@ -67,8 +72,7 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
     if isinstance(fault, Fault):
         said = str(fault)
     else:
-        if error["type"] == "extra_forbidden":
-            context |= _known_keys(model, [part for part in error["loc"] if isinstance(part, str)])
+        context |= _known_keys(model, error["loc"])
         kind = "string_too_short" if context.get("min_length") == 1 else error["type"]
         said = _PHRASES.get(kind, "{msg}").format(**context, msg=error["msg"], name=key)
     where = next((by for name, by in origin.items() if f"{name}.".startswith(f"{key}.")), source)
@@ -77,17 +81,18 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
     return f"{where}: {key}{shown}{entry} {said}."
 
 
-def _known_keys(model: Any, place: list[str]) -> dict[str, str]:
-    """What may stand in the ``place`` of an unknown key or section, and which of it may be meant."""
+def _known_keys(model: Any, loc: tuple[str | int, ...]) -> dict[str, str]:
+    """What may stand in the place ``loc`` of an unknown key or section, and which of it may be meant."""
     of_kind: dict[str, Any] = {}
+    place = [part for part in loc if isinstance(part, str)]
     for part in place[:-1]:
         if part in model.model_fields:
             of_kind = _sections(model.model_fields[part].annotation)
         model = of_kind.get(part, next(iter(of_kind.values()), model))
     known = list(model.model_fields)
-    near = difflib.get_close_matches(place[-1], known, 1)
-    hint = f"did you mean {near[0]}? " if near else ""
-    return {"known": ", ".join(known), "kind": "Sections" if len(place) == 1 else "Keys", "hint": hint}
+    near = _ELSEWHERE.get(".".join(place)) or "".join(difflib.get_close_matches(place[-1], known, 1))
+    hint = f"did you mean {near}? " if near else ""
+    return {"known": ", ".join(known), "kind": "Sections" if len(place) == 1 else "Keys", "hint": hint, "near": near}
 
 
 def _sections(kind: Any) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -46,14 +46,6 @@ def parse_any(data: dict[str, Any], source: str = "scene", origin: Mapping[str, 
     return scene(source, origin, **data)
 
 
-def load_joint(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
-    """As `load_scene`, of a scene that must be that of a joint."""
-    scene = load_scene(path, overrides)
-    if not isinstance(scene, Scene):
-        raise InputError(f"{path}: must be the scene of a [joint]; this is a general one.")
-    return scene
-
-
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     """Read and check the scene file ``path``, with ``overrides`` like ``"joint.clearance=0.01"`` on top.
 
@@ -63,7 +55,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     if "base" in data and "joint" not in data:
         raise InputError(f"{path}: is a sweep, not a scene; archord sweep solves it.")
     _give_way(data, overrides)
-    origin = {override_key(data, o): f"--set {o}" for o in sorted(overrides, key=set_later)}
+    origin = {override_key(data, o): f"--set {o}" for o in in_order(overrides)}
     read_targets(data, Path(path))
     find_mesh(data.get("mesh"), Path(path).parent)
     return parse_any(data, str(path), origin)
@@ -75,9 +67,12 @@ def find_mesh(mesh: Any, folder: Path) -> None:
         mesh["file"] = str((folder / mesh["file"]).absolute())
 
 
-def set_later(key: str) -> bool:
-    """Whether ``key`` is set after a rigid pin and materials, which drop what the file says, not other overrides."""
-    return not key.partition("=")[0].strip().endswith((".rigid", ".material"))
+def in_order(overrides: Iterable[str]) -> list[str]:
+    """The last of ``overrides`` of each key: those that drop it come first, then a rigid pin and materials, so that
+    what they drop is what the file says, not another override."""
+    last = {override.partition("=")[0].strip(): override for override in overrides}
+    brought = sorted(last, key=lambda key: not key.endswith((".rigid", ".material")))
+    return sorted((last[key] for key in brought), key=lambda override: not override.rstrip().endswith("="))
 
 
 def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
@@ -149,8 +144,8 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def override_key(data: dict[str, Any], override: str) -> str:
-    """Set one ``a.b=value`` in ``data``, or ``a.NAME.b=value`` in one of its tables (value: TOML, a number, else text;
-    nothing: drop it); returns the key as faults name it. Raises `InputError`."""
+    """Set one ``a.b=value`` in ``data``, or ``a.NAME.b=value`` in a table by its name, or number from 1 (value: TOML, a
+    number, else text; nothing: drop it); returns the key as faults name it. Raises `InputError`."""
     key, sign, text = override.partition("=")
     section, dot, name = key.strip().partition(".")
     value = _value(text.strip()) if text.strip() else None
@@ -160,13 +155,14 @@ def override_key(data: dict[str, Any], override: str) -> str:
             raise InputError(f"--set {override!r}: must read section.key=value, like joint.clearance=0.01.")
         put(data, section, name, value, f"--set {override}")
         return f"{section}.{name}"
-    known = {str(table.get("name")): table for table in reversed(tables) if isinstance(table, dict)}
+    known = {str(t.get("name", k)): t for k, t in reversed([*enumerate(tables, 1)]) if isinstance(t, dict)}
     part, _, name = name.rpartition(".")
     if not (sign and name and part in known):
-        names = ", ".join(reversed(known))
-        raise InputError(f"--set {override!r}: must read {section}.NAME.key=value, with a name among {names}.")
+        example = f"{section}.{['1', *known][-1]}.{name}={text}"
+        said = f"must read {section}.NAME.key=value, like {example!r}, with a name among"
+        raise InputError(f"--set {override!r}: {said} {', '.join(reversed(known))}.")
     put({section: known[part]}, section, name, value, override)
-    return f"{section} {json.dumps(part)}.{name}"
+    return f"{section} {json.dumps(part) if 'name' in known[part] else part}.{name}"
 
 
 def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) -> None:

@@ -11,14 +11,13 @@ from archord.scene.keys import Positive, Section, given, key, require
 
 _WIDEST = 1e6  # block_size over R
 _MOST_CELLS = 1e6  # triangles: some 10 GB, and minutes for a mesh generator that is not parallel
-Model = Literal["block", "ring"]
 Angle = Annotated[float, Field(gt=0, lt=math.pi / 2)]
 
 
 class JointGeometry(Section):
     """The pin of radius ``R`` in a hole of radius ``R + dR``, and the mesh of both."""
 
-    model: Model = key(
+    model: Literal["block", "ring"] = key(
         "block: the paper's quarter joint; ring: a ring and half a pin, loaded at its core (Persson)", default="block"
     )
     radius: float = key("radius R of the pin", "length", gt=0, example=10.0)

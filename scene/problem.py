@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from itertools import product
 from typing import Any, Literal
 
@@ -51,9 +50,10 @@ class ProblemScene(Checked):
                 alike = [p for p in getattr(self, other) if p.name == part.name and p is not part]
                 said = f"must not be the name of {'another' if other == section else 'a'} {other}, too"
                 require(not alike, (section, part.name, "name"), said)
-        used = Counter(name for i in self.interaction for name in i.surfaces)
-        many = [name for name, count in used.items() if count > 1]
-        require(not many, "interaction", f"uses the facet sets {many} more than once")
+        used: dict[str, str] = {}
+        for part, name in [(i, name) for i in self.interaction for name in i.surfaces]:
+            place, other = ("interaction", part.name, "surfaces"), used.setdefault(name, part.name)
+            require(other == part.name, place, f"must not name {name!r}, which {other!r} has already")
         self._directions()
         require_solids({("body", name): body for name, body in self.solids.items()})
         self.require_open(STEPS)
@@ -75,9 +75,10 @@ class ProblemScene(Checked):
             require(before is None or on not in couplings | discs, at, said)
             seen[on, freedom] = f"the {section} {name!r}"
             require(section == "load" or on not in discs, (section, name, "on"), "must not be a rigid disc")
-        for load in self.load:
-            free = load.kind != "pressure" or load.on not in couplings | discs
-            require(free, ("load", load.name, "on"), "must be a facet set for a pressure")
+        for load in (load for load in self.load if load.kind == "pressure"):
+            place, held = ("load", load.name, "on"), {(load.on, "x"), (load.on, "y")} <= seen.keys()
+            require(load.on not in couplings | discs, place, "must be a facet set for a pressure")
+            require(not held, place, "must not be held in x and y: a pressure moves nothing there")
 
     @property
     def n_stages(self) -> int:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
 from archord.scene.geometry import JointGeometry
-from archord.scene.keys import Positive, Section, key, require
+from archord.scene.keys import Pair, Positive, Section, key, require
 from archord.scene.scene import Checked, Scene, plain
 from archord.scene.sections import Loading, Modelling, Pin, ProblemOutput, Solid, StepCounts, Stepping, Targets, Units
 
 _THINNEST, _DEEPEST, _FARTHEST = 0.02 * (1 - 1e-9), 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
 _MATERIAL = {*Solid.model_fields}
-Radii = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 PinPart = Literal["half", "whole", "none"]
 
 
@@ -24,7 +23,6 @@ class Shape(Section):
     radius: float = key("radius R of the pin", "length", example=10.0, ge=1e-30, le=1e30)
     element_size: Positive | None = key("edge length of elements on the arcs; 0.04 R if absent", "length", other=0.4)
     growth: float = key("growth of the element size per unit of distance from the arcs", default=0.25, ge=0.01, le=2)
-    pin: PinPart = key("part of the pin that is meshed; [pin] says it in a preset", default="half", other="whole")
 
     @model_validator(mode="after")
     def _mesh(self):
@@ -50,7 +48,6 @@ class Lug(Shape):
     length: Positive | None = key("from the hole's centre to the clamp; 1.5 W if absent", "length", default=None)
     end: Literal["round", "square"] = key("the loaded end: an arc of radius W/2, or straight", default="round")
     half: bool = key("model the half y >= 0 alone", default=True)
-    kind: Literal["lug"] = "lug"
 
     @model_validator(mode="after")
     def _lug(self) -> Lug:
@@ -75,17 +72,17 @@ class Lug(Shape):
         return super().arguments() | lengths
 
 
+class LugShape(Lug):
+    """A lug with what a preset says elsewhere."""
+
+    pin: PinPart = "half"
+    kind: Literal["lug"] = "lug"
+
+
 class Bushing(Shape):
     """A pin in sleeves in a housing that is held at its outer edge."""
 
-    rings: list[Radii] = key("inner and outer radii from the pin outward", "length", default=[])
     touching: bool = key("bodies touch on the load axis at first, as under a force, or are concentric", default=False)
-    kind: Literal["bushing"] = "bushing"
-
-    @model_validator(mode="after")
-    def _bushing(self) -> Bushing:
-        self.check(self.rings, ["rings"] * len(self.rings))
-        return self
 
     def check(self, rings: list[list[float]], names: list[str]) -> None:
         """Raise `Fault`, of the keys ``names``, for ``rings`` that do not fit."""
@@ -98,10 +95,23 @@ class Bushing(Shape):
             edge = outer
 
 
+class BushingShape(Bushing):
+    """A bushing with what a preset says elsewhere."""
+
+    rings: list[Pair] = Field(default=[], description="inner and outer radii from the pin outward")
+    pin: PinPart = "half"
+    kind: Literal["bushing"] = "bushing"
+
+    @model_validator(mode="after")
+    def _bushing(self) -> BushingShape:
+        self.check(self.rings, ["rings"] * len(self.rings))
+        return self
+
+
 class JointShape(JointGeometry):
     """The paper's joint: half a block or a ring with a pin."""
 
-    pin: PinPart = key("part of the pin that is meshed; [pin] says it in a preset", default="half", other="whole")
+    pin: PinPart = "half"
     core_radius: float = key("ring: radius over R of the core that the force acts on", default=0.1)
     kind: Literal["joint"] = "joint"
 
@@ -147,17 +157,17 @@ class Preset(Checked):
         require(fits, name, "needs pin.whole = true, as half a pin cannot be pressed in")
 
     def _pulled(
-        self, shape: Shape, solids: Mapping[str, Solid], held: str, surfaces: list[str], gaps: list[float]
+        self, shape: dict[str, Any], solids: Mapping[str, Solid], held: str, surfaces: list[str], gaps: list[float]
     ) -> dict[str, Any]:
         """The general scene of ``solids``, from the pin outward, with the edge ``held``; of their ``surfaces`` the
         first faces the second at the first of the ``gaps``, the third the fourth, ..."""
-        half, touching = (getattr(shape, name, True) for name in ("half", "touching"))
+        half, touching = (shape.get(name, True) for name in ("half", "touching"))
         rigid, names, contacts = self.pin.rigid, ["pin", *solids], list[dict[str, Any]]()
         for k, gap in enumerate(gaps):
             facing = {"name": f"{names[k]} in {names[k + 1]}", "surfaces": surfaces[2 * k : 2 * k + 2]}
             contacts.append(facing | {"overlap": max(-gap, 0.0)})
         if rigid:
-            disc = {"centre": [touching * sum(max(gap, 0.0) for gap in gaps), 0.0], "radius": shape.radius}
+            disc = {"centre": [touching * sum(max(gap, 0.0) for gap in gaps), 0.0], "radius": shape["radius"]}
             contacts[0] |= {"surfaces": [surfaces[1]], "rigid": disc}
         supports = [{"name": held, "on": held, "fixed": ["x", "y"]}]
         if half or not rigid:
@@ -165,7 +175,7 @@ class Preset(Checked):
         place = contacts[0]["name"] if rigid else {"diameter": "flat"}.get(self.load.at, "centre")
         pull = {"name": "pull", "on": place, "direction": "x", self.load.kind: getattr(self.load, self.load.kind)}
         parts = {"interaction": contacts, "support": supports, "load": [pull], "path": {"steps": self.load.steps}}
-        return _general(self, shape.arguments(), 2 if half else 1, solids, **parts)
+        return _general(self, shape, 2 if half else 1, solids, **parts)
 
 
 class LugScene(Preset):
@@ -181,7 +191,8 @@ class LugScene(Preset):
 
     def general(self) -> dict[str, Any]:
         """The general scene that it stands for."""
-        return self._pulled(self.lug, {"lug": self.plate}, "clamp", ["pin", "hole"], [self.lug.clearance])
+        shape = self.lug.arguments() | {"kind": "lug"}
+        return self._pulled(shape, {"lug": self.plate}, "clamp", ["pin", "hole"], [self.lug.clearance])
 
 
 class BushingScene(Preset):
@@ -207,8 +218,8 @@ class BushingScene(Preset):
         sleeves = {f"sleeve {k}": sleeve for k, sleeve in enumerate(self.sleeve, 1)}
         surfaces = ["pin", *(f"{name} {side}" for name in sleeves for side in ("inside", "outside")), "bore"]
         touching = self.bushing.touching or self.load.force is not None
-        shape = self.bushing.model_copy(update={"rings": self._rings, "touching": touching})
-        inner = [shape.radius, *(outer for _, outer in self._rings)]
+        shape = self.bushing.arguments() | {"kind": "bushing", "rings": self._rings, "touching": touching}
+        inner = [self.bushing.radius, *(outer for _, outer in self._rings)]
         gaps = [bore - edge for edge, (bore, _) in zip(inner, self._rings, strict=False)]
         return self._pulled(shape, sleeves | {"housing": self.housing}, "outer edge", surfaces, gaps)
 

@@ -21,13 +21,13 @@ from archord.scene.errors import InputError
 from archord.scene.faults import shortened
 from archord.scene.file import (
     ALTERNATIVES,
+    in_order,
     override_key,
     parse_scene,
     put,
     read_targets,
     read_toml,
     resolved,
-    set_later,
 )
 from archord.scene.keys import Section, toml_value
 from archord.scene.scene import Scene
@@ -118,8 +118,8 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
     ``"joint.radius=2"`` on top and the targets of its load.path, and other paths are absolute. It is not checked, as it
     may be whole only with what is varied. Raises `InputError` with one sentence per fault."""
     data = read_toml(path)
-    if "base" not in data and "joint" in data:
-        raise InputError(f"{path}: is a scene, not a sweep; solve it by archord solve, or name it as a base.")
+    if "base" not in data and not {"joint", "mesh", "lug", "bushing"}.isdisjoint(data):
+        raise InputError(f"{path}: is a scene, not a sweep; solve it by archord solve, or name a joint as a base.")
     source = path
     if isinstance(data.get("base"), str):
         source = path.parent / data["base"]
@@ -128,7 +128,7 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
         sweep = SweepFile.model_validate(data)
     except ValidationError as error:
         raise InputError("\n".join(_sentence(fault, path) for fault in error.errors())) from None
-    for override in overrides:
+    for override in in_order(overrides):
         override_key(sweep.base, override)
     read_targets(sweep.base, source)
     for table in (*sweep.list_, sweep.zip, sweep.grid):
@@ -284,7 +284,7 @@ def run_name(scene: Scene) -> str:
 def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:
     """The base with ``overrides``, checked. Raises `InputError`."""
     data = copy.deepcopy(base)
-    for key in sorted(overrides, key=set_later):
+    for key in in_order(overrides):
         section, _, name = key.partition(".")
         put(data, section, name, None if overrides[key] == ABSENT else overrides[key], key)
     read_targets(data, path)

@@ -118,6 +118,15 @@ def test_an_interference_has_a_stage_of_its_own():
         ("load.0.displacement", {"a": 1}, 'load "press".displacement must be a number'),
         ("path.steps", [0, 1], "path.steps = .0, 1.: entry 1 must be at least 1"),
         ("load.0.direction", None, 'load "press".direction is missing'),
+        ("load.1.force", "4 kN", 'load "side".force = "4 kN" must be a number.$'),
+        ("load.1.force", float("nan"), 'load "side".force = NaN must be a finite number.$'),
+        ("load.1.steps", 4, 'load "side".steps = 4 is not a known key; did you mean path.steps. '),
+        ("load.1", {"name": "p", "on": "clamp", "pressure": 1.0}, 'load "p".on = .clamp. must not be held in x and y'),
+        (
+            "interaction",
+            [{"name": "a", "surfaces": ["pin", "hole"]}, {"name": "b", "surfaces": ["bore", "pin"]}],
+            'interaction "b".surfaces = .* must not name .pin., which .a. has already.$',
+        ),
         ("load.1.direction", "z", 'load "side".direction = "z" must be'),
         ("interaction.0.surfaces", ["pin"], 'interaction "contact".surfaces = ."pin". must name two facet sets'),
         ("interaction.0.integrated", "end", 'interaction "contact".integrated = "end" must be one of the surfaces'),
@@ -136,6 +145,17 @@ def test_a_fault_is_said_in_a_sentence(place, value, said):
     assert len(str(fault.value).splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    ("section", "key", "typed"), [("body", "E", "Ee"), ("load", "on", "onn"), ("mesh", "file", "fil")]
+)
+def test_a_misspelled_key_is_one_fault(section, key, typed):
+    data = lug()
+    table = data[section][0] if isinstance(data[section], list) else data[section]
+    table[typed] = table.pop(key)
+    with pytest.raises(InputError, match=rf"^scene: {section}[^\n]*{typed}[^\n]* did you mean {key}\?[^\n]*$"):
+        parse_any(data)
+
+
 def test_what_is_loaded_twice_is_refused():
     twice = lug()
     twice["load"].append(twice["load"][1] | {"name": "again"})
@@ -150,7 +170,9 @@ def test_a_scene_loads_as_it_is_resolved(tmp_path):
     assert scene.body[1].yield_stress == 250
     assert scene.mesh.file == str(tmp_path / "lug.msh")
     assert parse_any(tomllib.loads(resolved(scene))) == scene
-    with pytest.raises(InputError, match=r"must read body.NAME.key=value, with a name among pin, lug"):
+    with pytest.raises(
+        InputError, match=r"must read body.NAME.key=value, like .body.pin.E=1., with a name among pin, lug"
+    ):
         load_scene(path, ["body.plate.E=1"])
 
 

@@ -4,11 +4,12 @@ import copy
 import tomllib
 
 import pytest
+import tomli_w
 from mpi4py import MPI
 
 from archord.presets.problem import general_problem
 from archord.scene.errors import InputError
-from archord.scene.file import parse_any, resolved
+from archord.scene.file import load_scene, parse_any, resolved
 from archord.scene.problem import ProblemScene
 from archord.solver.system import System
 
@@ -109,6 +110,20 @@ def test_radii_of_a_bushing_make_its_fits():
         (LUG, "plate", None, "plate is missing."),
         (LUG, "block", STEEL, "block is not a known key"),
         (LUG, "pin", {"rigid": True, "whole": True}, "pin.whole = true is not for a rigid pin."),
+        (
+            LUG,
+            "lug.pin",
+            "whole",
+            "is not a known key; did you mean pin.whole? Keys are radius, element_size, growth, cl",
+        ),
+        (LUG, "lug.kind", "lug", 'lug.kind = "lug" is not a known key; Keys are '),
+        (BUSHING, "bushing.pin", "whole", "did you mean pin.whole?"),
+        (
+            BUSHING,
+            "bushing.rings",
+            [[1.0, 2.0]],
+            "did you mean [[sleeve]] and [housing]? Keys are radius, element_size, ",
+        ),
         (BUSHING, "sleeve.0.bore", None, "sleeve 1.bore is missing."),
         (BUSHING, "sleeve.0.outer", 10.1, "must have a wall of at least 0.02 R."),
         (BUSHING, "sleeve.0.bore", 9.9, "needs pin.whole = true, as half a pin cannot be pressed in."),
@@ -124,6 +139,27 @@ def test_faults_are_said_in_one_sentence(data, place, value, said):
     assert said in str(error.value)
     assert str(error.value).startswith("scene: ")
     assert len(str(error.value).splitlines()) == 1
+
+
+def test_sleeves_are_set_by_number(tmp_path):
+    path = tmp_path / "bushing.toml"
+    path.write_text(tomli_w.dumps(BUSHING))
+    assert load_scene(path, ["sleeve.1.E=2.0", "sleeve.1.outer=14.01"]).body[1].E == 2.0
+    for override, said in (
+        ("sleeve.2.E=1", "'sleeve.2.E=1': must read .* like 'sleeve.1.E=1', with a name among 1.$"),
+        ("sleeve.1.E=-1", "sleeve.1.E=-1: sleeve 1.E must be greater than 0.$"),
+    ):
+        with pytest.raises(InputError, match=f"^--set {said}"):
+            load_scene(path, [override])
+
+
+@pytest.mark.parametrize(
+    "overrides", [["load.force=2e3", "load.displacement="], ["load.displacement=", "load.force=2e3"]]
+)
+def test_a_load_is_replaced_in_any_order(tmp_path, overrides):
+    path = tmp_path / "lug.toml"
+    path.write_text(tomli_w.dumps(LUG))
+    assert load_scene(path, overrides).load[0].force == 2000.0
 
 
 @pytest.mark.parametrize(

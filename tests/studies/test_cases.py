@@ -221,6 +221,9 @@ def test_set_changes_the_base_but_nothing_that_varies(tmp_path):
 def test_scenes_and_sweeps_are_told_apart(tmp_path):
     with pytest.raises(InputError, match=r"\A.* is a scene, not a sweep; solve it by archord solve.*\Z"):
         read_sweep(ELASTIC)
+    for name in ("lug", "bushing"):
+        with pytest.raises(InputError, match=r"\A[^\n]*: is a scene, not a sweep; [^\n]*\.\Z"):
+            read_sweep(SCENES / f"{name}.toml")
     sweep = written(tmp_path, "[grid]\npin.E = [1.0]")
     with pytest.raises(InputError) as told:
         load_scene(sweep)
