@@ -105,7 +105,7 @@ class Report:
         return {
             "newton_iterations": sum(m.iterations for m in self.steps),
             "cutbacks": sum(m.cutbacks for m in self.steps),
-            "factorisations": self.system.factorisations + before.get("factorisations", 0),
+            "factorisations": self.system.equilibrium.tangent.factorisations + before.get("factorisations", 0),
             "residual_evaluations": counts.get("return mapping", 0) + before.get("residual_evaluations", 0),
             "accepted_steps": len(self.steps),
         }

@@ -7,6 +7,7 @@ tangent that changes; without them nothing of it is compiled or stored.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import basix.ufl
 import numpy as np
@@ -21,6 +22,7 @@ from archord.materials.elasticity import mean_stress, von_mises
 from archord.materials.material import Material, Points
 
 Index = npt.NDArray[np.integer]
+_NONE = np.zeros(0, dtype=np.int64)
 
 
 def _voigt(u):
@@ -29,28 +31,23 @@ def _voigt(u):
 
 
 def matrix(
-    V: fem.FunctionSpace, forms: list[fem.Form], extra: tuple[np.ndarray, np.ndarray] | None = None
+    V: fem.FunctionSpace, forms: list[fem.Form], extra: tuple[np.ndarray, np.ndarray] = (_NONE, _NONE)
 ) -> PETSc.Mat:
     """An empty matrix with room for the bilinear ``forms`` of separate bodies and ``extra`` blocks (rows, columns), in
     global block dofs and rows that this rank owns. PETSc gives back what is not written before the first assembly."""
     index_map = V.dofmap.index_map
     n, start = index_map.size_local, index_map.local_range[0]
-    diagonal, off = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    rows, columns = extra
+    slots = [(rows - start, (columns >= start) & (columns < start + n))]  # local rows, and which are in owned columns
     for form in forms:
         pattern = fem.create_sparsity_pattern(form)
         pattern.finalize()
         columns, offsets = pattern.graph
-        remote = np.concatenate([[0], np.cumsum(columns >= n)])
-        total, outside = np.diff(offsets)[:n], np.diff(remote[offsets])[:n]
-        diagonal += total - outside
-        off += outside
-    if extra is not None:
-        rows, columns = extra
-        inside = (columns >= start) & (columns < start + n)
-        diagonal += np.bincount(rows[inside] - start, minlength=n)
-        off += np.bincount(rows[~inside] - start, minlength=n)
-    diagonal, off = np.minimum(diagonal, n), np.minimum(off, index_map.size_global - n)
-    nnz = diagonal.astype(PETSc.IntType), off.astype(PETSc.IntType)
+        owned = columns[: offsets[n]] < n
+        slots.append((np.repeat(np.arange(n), np.diff(offsets[: n + 1])), owned))
+    rows, inside = (np.concatenate(part) for part in zip(*slots, strict=True))
+    room = (rows[inside], n), (rows[~inside], index_map.size_global - n)
+    nnz = [np.minimum(np.bincount(of, minlength=n), most).astype(PETSc.IntType) for of, most in room]
     A = PETSc.Mat().createBAIJ([[2 * n, None]] * 2, bsize=2, nnz=nnz, comm=V.mesh.comm)
     nodes = index_map.local_to_global(np.arange(n + index_map.num_ghosts, dtype=np.int32))
     lgmap = PETSc.LGMap().create(nodes.astype(PETSc.IntType), bsize=2, comm=V.mesh.comm)
@@ -68,36 +65,35 @@ def assemble(A: PETSc.Mat, forms: list[fem.Form], bcs: Sequence[fem.DirichletBC]
         A.assemblyEnd(PETSc.Mat.AssemblyType.FLUSH)
 
 
-class _PlasticBody:
-    """Quadrature data of one plastic body: gradients, weights, points with history."""
+class _BodyPoints:
+    """The integration points of one body: gradients, weights, points with history."""
 
-    def __init__(self, V: fem.FunctionSpace, cells: np.ndarray, material) -> None:
+    def __init__(self, V: fem.FunctionSpace, cells: np.ndarray, material: Material) -> None:
         degree = V.element.basix_element.degree
         X, w = bulk_quadrature(V.mesh.basix_cell(), degree)
         basis = cell_basis(V.mesh, degree, cells, X)
-        self.cells = cells
-        self.dofs = V.dofmap.list[cells]
-        self.gradient, self.point = basis.gradient, basis.point
-        self.weight = basis.measure * w
+        self.cells, self.dofs = cells, V.dofmap.list[cells]
+        self.gradient, self.point, self.weight = basis.gradient, basis.point, basis.measure * w
         self.points = Points(material, self.weight.size)
         self.stress: Array = np.zeros((self.weight.size, 4))
         self.yielding = cells[:0]  # cells that had a point off its elastic tangent at the last update
 
+    def update(self, u: Array) -> Array:
+        """Keep the stress at the nodal displacements ``u``; returns the tangent ``(n q, 3, 3)``."""
+        self.stress, tangent = self.points.update(strain(self.gradient, self.dofs, u).reshape(-1, 3))
+        return tangent
 
-class PointFields:
-    """Stress ``(n, q, 4)``, ``plastic_strain`` ``(n, q, 4)`` and ``peeq`` ``(n, q)`` at the integration points
-    ``coordinates`` ``(n, q, 2)`` of a body's ``cells`` ``(n,)``, which have the ``weight`` ``(n, q)``."""
 
-    def __init__(
-        self, cells: np.ndarray, coordinates: Array, weight: Array, stress: Array, history: Points | None = None
-    ) -> None:
-        n, q = weight.shape
-        self.cells, self.coordinates, self.weight, self.stress = cells, coordinates, weight, stress.reshape(n, q, 4)
-        self.peeq: Array = np.zeros((n, q))
-        self.plastic_strain: Array = np.zeros((n, q, 4))
-        if history is not None:
-            self.peeq = history.peeq.reshape(n, q)
-            self.plastic_strain = getattr(history.trial, "plastic_strain", self.plastic_strain).reshape(n, q, 4)
+class PointFields(NamedTuple):
+    """Fields at the integration points ``coordinates`` ``(n, q, 2)`` of a body's ``cells`` ``(n,)``: ``weight`` and
+    ``peeq`` ``(n, q)``, ``stress`` and ``plastic_strain`` ``(n, q, 4)``."""
+
+    cells: np.ndarray
+    coordinates: Array
+    weight: Array
+    stress: Array
+    plastic_strain: Array
+    peeq: Array
 
 
 def _check_elastic_tangent(material: Material) -> None:
@@ -113,7 +109,8 @@ def _check_elastic_tangent(material: Material) -> None:
 
 class Bulk:
     """Internal forces of all bodies in the displacement space ``V`` (blocked, two components), whose ``cells`` and
-    ``materials`` are given by their tags. ``elastic_forms``, one a body, span the pattern of the matrix."""
+    ``materials`` are given by their tags. ``elastic_forms``, one a body, span the pattern of the matrix; ``plastic`` is
+    whether any body can yield."""
 
     def __init__(self, V: fem.FunctionSpace, cells: Mapping[int, Index], materials: Mapping[int, Material]) -> None:
         self.V, self.materials = V, materials
@@ -124,7 +121,8 @@ class Bulk:
         n_owned = V.mesh.topology.index_map(2).size_local
         self.cells = {tag: cells[tag][cells[tag] < n_owned] for tag in materials}
         u, v = _voigt(ufl.TrialFunction(V)), _voigt(ufl.TestFunction(V))
-        self._plastic = {tag: _PlasticBody(V, self.cells[tag], m) for tag, m in materials.items() if m.yields}
+        self._plastic = {tag: _BodyPoints(V, self.cells[tag], m) for tag, m in materials.items() if m.yields}
+        self.plastic = bool(self._plastic)
         elastic = {}
         for tag, material in materials.items():
             moduli = fem.Constant(V.mesh, np.array(material.elastic_tangent))
@@ -150,11 +148,6 @@ class Bulk:
             assemble(self.stiffness, stiff)
             self.stiffness.assemble()
 
-    @property
-    def plastic(self) -> bool:
-        """Whether any body carries plastic history."""
-        return bool(self._plastic)
-
     def histories(self) -> dict[int, tuple[np.ndarray, Points]]:
         """Cells ``(n,)`` of this rank and their ``n q`` points with history, by the plastic body's tag."""
         return {tag: (body.cells, body.points) for tag, body in self._plastic.items()}
@@ -162,14 +155,12 @@ class Bulk:
     def update(self, u: Array) -> None:
         """Return-map the plastic bodies at the nodal displacements ``u`` ``(n_nodes, 2)`` of this rank."""
         for body in self._plastic.values():
-            eps = strain(body.gradient, body.dofs, u).reshape(-1, 3)
-            body.stress, tangent = body.points.update(eps)
-            n, q = body.weight.shape
+            tangent, (n, q) = body.update(u), body.weight.shape
             sigma = self._sigma.x.array.reshape(-1, q, 3)
             sigma[body.cells] = body.stress[:, [0, 1, 3]].reshape(n, q, 3)
             elastic = body.points.material.elastic_tangent
-            stiffness = elastic.diagonal()  # that of points that do not flow
-            a, b, c = (tangent[:, i, i] != stiffness[i] for i in range(3))
+            # points that do not flow have its diagonal
+            a, b, c = (tangent[:, i, i] != elastic[i, i] for i in range(3))
             flows = (a | b | c).reshape(n, q).any(axis=1)
             correction = self._correction.x.array.reshape(-1, 9 * q)
             correction[body.yielding] = 0.0
@@ -235,16 +226,15 @@ class Bulk:
     def at_points(self, u: Array) -> Iterator[PointFields]:
         """The state at the integration points of this rank, body by body, at the last update, whose nodal displacements
         ``u`` ``(n_nodes, 2)`` are."""
-        X, w = bulk_quadrature(self.V.mesh.basix_cell(), self.degree)
         for tag, cells in self.cells.items():
-            if tag in self._plastic:
-                body = self._plastic[tag]
-                yield PointFields(cells, body.point, body.weight, body.stress, body.points)
-            else:
-                material, basis = self.materials[tag], cell_basis(self.V.mesh, self.degree, cells, X)
-                eps = strain(basis.gradient, self.V.dofmap.list[cells], u).reshape(-1, 3)
-                stress, _, _ = material.update(eps, material.state(len(eps)))
-                yield PointFields(cells, basis.point, basis.measure * w, stress)
+            body = self._plastic.get(tag)
+            if body is None:
+                body = _BodyPoints(self.V, cells, self.materials[tag])
+                body.update(u)
+            shape, points = (*body.weight.shape, -1), body.points
+            plastic_strain = getattr(points.trial, "plastic_strain", np.zeros_like(body.stress)).reshape(shape)
+            peeq = points.peeq.reshape(body.weight.shape)
+            yield PointFields(cells, body.point, body.weight, body.stress.reshape(shape), plastic_strain, peeq)
 
     def cell_fields(self, parts: Iterable[PointFields]) -> dict[str, Array]:
         """Means over each cell of this rank ``(n_cells,)`` of what `at_points` yields: "von_mises", "mean_stress" and,

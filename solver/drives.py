@@ -111,10 +111,6 @@ class Drives:
         """Which displacements ``(n_owned, 2)`` the supports ``name`` prescribe."""
         return self._holder[: self.n_owned] == (self._supports.index(name) if name in self._supports else np.nan)
 
-    def of_means(self, name: str) -> list[int]:
-        """The levels that are forces of the means ``name``."""
-        return [self.names.index(mean.drive) for mean in self.problem.means if mean.name == name]
-
     def rigid_modes(self, body: Body) -> Array:
         """The rigid motions ``(3, n_local, 2)`` of the ``body``: along x, along y, and turning. Collective."""
         nodes = np.unique(self.V.dofmap.list[self.problem.cells_of(body)])

@@ -1,7 +1,5 @@
 """Static equilibrium at a given load: the residual and the tangent of bulk and contact.
 
-The drives turn the load factor into displacements of supports and rigid discs, and into forces (see `drives`).
-
 The residual is internal minus contact forces and loads; rows of prescribed displacements are left out of it, and out of
 the matrix with their columns, the contact's included. It is measured against the reaction of the supports, so that the
 tolerance has no unit.
@@ -61,14 +59,9 @@ class Equilibrium:
         self.changes = 0
         self.reaction_norm = self.noise = self.largest_reaction = 0.0
         frictionless = contact.pairs and all(isinstance(pair.law, Frictionless) for pair in contact.pairs)
-        facts = Facts(
-            self.comm,
-            2 * index_map.size_global,
-            bulk.plastic,
-            len(drives.unknown) > 0,
-            contact.gamma_factor if frictionless else None,
-            lambda: all(drives.held(body) for body in problem.bodies),
-        )
+        dofs, by_force = 2 * index_map.size_global, len(drives.unknown) > 0
+        gamma = contact.gamma_factor if frictionless else None
+        facts = Facts(self.comm, dofs, bulk.plastic, by_force, gamma, lambda: all(map(drives.held, problem.bodies)))
         self.choice = choose(facts)
         self._factoriser = partial(self.choice.factoriser, V)  # of tangents of all displacements
         condense = self.choice.uses("condensed")
@@ -77,7 +70,7 @@ class Equilibrium:
         self.tangent = TangentMatrix(bulk, contact, drives, self.springs, timer, condense=condense)
         self.border: Bordered | None = None
         with timer(BEFORE_SOLVING):
-            if facts.by_force:
+            if by_force:
                 self.border = Bordered(self.tangent.A, len(drives.unknown), self._stiffest, self._factoriser)
             self._choose_linear()
 
@@ -96,10 +89,8 @@ class Equilibrium:
 
     def _join(self, x: PETSc.Vec, u: Array, levels: Array) -> None:
         """Put displacements (or forces) ``u`` and unknown levels (or what their equations lack) into ``x``."""
-        if self.border:
-            self.border.join(x, u.ravel(), levels)
-        else:
-            x.array[:] = u.ravel()
+        n = 2 * self.n_owned
+        x.array[:n], x.array[n:] = u.ravel(), levels[: x.local_size - n]
 
     def _choose_linear(self) -> None:
         self.linear = self.border or self.tangent.condensed or self._factoriser(self.tangent.A)
@@ -162,14 +153,8 @@ class Equilibrium:
             self.springs.evaluate(self.u.x.array[: 2 * self.n_owned], self.levels)
             self._force.array[:] += self.springs.forces
         self._reaction = np.where(self.fixed[: self.n_owned], self._force.array_r.reshape(-1, 2), 0.0)
-        totals = np.array(
-            [
-                (self._reaction**2).sum() + (applied**2).sum(),
-                self.contact.round_off() ** 2,
-                self.interrupt.received > 0,
-                self.contact.active_set_changes,
-            ]
-        )
+        squares = (self._reaction**2).sum() + (applied**2).sum(), self.contact.round_off() ** 2
+        totals = np.array([*squares, self.interrupt.received > 0, self.contact.active_set_changes])
         self.comm.Allreduce(MPI.IN_PLACE, totals)
         self.changes = int(totals[3])
         self.reaction_norm, contact_noise = np.sqrt(totals[:2])
@@ -185,9 +170,10 @@ class Equilibrium:
 
     def reaction(self, name: str) -> Array:
         """Forces ``(n_owned, 2)`` of the supports and means ``name`` on the nodes at the last evaluation."""
-        of_means = self.drives.of_means(name)
-        spread = np.tensordot(self.levels[of_means], self.drives.applied[of_means], 1)
-        return np.where(self.drives.held_by(name), self._reaction, 0.0) + spread
+        drives, means = self.drives, [mean.drive for mean in self.problem.means if mean.name == name]
+        levels = [drives.names.index(drive) for drive in means]
+        spread = np.tensordot(self.levels[levels], drives.applied[levels], 1)
+        return np.where(drives.held_by(name), self._reaction, 0.0) + spread
 
     def conjugates(self) -> Array:
         """What is conjugate to the levels ``(d,)``, of the modelled part: forces on what moves, that of contact on

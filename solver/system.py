@@ -32,8 +32,9 @@ _AT_REST = 10.0  # times the round-off: forces that are none
 class System:
     """``problem`` ready to be solved; forces and energies are those of the whole, its symmetric parts included.
 
-    ``sides`` holds the surfaces of bodies in contact by the name of their facet set. Collective; raises ValueError for
-    a problem that contradicts itself and `ProjectionError` if a surface does not find its opposite.
+    ``sides`` holds the surfaces of bodies in contact by the name of their facet set; ``n_dofs`` counts displacements,
+    prescribed ones included. Collective; raises ValueError for a problem that contradicts itself and `ProjectionError`
+    if a surface does not find its opposite.
     """
 
     def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:
@@ -52,6 +53,9 @@ class System:
             self.contact = Contact(self.V, list(map(Interface, problem.interactions, surfaces)))
             self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
             self.solver = Recovery(NewtonSolver(self.equilibrium))
+        self.n_dofs, self.n_cells = 2 * self.V.dofmap.index_map.size_global, mesh.topology.index_map(2).size_global
+        self.cell_kind = f"{'curved' if mesh.geometry.cmap.degree > 1 else 'straight'} {mesh.basix_cell().name}s"
+        self.drive_names = self.equilibrium.drives.names
         self._path: LoadPath | None = None
 
     def _surface(self, given: str | Rigid, interaction: str) -> Surface | RigidSurface:
@@ -100,15 +104,6 @@ class System:
     def contact_force(self, name: str = "") -> Array:
         """Force ``(2,)`` of the interaction ``name``, the first without, on its second surface."""
         return self.problem.symmetry * self.contact.resultant(name)
-
-    def contact_moment(self, name: str, point: Sequence[float]) -> float:
-        """Moment of these forces on the undeformed surface about ``point``, anticlockwise."""
-        return self.problem.symmetry * self.contact.interface(name).moment(np.asarray(point))
-
-    @property
-    def drive_names(self) -> list[str]:
-        """The names of the problem's drives."""
-        return self.equilibrium.drives.names
 
     def driven(self) -> tuple[Array, Array]:
         """Displacements and forces ``(d,)`` of the ``drive_names`` on the whole, which do the work: of what a drive
@@ -163,24 +158,3 @@ class System:
         if largest <= _AT_REST * self.problem.symmetry * self.equilibrium.noise:
             return 0.0
         return float(self.problem.symmetry * np.linalg.norm(left, axis=1).max() / largest)
-
-    @property
-    def factorisations(self) -> int:
-        """Number of sparse factorisations so far."""
-        return self.equilibrium.tangent.factorisations
-
-    @property
-    def n_dofs(self) -> int:
-        """Number of displacement dofs, prescribed ones included."""
-        return 2 * self.V.dofmap.index_map.size_global
-
-    @property
-    def cell_kind(self) -> str:
-        """What its cells are, in words."""
-        mesh = self.V.mesh
-        return f"{'curved' if mesh.geometry.cmap.degree > 1 else 'straight'} {mesh.basix_cell().name}s"
-
-    @property
-    def n_cells(self) -> int:
-        """Number of cells."""
-        return self.problem.mesh.mesh.topology.index_map(2).size_global

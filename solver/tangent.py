@@ -48,7 +48,7 @@ class TangentMatrix:
         self.A = self._elastic = PETSc.Mat()
         self.condensed: Condensed | None = None
         if condense:
-            self.A = self._allocated(None)
+            self.A = self._allocated()
             self.A.assemble()
             with self.timer(BEFORE_SOLVING):
                 self.A.convert("aij")  # PETSc has no Cholesky factors of block matrices from MUMPS
@@ -56,9 +56,9 @@ class TangentMatrix:
                 self.condensed = Condensed(self.A, nodes, self._revise)
         self.renew()
 
-    def _allocated(self, slots: tuple[np.ndarray, np.ndarray] | None) -> PETSc.Mat:
+    def _allocated(self, *slots: tuple[np.ndarray, np.ndarray]) -> PETSc.Mat:
         """The matrix of the bulk's constant part, with room for block ``slots`` in rows of this rank."""
-        A = matrix(self.V, self.bulk.elastic_forms, slots)
+        A = matrix(self.V, self.bulk.elastic_forms, *slots)
         assemble(A, self.bulk.elastic_forms, self._bcs)
         return A
 

@@ -119,13 +119,9 @@ class Contact:
         slots = (rows * size + columns)[(rows < size) & (columns < size)]
         return np.divmod(np.unique(np.concatenate(self.comm.allgather(slots))), size)
 
-    def interface(self, name: str = "") -> Interface:
-        """The interface of the interaction ``name``, the first without."""
-        return next(i for i in self.interfaces if name in ("", i.interaction.name))
-
     def resultant(self, name: str = "") -> Array:
-        """Contact force ``(2,)`` on the second surface of the interaction ``name``, over all ranks."""
-        return self.interface(name).resultant()
+        """Force ``(2,)`` on the second surface of the interaction ``name``, the first without, over all ranks."""
+        return next(i for i in self.interfaces if name in ("", i.interaction.name)).resultant()
 
     def force_on_drives(self) -> Array:
         """Contact force ``(d,)`` on what moves rigid surfaces, the first ones of theirs, along their rates, over all

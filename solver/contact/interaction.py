@@ -118,15 +118,6 @@ class Interface:
             total += pair.forces.sum(0) * (1 if pair.surface is self.surfaces[1] else -1)
         return self.pairs[0].surface.sum_over_ranks(total)
 
-    def moment(self, point: Array) -> float:
-        """Moment of the contact forces on the nodes of the second surface about ``point`` ``(2,)``, over all ranks."""
-        second, total = self.surfaces[1], np.zeros_like(self.surfaces[1].curve.X)
-        for pair in self.pairs:
-            other = np.zeros_like((pair.opposite if pair.surface is second else pair.surface).curve.X)
-            pair.add_forces(*((total, other) if pair.surface is second else (other, total)))
-        arm = second.curve.X - point
-        return float(self.pairs[0].surface.sum_over_ranks(arm[:, 0] * total[:, 1] - arm[:, 1] * total[:, 0]).sum())
-
 
 @contextmanager
 def on_every_rank(comm: MPI.Comm) -> Iterator[None]:
