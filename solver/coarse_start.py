@@ -45,13 +45,11 @@ class CoarseStart:
         self._maps: list[tuple[np.ndarray, Interpolation]] = []  # nodes of a body on this rank, and their values
         for body in fine.problem.bodies:
             nodes, on = fine.nodes_of(body), of_cells == coarse.problem.tag(body)
-            onto = Interpolation(x[:, :2], cells[on], places[nodes])
-            self._maps.append((nodes, onto))
+            self._maps.append((nodes, Interpolation(x[:, :2], cells[on], places[nodes])))
         self._reached: float | None = None
 
     def increment(self, load: float) -> Array | None:
-        """What a step to ``load`` adds to the state of the fine problem, ``(2 n_local + d,)``; None if the coarse mesh
-        does not tell."""
+        """What a step to ``load`` adds to the fine state ``(2 n_local + d,)``, None if the coarse one fails."""
         with self.fine.timer("coarse start"):
             result, contact = self.path.attempt(load), self.coarse.contact
             self.iterations = result.iterations + self.path.coarse_iterations

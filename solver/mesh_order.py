@@ -96,9 +96,8 @@ class MeshOrder:
         mesh, found = tagged.mesh, {}
         for name in (name for name, tags in tagged.facet_sets.items() if tags):
             facets = tagged.facets_in(name)
-            ends = np.zeros((0, 2), dtype=np.int32)
-            if len(facets):  # dolfinx divides by their number
-                ends = entities_to_geometry(mesh, 1, facets)[:, :2]
+            # dolfinx divides by their number
+            ends = entities_to_geometry(mesh, 1, facets)[:, :2] if len(facets) else np.zeros((0, 2), dtype=np.int32)
             parts = comm.gather(np.sort(self._index[self._dof_of_vertex[ends]], axis=1))
             if parts is not None:
                 found[name] = np.searchsorted(self._nodes.unique, np.unique(np.concatenate(parts), axis=0))
@@ -124,18 +123,14 @@ class MeshOrder:
     def collect_history(self) -> Arrays:
         """History of the points that have one, on rank 0: "history/PLACE/point", their numbers in rising order, and
         "history/PLACE/NAME" for every array of their state. Collective."""
-        mine = {}
+        whole = {}
         for place, (points, number) in self._points().items():
             now, virgin = vars(points.state), vars(points.material.state(points.n))
             changed = [(v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in now.items()]
             used = np.logical_or.reduce(changed)
-            mine[place] = {name: values[used] for name, values in ({"point": number} | now).items()}
-        parts, whole = self.system.comm.gather(mine) or [], {}
-        for place in sorted({place for part in parts for place in part}):
-            found = [part[place] for part in parts if place in part]
-            order = np.argsort(np.concatenate([arrays["point"] for arrays in found]))
-            for name in found[0]:
-                whole[f"history/{place}/{name}"] = np.concatenate([arrays[name] for arrays in found])[order]
+            gather = Gather(self.system.comm, number[used])
+            for name, values in ({"point": number} | now).items():
+                whole[f"history/{place}/{name}"] = gather(values[used])
         return whole
 
     def spread_history(self, whole: Arrays | None) -> None:

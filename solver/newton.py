@@ -73,8 +73,7 @@ class NewtonSolver:
         return snes
 
     def _start_linear(self) -> None:
-        """Start with a new linear solver: after a singular matrix PETSc's interface to MUMPS may skip the factorisation
-        of the next one, and fail."""
+        """Start with a new linear solver: after a singular matrix PETSc's MUMPS may skip the next factorisation."""
         self._ksp = PETSc.KSP().create(self.equilibrium.comm)
         self._ksp.setPreSolve(lambda ksp, b, x: ksp.getPC().setReusePreconditioner(self._reuse))
         for snes in self._solvers.values():
@@ -105,9 +104,8 @@ class NewtonSolver:
     def solve(self, guess: Array | None, *, line_search: bool = True, goal: float = 0.0) -> Newton:
         """Newton's method at the equilibrium's load, to a residual of ``goal``, the own tolerance without.
 
-        ``guess`` is shaped like the equilibrium's `state`; its prescribed values are replaced, and contact points
-        search their partners. Without one the solve goes on from the last iterate and the partners of its points. Steps
-        are full ones without ``line_search``.
+        ``guess`` is shaped like the equilibrium's `state`; contact points search their partners there. Without one the
+        solve goes on from the last iterate and its partners. Steps are full ones without ``line_search``.
         """
         at, snes = self.equilibrium, self._solvers[line_search]
         self._goal = goal or self.tolerance
@@ -152,8 +150,7 @@ class NewtonSolver:
             self._attach()
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        """Assemble the tangent where the last factorisation does not serve once more, and factorise it where a lagged
-        one does not."""
+        """Assemble the tangent unless the last one will do, and factorise it unless a lagged factorisation will."""
         at, result = self.equilibrium, self._result
         if self._close():
             return
@@ -182,9 +179,8 @@ class NewtonSolver:
         result.residuals.append(float(norm / reaction if reaction > 0 else norm))
         if at.border and at.border.singular is not None:
             pressed = at.load > 0 and at.contact.n_active() > 0
-            of = next(
-                (f" of the drive {n!r}" for n in at.drives.names[at.drives.unknown[at.border.singular] :] if n), ""
-            )
+            level = at.drives.unknown[at.border.singular]
+            of = "".join(f" of the drive {name!r}" for name in at.drives.names[level : level + 1] if name)
             self._failure = f"{'no stiffness is left' if pressed else 'nothing resists the force'}{of} (singular mode)"
             return reasons.DIVERGED_LINEAR_SOLVE
         if not np.isfinite(norm):

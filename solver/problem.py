@@ -165,9 +165,7 @@ class Problem:
             if name not in known:
                 raise ValueError(f"there is no drive {name!r}; there are {', '.join(map(repr, known))}")
             if (name in moves) + (name in loads) + means.count(name) > 1:
-                raise ValueError(
-                    f"the drive {name!r} must move supports and discs, or multiply loads, or have one mean"
-                )
+                raise ValueError(f"the drive {name!r} must move supports and discs, multiply loads, or have one mean")
         for name in known:
             if name and name not in (*moves, *loads, *means):
                 raise ValueError(f"the drive {name!r} moves nothing and multiplies no load")

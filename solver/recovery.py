@@ -27,27 +27,21 @@ class Recovery:
         self.continues_gamma = False
 
     def solve(self, load: float, guesses: Iterable[tuple[Array, bool]]) -> Newton:
-        """Solve at ``load`` from one of the ``guesses`` after the other, of which each tells whether it comes from afar
-        (see `_solve_at_once`). Collective.
-
-        Where a large gamma makes that fail, gamma is raised in stages: the solution hardly depends on it, but points
-        open and close for many iterations where it is large.
-        """
+        """Solve at ``load`` from one of the ``guesses`` after the other, each with whether it comes from afar; where
+        springs may have to hold bodies, these come to rest there first as if rigid. Collective."""
         self.equilibrium.load = load
         self._solves: list[Newton] = []
+        springs = self.equilibrium.springs
         for guess, afar in guesses:
-            if self._solve_placing(guess, afar):
+            if springs is not None and (afar or not springs.idle):
+                guess, afar = springs.rigid.at_rest(load, guess), True
+            if self._solve_in_stages(guess, afar):
                 break
         return Newton.together(self._solves)
 
-    def _solve_placing(self, guess: Array, afar: bool) -> bool:
-        """Solve from ``guess``; where springs may have to hold bodies, these come to rest first as if rigid."""
-        springs = self.equilibrium.springs
-        if springs is not None and (afar or not springs.idle):
-            guess, afar = springs.rigid.at_rest(self.equilibrium.load, guess), True
-        return self._solve_in_stages(guess, afar)
-
     def _solve_in_stages(self, guess: Array, afar: bool) -> bool:
+        """Solve from ``guess``; where a large gamma makes that fail, on which the solution hardly depends, but with
+        which points open and close for many iterations, gamma is raised in stages."""
         contact = self.equilibrium.contact
         wanted, stiff = contact.gamma_factor, contact.gamma_factor > _STIFF_CONTACT
         converged = not (stiff and self.continues_gamma) and self._solve_at_once(guess, afar)
@@ -65,12 +59,8 @@ class Recovery:
         return converged
 
     def _solve_at_once(self, guess: Array, afar: bool) -> bool:
-        """Solve from ``guess``.
-
-        A guess from ``afar`` is too stiff for a line search, which creeps there, and may yield far too much: full steps
-        come first, and a rough equilibrium of points that cannot yield (further) comes before the one asked for; if
-        that fails, the solve starts from the guess.
-        """
+        """Solve from ``guess``; one from ``afar`` is too stiff for a line search, which creeps there, and may yield far
+        too much: full steps come first, to a rough equilibrium of points that cannot yield (further) where that is."""
         points = self.equilibrium.plastic_points()
         if not self.equilibrium.comm.allreduce(len(points)):
             return self._solve_either_way(guess, full_steps=afar)
@@ -84,12 +74,8 @@ class Recovery:
         return self._solve_either_way(guess)
 
     def _solve_either_way(self, guess: Array, *, full_steps: bool = False, goal: float = 0.0) -> bool:
-        """With a line search, then without, or the other way round with ``full_steps``.
-
-        The problem is nearly linear by pieces, where it is smooth, and full steps find the right ones where the line
-        search, which wants a smaller residual in every step, creeps: first touch, large gamma, nearly incompressible
-        bodies.
-        """
+        """With a line search, then without, or the other way round with ``full_steps``, which find the right piece of a
+        problem that is nearly linear by pieces where the line search creeps: first touch, large gamma."""
         for line_search in (not full_steps, full_steps):
             if self._solve_holding(guess, line_search, goal):
                 return True

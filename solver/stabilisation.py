@@ -19,7 +19,6 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.solver.bulk import assemble, matrix
 from archord.solver.contact.contact import Contact
-from archord.solver.contact.pair import Pair
 from archord.solver.contact.surface import RigidSurface
 from archord.solver.contact.tangent import trial_rate
 from archord.solver.drives import MOVABLE, Drives
@@ -108,9 +107,9 @@ class RigidMotions:
         r, pressed, openings = len(self.free), 0.0, []
         force, stiffness = np.zeros(r), np.zeros((r, r))
         for pair in self.contact.pairs:
-            opening = np.stack(
-                [self._opening(pair, *motion) for motion in zip(self.free, self.levels, strict=True)], axis=2
-            )
+            opening = np.stack([-trial_rate(pair, motion) / pair.gamma[:, None] for motion in self.free], axis=2)
+            if isinstance(pair.opposite, RigidSurface):
+                opening -= pair.frame @ (self.levels @ pair.opposite.rate).T
             weight = pair.share * pair.surface.weight.ravel()
             force += np.einsum("m,mi,mik->k", weight, pair.traction, opening)
             stiff = (weight * pair.gamma)[:, None, None] * pair.derivative
@@ -118,13 +117,6 @@ class RigidMotions:
             pressed += float(np.abs(pair.forces).sum())
             openings.append(opening)
         return *map(self.comm.allreduce, (force, stiffness, pressed)), openings
-
-    @staticmethod
-    def _opening(pair: Pair, motion: Array, levels: Array) -> Array:
-        opening = -trial_rate(pair, motion) / pair.gamma[:, None]
-        if isinstance(pair.opposite, RigidSurface):
-            opening -= pair.frame @ (levels @ pair.opposite.rate)
-        return opening
 
 
 class Springs:

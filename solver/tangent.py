@@ -63,8 +63,7 @@ class TangentMatrix:
         return A
 
     def renew(self) -> None:
-        """Allocate the matrix with every slot that bulk and contact may fill, and assemble the constant part; a
-        condensed one makes room for the contact alone."""
+        """Allocate every slot that bulk and contact may fill, a condensed matrix those of contact alone."""
         tangent = self.contact.tangent
         self._in_matrix = (tangent.rows < self._size) & (tangent.columns < self._size)
         (row_free, self._row_rate), (free, self._column_rate) = map(self._at, (tangent.rows, tangent.columns))
@@ -111,8 +110,6 @@ class TangentMatrix:
                 if self.springs:
                     self.A.axpy(1.0, self.springs.of_free, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
                 self.bulk.assemble_correction(self.A, self._bcs)
-        else:
-            self.factorisations = 1
         with self.timer("assemble contact"):
             tangent = self.contact.tangent
             self._contact_blocks = tangent.blocks()
@@ -123,12 +120,12 @@ class TangentMatrix:
                 self._add(self.A, tangent.rows[kept], tangent.columns[kept], values)
                 self.A.assemble()
             else:
+                self.factorisations = 1
                 self.condensed.update(self._contact_blocks[self._in_matrix] * self._free[self._in_matrix])
 
     def _revise(self, increment: Array) -> Array | None:
-        """Go over to the contact points that would be closed after ``increment`` ``(k, 2)`` of the nodes near the
-        contact: the change of the residual ``(m, 2)`` at those of the contact, with the matrix up to date; None if they
-        are closed already."""
+        """Go over to the points that ``increment`` ``(k, 2)`` of the nodes near the contact would close: the change of
+        the residual ``(m, 2)`` at those of the contact, with the matrix up to date; None if no point changes."""
         assert self.condensed is not None
         with self.timer("contact"):
             index_map = self.V.dofmap.index_map

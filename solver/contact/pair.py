@@ -51,14 +51,22 @@ class Pair:
         self.projection = replace(self.projection, normal=-self._outward)
 
     def evaluate(self, u: Array, motion: Array) -> None:
-        """Pairs, gaps, tractions and trial history at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``;
-        raises `ProjectionError`."""
+        """Evaluate at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``; raises `ProjectionError`."""
         displacement, stress, moduli = self.surface.deform(u)
         self._moved = displacement, motion
         self.moduli = np.ascontiguousarray(moduli)
         if self.moves:
-            self._pair(self.surface.point.reshape(-1, 2) + displacement, motion)
-            opening = self.separation
+            x, curve, facet = (
+                self.surface.point.reshape(-1, 2) + displacement,
+                self.opposite.curve,
+                self.projection.facet,
+            )
+            if self.start == "held":
+                self.projection = curve.continued(x, self._outward, motion, facet)
+            else:
+                known = None if self.start == "anywhere" else facet
+                self.projection, self.start = curve.closest_point(x, self._outward, motion, known), "near"
+            self.separation = opening = x - self.projection.point
         else:
             P = self.projection
             opening = displacement - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
@@ -72,15 +80,6 @@ class Pair:
         self.trial = np.einsum("mij,mj->mi", self.frame, self.stress_vector) - self.gamma[:, None] * self.opening
         self.traction = self._answer(self.trial)
 
-    def _pair(self, x: Array, motion: Array) -> None:
-        curve, facet = self.opposite.curve, self.projection.facet
-        if self.start == "held":
-            self.projection = curve.continued(x, self._outward, motion, facet)
-        else:
-            known = None if self.start == "anywhere" else facet
-            self.projection, self.start = curve.closest_point(x, self._outward, motion, known), "near"
-        self.separation = x - self.projection.point
-
     def _answer(self, trial: Array) -> Array:
         """Traction of the law, none at points without a partner; its derivative and the active points are kept."""
         traction, self.derivative = self.points.update(*self.opening.T, trial, self.gamma)
@@ -93,8 +92,7 @@ class Pair:
         return traction
 
     def expect(self, rate: Array) -> None:
-        """Go over to the branch of the law where ``rate`` ``(m, 2)`` is added to the trial tractions, as that branch
-        continues to the present ones."""
+        """Go over to the law's branch with ``rate`` ``(m, 2)`` added to the trial, continued to the present one."""
         self.traction = self._answer(self.trial + rate) - np.einsum("mij,mj->mi", self.derivative, rate)
 
     @property
@@ -105,8 +103,7 @@ class Pair:
 
     @property
     def slip(self) -> Array:
-        """Displacement ``(n, q)`` of the points relative to the opposite surface, along the outward normal turned by a
-        quarter anticlockwise."""
+        """Displacement ``(n, q)`` of the points relative to the opposite surface, along the tangent of the frame."""
         (own, motion), P = self._moved, self.projection
         relative = own - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
         return (self.frame[:, 1] * relative).sum(axis=1).reshape(self.surface.weight.shape)
