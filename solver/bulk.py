@@ -109,13 +109,10 @@ def _check_elastic_tangent(material: Material) -> None:
 
 class Bulk:
     """Internal forces of all bodies in the displacement space ``V`` (blocked, two components), whose ``cells`` and
-    ``materials`` are given by their tags. ``elastic_forms``, one a body, span the pattern of the matrix; ``plastic`` is
-    whether any body can yield."""
+    ``materials`` are given by their tags. ``elastic_forms``, one a body, span the matrix's pattern."""
 
     def __init__(self, V: fem.FunctionSpace, cells: Mapping[int, Index], materials: Mapping[int, Material]) -> None:
         self.V, self.materials = V, materials
-        for material in materials.values():
-            _check_elastic_tangent(material)
         self.degree = V.element.basix_element.degree
         rule = bulk_quadrature_degree(V.mesh.basix_cell(), self.degree)
         n_owned = V.mesh.topology.index_map(2).size_local
@@ -125,6 +122,7 @@ class Bulk:
         self.plastic = bool(self._plastic)
         elastic = {}
         for tag, material in materials.items():
+            _check_elastic_tangent(material)
             moduli = fem.Constant(V.mesh, np.array(material.elastic_tangent))
             domain = [(1, self.cells[tag])]
             dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": rule})(1)
@@ -177,8 +175,7 @@ class Bulk:
         force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def add_action(self, direction: fem.Function, out: PETSc.Vec) -> None:
-        """Add the tangent of the last `update`, applied to ``direction``, to ``out``; `add_force` then needs another
-        update."""
+        """Add the last tangent, applied to ``direction``, to ``out``; `add_force` then needs another `update`."""
         for body in self._plastic.values():
             eps = strain(body.gradient, body.dofs, direction.x.array.reshape(-1, 2))
             q = eps.shape[1]
@@ -224,8 +221,7 @@ class Bulk:
         return largest, integral
 
     def at_points(self, u: Array) -> Iterator[PointFields]:
-        """The state at the integration points of this rank, body by body, at the last update, whose nodal displacements
-        ``u`` ``(n_nodes, 2)`` are."""
+        """The state at this rank's integration points, body by body, at ``u`` ``(n_nodes, 2)`` of the last update."""
         for tag, cells in self.cells.items():
             body = self._plastic.get(tag)
             if body is None:
@@ -237,8 +233,7 @@ class Bulk:
             yield PointFields(cells, body.point, body.weight, body.stress.reshape(shape), plastic_strain, peeq)
 
     def cell_fields(self, parts: Iterable[PointFields]) -> dict[str, Array]:
-        """Means over each cell of this rank ``(n_cells,)`` of what `at_points` yields: "von_mises", "mean_stress" and,
-        where a body can yield, "peeq"."""
+        """Cell means ``(n_cells,)`` of `at_points`: "von_mises", "mean_stress" and, where a body can yield, "peeq"."""
         names = ("von_mises", "mean_stress", *(["peeq"] if self.plastic else []))
         fields = {name: np.zeros(self.V.mesh.topology.index_map(2).size_local) for name in names}
         for part in parts:

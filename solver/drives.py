@@ -3,8 +3,7 @@
 Every drive has one level: the displacement ``q`` of what it moves, where prescribed displacements are ``rate q``, or
 the force ``f`` of loads and means, whose nodal forces are ``applied f``. Conjugate to it is the force on what moves, or
 the displacement of what is loaded: their product is work. Where a drive prescribes the conjugate (a force on what
-moves; the displacement of a mean, whose force is a Lagrange multiplier then), the level is unknown, with the equation
-that the conjugate is the drive's value.
+moves; the displacement of a mean, whose force is a Lagrange multiplier then), the level is unknown.
 
 A body that nothing but prescribed means holds would leave the tangent of all displacements singular. Three of its
 displacements become levels of drives without force, its anchors, which change nothing.

@@ -1,8 +1,7 @@
 """Static equilibrium at a given load: the residual and the tangent of bulk and contact.
 
 The residual is internal minus contact forces and loads; rows of prescribed displacements are left out of it, and out of
-the matrix with their columns, the contact's included. It is measured against the reaction of the supports, so that the
-tolerance has no unit.
+the matrix with their columns. It is measured against the reaction of the supports: the tolerance has no unit.
 """
 
 from __future__ import annotations
@@ -32,8 +31,7 @@ from archord.solver.tangent import TangentMatrix
 
 
 class Equilibrium:
-    """Equilibrium of ``bulk`` and ``contact`` under the drives of ``problem``, whose ``levels`` ``(d,)``, displacements
-    or forces, are prescribed or unknown. Collective.
+    """Equilibrium of ``bulk`` and ``contact`` under the drives of ``problem`` at their ``levels`` ``(d,)``. Collective.
 
     ``linear`` is the strategy that solves with the tangent of all unknowns, ``border`` that of the unknown levels. What
     the last evaluation left are the ``changes``, points that opened or closed, the ``reaction_norm`` and the ``noise``,
@@ -42,14 +40,10 @@ class Equilibrium:
 
     def __init__(self, problem: Problem, bulk: Bulk, contact: Contact, timer: Timer) -> None:
         self.problem, self.bulk, self.contact, self.timer = problem, bulk, contact, timer
-        self.V = V = bulk.V
-        self.comm = V.mesh.comm
-        self.interrupt = Interrupt()
-        self.u = fem.Function(V, name="displacement")
-        self.load = 0.0
-        index_map = V.dofmap.index_map
-        self.n_owned = index_map.size_local
-        self.n_local = index_map.size_local + index_map.num_ghosts
+        self.V, self.comm, V = bulk.V, bulk.V.mesh.comm, bulk.V
+        self.interrupt, self.u = Interrupt(), fem.Function(V, name="displacement")
+        self.load, index_map = 0.0, V.dofmap.index_map
+        self.n_owned, self.n_local = index_map.size_local, index_map.size_local + index_map.num_ghosts
         self._stiffest = max(float(body.material.elastic_tangent[0, 0]) for body in problem.bodies)
         self.drives = drives = Drives(problem, V, contact, self._stiffest)
         self.levels: Array = np.zeros(len(drives.rate))
@@ -134,8 +128,7 @@ class Equilibrium:
         return renewed
 
     def evaluate(self) -> None:
-        """Residual, reactions and trial history at the current displacement and load. Raises `Interrupted` on every
-        rank if ``interrupt`` was received by any."""
+        """Residual, reactions and trial history at the current state. Raises `Interrupted`, on every rank."""
         u = self.u.x.array.reshape(-1, 2)
         with self.timer("return mapping"):
             self.bulk.update(u)

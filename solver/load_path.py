@@ -24,8 +24,7 @@ class Position:
     """The place on a path between two steps: what is needed besides the state of the equilibrium to go on from it.
 
     ``targets_done`` output targets were reached, the last step being of length ``stride`` in the load; ``increment`` is
-    what it changed in the state of the equilibrium. None before the first step. ``size`` is the length of the next
-    step, in output steps.
+    what it changed in the state, None before the first step. ``size`` is the length of the next, in output steps.
     """
 
     targets_done: int = 0

@@ -145,10 +145,9 @@ class Springs:
         self.of_free = self._matrix.copy()
         self.of_free.zeroRowsColumns(fixed.astype(PETSc.IntType), 0.0)
         self._x, self._y = self._matrix.createVecs()
-        self.of_levels: Array = np.zeros(len(drives.rate))
-        for disc in contact.rigid:
-            self.of_levels += WEAK * stiffness * (disc.rate**2).sum(axis=1)
-        self.last: tuple[Array, Array] = np.zeros(2 * drives.n_owned), np.zeros(len(drives.rate))
+        none: Array = np.zeros(len(drives.rate))
+        self.of_levels = WEAK * stiffness * sum(((disc.rate**2).sum(axis=1) for disc in contact.rigid), none)
+        self.last = np.zeros(2 * drives.n_owned), none
 
     def pull(self, u: Array) -> Array:
         """Forces ``(n_owned dofs,)`` of displacements ``u``, alike, on the bodies' springs."""

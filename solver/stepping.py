@@ -35,10 +35,7 @@ class StepRules:
 
 
 class StepFailure(RuntimeError):
-    """Equilibrium was not found even with the smallest allowed step; the last accepted state remains.
-
-    ``attempt`` is the output step that failed.
-    """
+    """No equilibrium even with the smallest step in the output step ``attempt``; the last accepted state remains."""
 
     def __init__(self, message: str, attempt: Step) -> None:
         super().__init__(message)
@@ -74,8 +71,7 @@ def march(
     target_done: Callable[[Step, Position], None] = lambda step, position: None,
     attempted: Callable[[float, int], None] = lambda load, iterations: None,
 ) -> None:
-    """Follow ``path`` to the loads ``targets`` in turn and, where a step fails or ``rules`` ask for it, to loads in
-    between.
+    """Follow ``path`` to the loads ``targets`` in turn and, where a step fails or ``rules`` say so, to loads between.
 
     ``substep_done(load)`` follows every accepted step, ``target_done(step, position)`` every output target,
     ``attempted(load, iterations)`` every solve. Raises `StepFailure`.

@@ -149,8 +149,7 @@ class System:
         return max(self.comm.allgather(found))
 
     def force_balance(self) -> float:
-        """Largest resultant of all forces on a body, over the largest force of an interaction or a support; 0 where all
-        are round-off."""
+        """Largest resultant on a body over the largest force of an interaction or a support; 0 if all are round-off."""
         left = [self.equilibrium.residual_on(self.nodes_of(body)) for body in self.problem.bodies]
         forces = [np.zeros(2), *(self.contact_force(interaction.name) for interaction in self.problem.interactions)]
         forces += [self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)]

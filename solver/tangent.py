@@ -33,10 +33,8 @@ class TangentMatrix:
         self.drives, self.springs, fixed, m = drives, springs, drives.fixed, len(drives.unknown)
         self._fixed, rate = fixed[: self._n], drives.unknown_rate[:, : self._n].reshape(m, 2 * self._n).T
         self._direction = fem.Function(self.V)
-        self._bcs = []
-        for axis in range(2):
-            dofs = 2 * np.flatnonzero(fixed[:, axis]).astype(np.int32) + axis
-            self._bcs.append(fem.dirichletbc(0.0, dofs, self.V.sub(axis)))
+        dofs = [2 * np.flatnonzero(fixed[:, axis]).astype(np.int32) + axis for axis in range(2)]
+        self._bcs = [fem.dirichletbc(0.0, dofs[axis], self.V.sub(axis)) for axis in range(2)]
         # prescribed dofs of all ranks and their rates, with those of rigid surfaces and one that is none behind
         own = np.flatnonzero(self._fixed)
         discs = [drives.weight[:, None] * surface.rate[drives.unknown] for surface in contact.rigid]
@@ -85,8 +83,7 @@ class TangentMatrix:
         self._elastic = self.A.copy()
 
     def _at(self, nodes: np.ndarray) -> tuple[Array, Array]:
-        """Which displacements of ``nodes`` ``(k,)``, block dofs of any rank or of rigid surfaces, are free ``(k, 2)``,
-        and the rates ``(k, 2, m)`` of those that are not."""
+        """Which displacements of block dofs ``nodes`` ``(k,)`` are free ``(k, 2)``; others' rates ``(k, 2, m)``."""
         dofs = 2 * nodes[:, None] + np.arange(2)
         at = np.searchsorted(self._prescribed, dofs)
         free = self._prescribed[at] != dofs

@@ -3,11 +3,9 @@
 At a point ``x`` of a side, with closest point ``y`` on the opposite surface, ``n`` the opposite's outward normal there
 and ``g = (x - y) . n`` the gap, the trial pressure is ``t . n - gamma g`` with ``t = sigma(u) N`` the traction of the
 own body. The law makes a traction ``f`` of it, ``[t . n - gamma g]_+ n`` without friction, and the virtual work of the
-contact forces is ``sum over sides of share * integral of f . (v(x) - v(y))``. The linearisation includes the moving
-``n`` and ``y``.
+contact forces is ``sum over sides of share * integral of f . (v(x) - v(y))``. Linearised are ``n`` and ``y``, too.
 
-Opposite surfaces may lie on other ranks: their displacement is exchanged, forces on them are summed over the ranks, and
-their rows of the matrix travel with PETSc's assembly.
+Opposite surfaces may lie on other ranks: displacements are exchanged, and forces summed over the ranks.
 """
 
 from __future__ import annotations
@@ -51,8 +49,7 @@ class Contact:
         self.tangent = ContactTangent(self._reaches)
 
     def move(self, levels: Array, fitted: float = 1.0) -> None:
-        """Displace rigid surfaces by their rates times the drives' ``levels`` ``(d,)``; interferences are there by the
-        part ``fitted``."""
+        """Displace rigid surfaces to the drives' ``levels`` ``(d,)``, with the part ``fitted`` of interferences."""
         for surface in self.rigid:
             surface.motion = levels[None] @ surface.rate
         for interface in self.interfaces:
@@ -112,8 +109,7 @@ class Contact:
             surface.add_to_owned(surface.sum_over_ranks(-on[id(surface)]), force)
 
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
-        """Block ``(rows, columns)`` in global dofs that the contact may fill, those of all ranks, each once.
-        Collective."""
+        """Block ``(rows, columns)`` that the contacts of all ranks may fill, each once, in global dofs. Collective."""
         size = self._n_dofs
         rows, columns = self.tangent.rows, self.tangent.columns
         slots = (rows * size + columns)[(rows < size) & (columns < size)]
@@ -124,8 +120,7 @@ class Contact:
         return next(i for i in self.interfaces if name in ("", i.interaction.name)).resultant()
 
     def force_on_drives(self) -> Array:
-        """Contact force ``(d,)`` on what moves rigid surfaces, the first ones of theirs, along their rates, over all
-        ranks; a single zero where there are none."""
+        """Contact force ``(d,)`` along the rates of rigid surfaces, over all ranks; a single zero without any."""
         first = [(i.surfaces[0], i) for i in self.interfaces]
         return sum((d.rate @ i.resultant() for d, i in first if isinstance(d, RigidSurface)), np.zeros(1))
 

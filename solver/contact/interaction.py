@@ -1,16 +1,12 @@
 """Contact of two surfaces that may not match: which of them are integrated, and with what gamma.
 
-The unbiased form gives like bodies one half each; of unlike bodies the softer takes more, in proportion to the
-compliances (Annavarapu, Hautefeuille and Dolbow 2012), or a stiff body's gamma would swamp the other's. The one-sided
-form integrates one side only.
+The unbiased form gives bodies shares in proportion to their compliances (Annavarapu, Hautefeuille and Dolbow 2012), or
+a stiff body's gamma would swamp the other's. The one-sided form integrates one side only.
 
 gamma is ``gamma_factor`` times the share times the trace constant ``c`` of each contact cell,
 ``|sigma_n(v)|^2 <= c a(v, v)``. The form is coercive where ``gamma > share c / 4``: Cauchy-Schwarz and ``c`` bound
 ``share * integral of sigma_n v_n`` by ``sqrt(a(v, v)) * share sqrt(c) |v_n|``, which ``a(v, v) + share gamma |v_n|^2``
 exceeds.
-
-Each side's quadrature respects the facets of the opposite one where the undeformed surfaces touch (`segment_rule`), so
-that meshes that match nowhere pass the patch tests.
 """
 
 from __future__ import annotations
@@ -36,8 +32,7 @@ GAMMA_FACTOR = 0.5  # twice the bound of coercivity; larger values stiffen the e
 
 @dataclass(frozen=True)
 class Rigid:
-    """A rigid disc that is displaced by ``rate`` times the displacement of the ``drive``, or by a rate of each of
-    several drives, by their names."""
+    """A rigid disc displaced by ``rate`` times the displacement of the ``drive``, or by rates of drives by name."""
 
     circle: RigidCircle
     rate: Vector | Mapping[str, Vector] = (0.0, 0.0)
@@ -57,12 +52,10 @@ class Interaction:
     the deformed curves, under "reference" those of the undeformed ones, with the normal of the first surface for both,
     and the gap is linear in the displacement; a law whose points do not slide has no other. ``gamma_factor`` is
     Nitsche's gamma over the trace constant of each contact cell. ``integrated`` names the one facet set whose points
-    carry the contact, both do if empty. ``slide`` is how far pairs are expected to slide, for which the matrix gets
-    room from the start.
+    carry the contact, both do if empty. The matrix gets room from the start for pairs that ``slide`` as far as this.
 
     The gap of the law is that between the surfaces, less ``interference``, which their mesh does not show; ``overlap``
-    is what the mesh shows. Both grow from nothing in a stage of the fit, to ``s``: the gap is raised by
-    ``overlap (1 - s) - interference s``.
+    is what it shows. Both grow in a stage of the fit, to ``s``: the gap gets ``overlap (1 - s) - interference s``.
     """
 
     name: str

@@ -25,8 +25,7 @@ class Pair:
     and ``opening`` ``(m, 2)`` gap and slip; ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` are those of the
     own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active``
     ``(m,)`` points touch, and ``changes`` opened or closed. ``offset`` is added to the gap. The next evaluation
-    searches partners from ``start`` on: anywhere, near the last ones, or on their facets alone, where points are held
-    until it is set again.
+    searches partners from ``start`` on: anywhere, near the last ones, or, until it is set again, on their facets.
     """
 
     def __init__(

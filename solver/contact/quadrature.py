@@ -23,7 +23,10 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     """
     met = own.closest_point(*opposite.vertices(), np.zeros_like(own.X))
     inside = met.found & (met.xi > _SHORTEST) & (met.xi < 1 - _SHORTEST)
-    breaks = [_apart(np.sort(met.xi[inside & (met.facet == k)])) for k in range(own.n_facets)]
+    breaks = []
+    for k in range(own.n_facets):
+        met_here = np.sort(met.xi[inside & (met.facet == k)])
+        breaks.append(np.concatenate([[0.0], met_here[np.diff(met_here, prepend=0.0) > _SHORTEST], [1.0]]))
     points = max(map(len, breaks))
     ends = np.array([_refined(b, points) for b in breaks])
     # two more than a quadratic pressure against quadratic shape functions wants, as pairs slide and breaks do not
@@ -31,11 +34,6 @@ def segment_rule(own: Curve, opposite: Curve) -> tuple[Array, Array]:
     length = np.diff(ends, axis=1)[:, :, None]
     xi = ends[:, :-1, None] + length * (x + 1) / 2
     return xi.reshape(own.n_facets, -1), (length * w / 2).reshape(own.n_facets, -1)
-
-
-def _apart(breaks: Array) -> Array:
-    """0, the breaks that are distinct, and 1."""
-    return np.concatenate([[0.0], breaks[np.diff(breaks, prepend=0.0) > _SHORTEST], [1.0]])
 
 
 def _refined(ends: Array, points: int) -> Array:

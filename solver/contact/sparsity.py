@@ -15,8 +15,8 @@ _WIDEST = 16  # the same where pairs are expected to slide further
 class Reach:
     """Which opposite facets each facet of a ``pair`` may meet, where points are expected to slide by ``slide``.
 
-    ``keys`` ``(n,)``, sorted and the same on every rank, number the facets that may meet: the own one times the number
-    of opposite ones, plus the opposite one. Collective.
+    ``keys`` ``(n,)`` of pairs of facets, own times the number of opposite ones plus opposite, are sorted, and the same
+    on every rank. Collective.
     """
 
     def __init__(self, pair: Pair, slide: float) -> None:
@@ -43,8 +43,7 @@ class Reach:
         return (facet[:, None] * self._n + self.pair.projection.facet.reshape(shape)).ravel()
 
     def dofs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Keys ``(p,)`` of the facets of this rank and those that they may meet, dofs of rows ``(p, k + o)`` and of
-        columns ``(p, a + o)``."""
+        """The keys ``(p,)`` of this rank's facets, their dofs of rows ``(p, k + o)`` and of columns ``(p, a + o)``."""
         surface, opposite = self.pair.surface, self.pair.opposite
         facet, met = np.divmod(self.keys, self._n)
         here = np.isin(facet, surface.facet)

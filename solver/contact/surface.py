@@ -95,8 +95,7 @@ class Surface:
         self.points = Points(self.material, self.weight.size)
 
     def _trace_inequality(self) -> Array:
-        """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over the facet <= gamma a(v, v) over its cell`` for all
-        ``v``.
+        """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over a facet <= gamma a(v, v) over its cell``, any ``v``.
 
         Warburton and Hesthaven (2003) give the constant for polynomials; here the generalised eigenvalue problem of
         each contact cell is solved, with its curved geometry and its elastic moduli. Unit: stress / length.
@@ -166,8 +165,7 @@ class RigidSurface:
 
 
 def neighbours(curve: Curve | RigidCircle, facets: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
-    """``facets`` ``(m,)`` of ``curve`` and those within some ``rings`` around: places ``(k,)`` in ``facets`` and
-    neighbours, some twice on short closed curves."""
+    """Places ``(k,)`` in ``facets`` ``(m,)`` of ``curve`` and facets within ``rings`` around, some perhaps twice."""
     near = [facets]
     for adjacent in (curve.before, curve.after):
         facet = facets
@@ -179,8 +177,7 @@ def neighbours(curve: Curve | RigidCircle, facets: np.ndarray, rings: int) -> tu
 
 
 def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells that this rank owns behind boundary ``facets``, the facets' numbers within them, and which of them lie
-    between two cells."""
+    """Owned cells behind ``facets``, the facets' numbers within them, and which of these lie between two cells."""
     for dimensions in ((1, 2), (2, 1)):
         mesh.topology.create_connectivity(*dimensions)
     to_cell, to_facet = mesh.topology.connectivity(1, 2), mesh.topology.connectivity(2, 1)
