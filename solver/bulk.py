@@ -22,7 +22,7 @@ from archord.materials.elasticity import mean_stress, von_mises
 from archord.materials.material import Material, Points
 
 Index = npt.NDArray[np.integer]
-_NONE = np.zeros(0, dtype=np.int64)
+_NO_SLOTS = np.zeros((2, 0), dtype=np.int64)
 
 
 def _voigt(u):
@@ -30,9 +30,7 @@ def _voigt(u):
     return ufl.as_vector([e[0, 0], e[1, 1], 2 * e[0, 1]])
 
 
-def matrix(
-    V: fem.FunctionSpace, forms: list[fem.Form], extra: tuple[np.ndarray, np.ndarray] = (_NONE, _NONE)
-) -> PETSc.Mat:
+def matrix(V: fem.FunctionSpace, forms: list[fem.Form], extra: Iterable[np.ndarray] = _NO_SLOTS) -> PETSc.Mat:
     """An empty matrix with room for the bilinear ``forms`` of separate bodies and ``extra`` blocks (rows, columns), in
     global block dofs and rows that this rank owns. PETSc gives back what is not written before the first assembly."""
     index_map = V.dofmap.index_map

@@ -1,8 +1,7 @@
 """Guesses from a coarser mesh (nested iteration), which follows the path of loads step by step.
 
-Newton's method moves the edge of the contact, and of a plastic zone, by few elements an iteration, so that iterations
-grow with the mesh. The coarse problem finds both edges where iterations are cheap; its increments, interpolated, leave
-the fine one to correct them by less than a coarse element.
+Newton's method moves the edge of the contact, and of a plastic zone, by few elements an iteration. The coarse problem
+finds both edges where iterations are cheap; the fine one corrects its increments by less than a coarse element.
 """
 
 from __future__ import annotations

@@ -89,10 +89,9 @@ class Drives:
         """The unit of a level: one that moves a node by 1 at most, or whose forces are of the size of the stiffness."""
         if not self.moving[level]:
             return self.stiffness / self.comm.allreduce(np.abs(self.applied[level]).sum())
-        largest = max(
-            np.abs(self.rate[level]).max(initial=0.0), *(np.abs(d.rate[level]).max() for d in contact.rigid), 0
-        )
-        if (largest := self.comm.allreduce(largest, op=MPI.MAX)) == 0:
+        rates = self.rate[level], *(disc.rate[level] for disc in contact.rigid)
+        largest = self.comm.allreduce(max(np.abs(rate).max(initial=0.0) for rate in rates), op=MPI.MAX)
+        if largest == 0:
             raise ValueError(f"the drive {self.names[level]!r} moves nothing: supports hold all that it would move")
         return 1 / largest
 

@@ -39,9 +39,8 @@ class LoadPath:
 
     The guess for a step is, where there is a ``coarse`` start, what a coarser mesh found. Else it extrapolates the last
     increment; where that fails elastic bodies start from the last state itself. Where the path starts or turns, or
-    another drive takes over, the guess comes from the elastic solution, at the start from ``first_guess(load)``. Where
-    the bodies were not in equilibrium before the first step (a press fit), or before the last one were loose, its
-    increment says nothing about the next.
+    another drive takes over, the guess comes from the elastic solution, at the start from ``first_guess(load)``. The
+    increment from a state without equilibrium (a press fit), or of loose bodies, says nothing about the next.
     """
 
     def __init__(

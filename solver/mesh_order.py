@@ -8,7 +8,7 @@ that of a contact edge's points along the curve depends on the ranks.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from dolfinx.mesh import entities_to_geometry
@@ -121,10 +121,10 @@ class MeshOrder:
         return values[np.searchsorted(index, self._index)]
 
     def collect_history(self) -> Arrays:
-        """History of the points that have one, on rank 0: "history/PLACE/point", their numbers in rising order, and
+        """Histories on rank 0: "history/PLACE/point", numbers of points that have one in rising order, and
         "history/PLACE/NAME" for every array of their state. Collective."""
         whole = {}
-        for place, (points, number) in self._points().items():
+        for place, points, number in self._points():
             now, virgin = vars(points.state), vars(points.material.state(points.n))
             changed = [(v != virgin[name]).any(axis=tuple(range(1, v.ndim))) for name, v in now.items()]
             used = np.logical_or.reduce(changed)
@@ -136,19 +136,17 @@ class MeshOrder:
     def spread_history(self, whole: Arrays | None) -> None:
         """The inverse of `collect_history`: give every point its history. Collective."""
         stored: Arrays = self.system.comm.bcast(whole)
-        for place, (points, number) in self._points().items():
+        for place, points, number in self._points():
             state, known = points.material.state(len(number)), stored[f"history/{place}/point"]
             _, here, there = np.intersect1d(number, known, assume_unique=True, return_indices=True)
             for name, values in vars(state).items():
                 values[here] = stored[f"history/{place}/{name}"][there]
             points.state = points.trial = state
 
-    def _points(self) -> dict[str, tuple[Points, np.ndarray]]:
-        """All points with history of this rank and their numbers ``(n q,)``, by place."""
+    def _points(self) -> Iterator[tuple[str, Points, np.ndarray]]:
+        """The places with history, this rank's points there, and their numbers ``(n q,)``."""
         found = {f"bulk {tag}": (self._cell_index[c], p) for tag, (c, p) in self.system.bulk.histories().items()}
-        numbered = {}
         for place, (entity, points) in (found | self.system.contact.histories()).items():
             if points.state is not None:
                 q = points.n // max(len(entity), 1)
-                numbered[place] = points, (entity.astype(np.int64)[:, None] * q + np.arange(q)).ravel()
-        return numbered
+                yield place, points, (entity.astype(np.int64)[:, None] * q + np.arange(q)).ravel()

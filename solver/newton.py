@@ -201,5 +201,4 @@ _REASONS = {
     _R.DIVERGED_LINE_SEARCH: "the line search found no smaller residual",
     _R.DIVERGED_LINEAR_SOLVE: "the linear system could not be factorised",
     _R.DIVERGED_FNORM_NAN: "the residual is not a number",
-    _R.DIVERGED_FUNCTION_DOMAIN: "the residual could not be evaluated",
 }

@@ -1,8 +1,7 @@
 """A problem of solid mechanics to be solved: bodies on a mesh, what they touch, what holds them, what loads them.
 
 Sets of cells, facets and points are named in the mesh. One number, the load factor, runs along the path; drives turn it
-into displacements of supports and rigid circles, and into forces. Lengths, stresses and forces (per unit thickness) are
-in any consistent units.
+into displacements of supports and rigid circles, and into forces (per unit thickness), in any consistent units.
 """
 
 from __future__ import annotations
@@ -36,8 +35,7 @@ class Drive:
 
     ``path`` holds the values at the load factors 0, 1, 2, ..., with straight lines between, constant behind; without
     one the value is the load factor itself. Under ``control`` "force" the value is the force that works on the drive's
-    displacement, over all symmetric parts of the problem, and the displacement is one more unknown. Of loads the value
-    is always the force.
+    displacement, over all symmetric parts of the problem, and the displacement is unknown. Loads always take a force.
     """
 
     name: str

@@ -59,12 +59,9 @@ class RigidMotions:
         return self.comm.allreduce(np.tensordot(motions[:, : self.drives.n_owned], forces, ((1, 2), (1, 2))))
 
     def at_rest(self, load: float, state: Array) -> Array:
-        """A ``state`` of the equilibrium at ``load``, with bodies moved as their supports are, and loose ones moved to
-        where contact and forces push them; as it was where contact points find no partners on the way.
-
-        The contact law alone resists. Newton's method finds the least energy, damped as long as forces are large
-        (Levenberg 1944), in steps of a facet at most.
-        """
+        """A ``state`` at ``load``, with bodies moved as their supports are, and loose ones to where contact and forces
+        push them; as it was where contact points find no partners on the way. The contact law alone resists: Newton's
+        method finds the least energy, damped while forces are large (Levenberg 1944), in steps of a facet at most."""
         if not self.contact.pairs:
             return state
         drives, n = self.drives, self._modes[0].size
@@ -123,9 +120,8 @@ class Springs:
     """The springs of what ``rigid`` finds loose, bodies and discs; ``stiffness`` is that of discs. Collective.
 
     ``forces`` ``(n_owned dofs,)`` are those of the bodies' last displacements, ``on_levels`` ``(d,)`` those of discs,
-    and ``work`` what the springs took up, of the modelled part; ``energy`` is its sum over accepted states.
-    ``of_free`` is their matrix without rows and columns of prescribed displacements. They are ``idle`` where contact
-    holds in the last accepted state what they do not.
+    and ``work`` what the springs took up, of the modelled part; ``energy`` is its sum over accepted states. ``of_free``
+    is their matrix without prescribed displacements. In the last accepted state ``idle`` ones left all to contact.
     """
 
     def __init__(self, rigid: RigidMotions, stiffness: float) -> None:

@@ -1,7 +1,6 @@
 """Load stepping along a path: output targets are hit exactly, a step that fails is taken back with all history and cut.
 
-The path is a list of loads, reached one after the other on straight lines, up, down and through zero. Lengths of steps
-are in output steps, whatever the load between two targets.
+The path is a list of loads, reached on straight lines, up, down and through zero. Steps are measured in output steps.
 """
 
 from __future__ import annotations

@@ -32,9 +32,8 @@ _AT_REST = 10.0  # times the round-off: forces that are none
 class System:
     """``problem`` ready to be solved; forces and energies are those of the whole, its symmetric parts included.
 
-    ``sides`` holds the surfaces of bodies in contact by the name of their facet set; ``n_dofs`` counts displacements,
-    prescribed ones included. Collective; raises ValueError for a problem that contradicts itself and `ProjectionError`
-    if a surface does not find its opposite.
+    ``sides`` holds the surfaces of bodies in contact by the name of their facet set; ``n_dofs`` counts prescribed
+    displacements, too. Collective; raises ValueError for contradictions, `ProjectionError` for surfaces that miss.
     """
 
     def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:

@@ -28,9 +28,8 @@ from archord.solver.contact.tangent import ContactTangent, trial_rate
 class Contact:
     """All ``interfaces``, if any, in the displacement space ``V``: ``surfaces`` of bodies, ``rigid`` ones, ``pairs``.
 
-    A surface belongs to one interface, as its points do. ``active_set_changes`` counts the points of this rank that
-    opened or closed at the last evaluation; ``tangent`` is the derivative of what `add_force` adds, another one
-    whenever the pattern had to grow. Collective.
+    A surface belongs to one interface. ``active_set_changes`` counts this rank's points that opened or closed at the
+    last evaluation; ``tangent`` is the derivative of what `add_force` adds, renewed as the pattern grows. Collective.
     """
 
     def __init__(self, V: fem.FunctionSpace, interfaces: Sequence[Interface] = ()) -> None:

@@ -106,10 +106,8 @@ class Interface:
 
     def resultant(self) -> Array:
         """Contact force ``(2,)`` on the second surface, over all ranks."""
-        total = np.zeros(2)
-        for pair in self.pairs:
-            total += pair.forces.sum(0) * (1 if pair.surface is self.surfaces[1] else -1)
-        return self.pairs[0].surface.sum_over_ranks(total)
+        forces = (pair.forces.sum(0) * (1 if pair.surface is self.surfaces[1] else -1) for pair in self.pairs)
+        return self.pairs[0].surface.sum_over_ranks(sum(forces, np.zeros(2)))
 
 
 @contextmanager

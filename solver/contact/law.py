@@ -21,8 +21,7 @@ State = Any
 class ContactLaw(Protocol):
     """A law by its `update`, a pure function; without a history and without friction as it stands.
 
-    Points of a law that ``slides`` move along the opposite surface. Those of others keep the partners and the distance
-    that they have undeformed, where gap and slip count as zero.
+    Points of a law that ``slides`` move along the opposite surface; others keep partners, and undeformed gaps as zero.
     """
 
     slides: ClassVar[bool] = True

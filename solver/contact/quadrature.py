@@ -1,9 +1,8 @@
 """Quadrature that respects the facets of the opposite curve.
 
 A point's force goes to the nodes of its partner facet, whose shape functions have kinks at its ends. Points that ignore
-them integrate a uniform pressure with an error of the order of the mesh (11 % scatter where 4 edges meet 7); on facets
-that are broken there a patch test is passed exactly. Breaks stay where the undeformed curves face each other, as points
-carry history: pairs that slide by a part of a facet get that part of the error back.
+them integrate a uniform pressure with an error of the order of the mesh; facets broken there pass a patch test exactly.
+Breaks stay, as points carry history: pairs that slide by a part of a facet get that part of the error back.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """One side of a contact: the facets of a body's contact edge on this rank, and the whole edge as a curve on every rank.
 
-Nothing outside of this file relies on how the facets follow each other. The curve is small (it grows with the square
-root of the mesh), so every rank holds all of it and exchanges its displacement; each rank integrates the facets of the
-cells it owns. What a facet needs of its own cell stays local.
+The curve is small (it grows with the square root of the mesh), so every rank holds all of it and exchanges its
+displacement; each rank integrates the facets of the cells it owns.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The consistent linearisation of the contact forces as blocks of a matrix, each place once.
 
-The kernel in C (contact_tangent.c, which has the formulas) adds up the points of a pair of surfaces in slots that are
-found once for every two facets that may meet.
+The kernel in C (contact_tangent.c has the formulas) adds up points in slots found once for facets that may meet.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin
     patient = solve(scene)
     monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
     long = solve(scene)
-    assert short.joint.factorisations == 1 < long.joint.factorisations
+    assert short.joint.equilibrium.tangent.factorisations == 1 < long.joint.equilibrium.tangent.factorisations
     counts = [[m.iterations for m in run.steps] for run in (short, long)]
     assert max(counts[0]) <= 4
     assert sum(counts[0]) < 0.8 * sum(counts[1])
@@ -93,7 +93,7 @@ def test_the_ranks_take_the_same_way(comm, pin):
     for a, b in zip(many.steps, one.steps, strict=True):
         assert a.iterations == b.iterations
         assert (a.P, a.p0, a.eps) == pytest.approx((b.P, b.p0, b.eps), rel=1e-10)
-    assert many.joint.factorisations == one.joint.factorisations == 1
+    assert many.joint.equilibrium.tangent.factorisations == one.joint.equilibrium.tangent.factorisations == 1
 
 
 def test_only_joints_that_stay_elastic_and_held_are_condensed():
