@@ -44,11 +44,7 @@ class LoadPath:
     """
 
     def __init__(
-        self,
-        solver: Recovery,
-        first_guess: Callable[[float], Array],
-        at: Position | None = None,
-        coarse: CoarseStart | None = None,
+        self, solver: Recovery, first_guess: Callable[[float], Array], at: Position | None, coarse: CoarseStart | None
     ) -> None:
         self.solver, self._first_guess, self.at, self.coarse = solver, first_guess, at or Position(), coarse
         self.state = solver.equilibrium.state()

@@ -1,8 +1,7 @@
 """Fields and histories in the order of the mesh generator, whatever the number of ranks and their cut of the mesh.
 
-Rank 0 holds what is collected. The points of a body or a contact edge are numbered through: the cell's (facet's) number
-times points per cell, plus the point's. Neither the order of a cell's nodes, from which that of its points follows, nor
-that of a contact edge's points along the curve depends on the ranks.
+Rank 0 holds what is collected. The number of a point is that of its cell or facet times points per cell, plus its own.
+Neither the order of a cell's nodes, and so of its points, nor that along a contact edge depends on the ranks.
 """
 
 from __future__ import annotations

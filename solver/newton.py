@@ -25,9 +25,8 @@ _ADDED_UP = ("iterations", "residuals", "active_set_changes", "factorisations", 
 class Newton:
     """What a nonlinear solve did: whether it converged and why not, its iterations and residuals relative to reaction.
 
-    Of a solve that did not converge, ``worst`` is the place ``(2,)`` of the largest residual, ``active_set_changes``
-    the contact points that opened or closed at each residual, ``plastic_increment`` the largest increment of PEEQ.
-    ``held``: contact points had to stay on their facets. ``evaluations`` are those of the residual.
+    Without convergence ``worst`` is the place ``(2,)`` of the largest residual, ``plastic_increment`` the largest of
+    PEEQ. ``active_set_changes`` belong to each residual. ``held`` contact points had to stay on their facets.
     """
 
     converged: bool

@@ -53,8 +53,7 @@ class Support:
 
     ``rate`` is a number, or a function of the nodes' positions ``(n, 2)`` that returns ``(n,)``. Supports of one
     ``name`` have one reaction, and where they share nodes their drives add up; of different names the last one counts
-    there. Supports of one name by drives "x", "y" and "turn" with the rates 1, 1, and ``Y - y`` and ``x - X``, are a
-    rigid reference point at (X, Y).
+    there. Drives "x", "y", "turn" of one name, at rates 1, 1, ``(Y - y, x - X)``, are a rigid reference point (X, Y).
     """
 
     name: str
@@ -119,8 +118,7 @@ class Problem:
     without being given, with the load factor for its displacement. ``load_name`` names the load in messages.
 
     With ``fit`` the path begins with a stage of its own: between the load factors 0 and 1 interferences grow from
-    nothing. With ``stabilise`` bodies that supports alone do not hold are attached to their last accepted state by weak
-    springs, so that they may begin without contact.
+    nothing. With ``stabilise`` weak springs hold bodies that supports do not, which so may begin without contact.
 
     ``symmetry`` is how many times the modelled part makes up the whole, whose forces and energies are reported.
     ``travel`` is the size of displacements to be expected, which limits what counts as round-off. Newton's method stops

@@ -1,7 +1,4 @@
-"""What is tried where Newton's method does not converge, before a step is cut.
-
-With a line search and without, points held on their facets, elastic points first, continuation in gamma.
-"""
+"""What is tried where Newton's method does not converge, before a step is cut."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
 As if rigid, bodies go where contact and forces push them; from there the elastic ones find their equilibrium. Springs
 between them and their last accepted state hold what does not touch even then: each point of a body of area ``A`` is
 pulled back with `WEAK` times ``M / A`` per displacement and area, ``M`` being the modulus of uniaxial strain, so that a
-force moves the body by about ``1 / WEAK`` times as much as it deforms it. Rigid discs under forces have springs of
-`WEAK` times ``M``.
+force moves the body by about ``1 / WEAK`` times as much as it deforms it; rigid discs under forces, with `WEAK` ``M``.
 """
 
 from __future__ import annotations

@@ -37,8 +37,7 @@ class System:
     """
 
     def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:
-        self.problem, self.timer = problem, timer or Timer()
-        self.comm = problem.mesh.mesh.comm
+        self.problem, self.timer, self.comm = problem, timer or Timer(), problem.mesh.mesh.comm
         with self.timer("setup"):
             variant = basix.LagrangeVariant.equispaced
             mesh, degree = problem.mesh.mesh, problem.degree

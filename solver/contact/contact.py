@@ -66,9 +66,8 @@ class Contact:
                 pair.use_gamma(min(interface.interaction.gamma_factor, factor))
 
     def evaluate(self, u: Array, *, reach: bool = True) -> bool:
-        """Gaps, tractions and trial history at the nodal displacements ``u`` ``(n, 2)`` of this rank; returns whether
-        the matrix pattern had to grow (the pairs slid out of it), which without ``reach`` it does not. Collective;
-        raises `ProjectionError` on every rank if a point on any of them finds no partner."""
+        """Gaps, tractions and trial history at this rank's displacements ``u`` ``(n, 2)``; whether the pattern had to
+        grow, which without ``reach`` it does not. Collective; raises `ProjectionError` on every rank."""
         motions = [pair.opposite.curve_displacement(u) for pair in self.pairs]
         try:
             with on_every_rank(self.comm):
@@ -84,9 +83,8 @@ class Contact:
         return grew
 
     def anticipate(self, u: Array) -> bool:
-        """Open and close the points that would with the displacements ``u`` ``(n, 2)``, to first order and between the
-        same partners, while rigid surfaces stand still; returns whether any does. Closed points carry their trial
-        pressure, a tension too, until the next evaluation. Collective."""
+        """Open and close points as ``u`` ``(n, 2)`` would, to first order, with the partners and rigid surfaces they
+        have; returns whether any does. Closed points carry their trial pressure, even a tension. Collective."""
         for pair in self.pairs:
             pair.expect(trial_rate(pair, u))
         return self.comm.allreduce(sum(pair.changes for pair in self.pairs)) > 0

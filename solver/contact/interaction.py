@@ -70,11 +70,8 @@ class Interaction:
 
 
 class Interface:
-    """The ``interaction`` of two ``surfaces`` as pairs of them.
-
-    Collective; raises ValueError if none of them is to be integrated, or an interference is to be tied, and
-    `ProjectionError` on every rank if a point on any of them finds no partner.
-    """
+    """The ``interaction`` of two ``surfaces`` as pairs of them. Collective; raises ValueError if none is integrated, or
+    an interference is tied, and `ProjectionError` on every rank if a point on any finds no partner."""
 
     def __init__(self, interaction: Interaction, surfaces: Sequence[Surface | RigidSurface]) -> None:
         self.interaction, self.surfaces = interaction, list(surfaces)

@@ -13,10 +13,9 @@ _WIDEST = 16  # the same where pairs are expected to slide further
 
 
 class Reach:
-    """Which opposite facets each facet of a ``pair`` may meet, where points are expected to slide by ``slide``.
+    """Which opposite facets each facet of a ``pair`` may meet, where points slide by about ``slide``. Collective.
 
-    ``keys`` ``(n,)`` of pairs of facets, own times the number of opposite ones plus opposite, are sorted, and the same
-    on every rank. Collective.
+    ``keys`` ``(n,)``, sorted and alike on all ranks, are own facets times the number of opposite ones, plus opposite.
     """
 
     def __init__(self, pair: Pair, slide: float) -> None:

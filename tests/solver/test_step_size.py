@@ -48,7 +48,7 @@ class Spring:
 def follow(targets, cost=lambda load, stride: 3, spring=None, **rules):
     spring, done, accepted = spring or Spring(cost), [], []
     march(
-        LoadPath(spring, lambda load: np.zeros(1)),
+        LoadPath(spring, lambda load: np.zeros(1), None, None),
         targets,
         rules=StepRules(**rules),
         substep_done=accepted.append,
