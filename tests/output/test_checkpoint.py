@@ -31,7 +31,7 @@ def pressed():
 def point_numbers(order: MeshOrder) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Numbers ``(n,)`` and coordinates ``(n, 2)`` of all points that may have a history, on every rank."""
     joint, here = order.system, {}
-    for place, (_, number) in order._points().items():
+    for place, _, number in order._points():
         kind, name = place.split()
         if kind == "contact":
             x = joint.sides[name].point
