@@ -225,7 +225,7 @@ class Bulk:
             if body is None:
                 body = _BodyPoints(self.V, cells, self.materials[tag])
                 body.update(u)
-            shape, points = (*body.weight.shape, -1), body.points
+            shape, points = (*body.weight.shape, 4), body.points
             plastic_strain = getattr(points.trial, "plastic_strain", np.zeros_like(body.stress)).reshape(shape)
             peeq = points.peeq.reshape(body.weight.shape)
             yield PointFields(cells, body.point, body.weight, body.stress.reshape(shape), plastic_strain, peeq)
