@@ -173,7 +173,7 @@ CYCLE, IN_A_ROW = 'path = "cycle.csv"', "cycle.csv: must have a number in every 
         ("displacement = []", None, "must not be empty"),
         ('displacement = "far"', None, "must be a number"),
         ('displacement = [1.0, "far"]', None, "entry 2 must be a number"),
-        ("displacement = [1.0, 2.0]\nsteps = [1]", None, "must have one number for each of the 2 targets"),
+        ("displacement = [1.0, 2.0]\nsteps = [1]", None, "must have one number for each of the 2 stages"),
         ("displacement = 1.0\nsteps = 0", None, "must be at least 1"),
         ("displacement = 1.0\nsteps = 1.5", None, "must be a whole number"),
         (f"displacement = 1.0\n{CYCLE}", None, "load.displacement = 1.0 must not be given together with path"),
