@@ -192,8 +192,9 @@ class Equilibrium:
     def worst_place(self) -> tuple[float, float] | None:
         """Where the residual is largest, over all ranks."""
         size = np.nan_to_num(np.linalg.norm(self._where_free(), axis=1), nan=-1.0, posinf=-1.0)
-        x = self.V.tabulate_dof_coordinates()[: len(size), :2].tolist()
-        value, place = max(self.comm.allgather(max(zip(size, map(tuple, x), strict=True), default=(-1.0, (0.0, 0.0)))))
+        at = size.argmax() if len(size) else 0
+        x = self.V.tabulate_dof_coordinates()[at, :2] if len(size) else np.zeros(2)
+        value, place = max(self.comm.allgather((size.max(initial=-1.0), tuple(x))))
         return place if value >= 0 else None
 
     def displacement(self) -> Array:

@@ -31,7 +31,8 @@ class Recovery:
         springs = self.equilibrium.springs
         for guess, afar in guesses:
             if springs is not None and (afar or not springs.idle):
-                guess, afar = springs.rigid.at_rest(load, guess), True
+                with self.equilibrium.timer("contact"):
+                    guess, afar = springs.rigid.at_rest(load, guess), True
             if self._solve_in_stages(guess, afar):
                 break
         return Newton.together(self._solves)
