@@ -1,0 +1,79 @@
+"""The table of a joint's law: continuity, slopes, inverse, the way back, first touch, units, several joints at once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from archord.postprocess.laws.joint_curve import JointCurve, first_touch
+from tests.postprocess.laws.curves import yielding_curve
+
+X = np.linspace(0.0, 3.3, 500)
+
+
+def test_slopes_are_those_of_the_force() -> None:
+    """dP/d(delta) is the derivative of P, loading and coming back, but at kinks: where it opens, and the deepest."""
+    curve, h = yielding_curve(), 1e-7
+    for deepest in (0.0, 1.0, 2.5):
+        z = float(curve.residual(np.array([deepest]))[0])
+        x = X[(np.abs(X - deepest) > 1e-3) & (np.abs(X - z) > 1e-3) & (X > 0)]
+        slope = (curve.at(x + h, deepest).load - curve.at(x - h, deepest).load) / (2 * h)
+        np.testing.assert_allclose(curve.at(x, deepest).stiffness, slope, rtol=2e-6, atol=2e-6)
+
+
+def test_both_branches_meet_at_the_deepest_point_and_the_way_back_is_below() -> None:
+    """P is continuous, never above first loading on the way back, and zero up to the residual clearance."""
+    curve = yielding_curve()
+    first = curve.at(X).load
+    for deepest in (0.3, 1.0, 2.5):
+        back, z = curve.at(X, deepest).load, float(curve.residual(np.array([deepest]))[0])
+        assert (back <= first).all()
+        assert (np.diff(back) >= 0).all()
+        assert 0 <= z < deepest
+        np.testing.assert_array_equal(back > 0, (z < X) & (X > 0))
+        assert abs(float(curve.at([deepest - 1e-12], deepest).load[0] - curve.at([deepest]).load[0])) < 1e-10
+    assert float(curve.residual(np.array([2.5]))[0]) > 0.5
+
+
+def test_the_inverse_gives_the_displacement_back() -> None:
+    """delta(P(delta)) = delta; no displacement of first loading has more than the largest force."""
+    curve = yielding_curve()
+    x = X[X <= 3.0]
+    np.testing.assert_allclose(curve.displacement(curve.at(x).load), x, atol=1e-12)
+    assert np.isnan(curve.displacement([1.001 * curve.y[-1]])[0])
+
+
+def test_first_touch_is_line_contact() -> None:
+    """P at first touch solves pi x/y + ln(y/(1 + y)) = F, and its slope tends to zero with the logarithm."""
+    curve, x = yielding_curve(), np.geomspace(1e-9, 0.019, 30)
+    y, a = curve.at(x).load, curve.touch[0]
+    F = np.pi * x / y + np.log(y / (1 + y))
+    np.testing.assert_allclose(F, a + curve.touch[1] * x + curve.touch[2] * x * x, rtol=1e-12)
+    y, slope = first_touch(curve.touch, np.array([1e-200]))
+    assert slope[0] == pytest.approx(np.pi / (a - np.log(y[0])), rel=0.01)
+
+
+def test_units_scale_and_nothing_else() -> None:
+    """A joint in other units has the same law."""
+    curve = yielding_curve()
+    other = replace(curve, length=0.05, force=7e3, pressure=210.0)
+    for mine, theirs, unit in zip(
+        curve.at(X, 1.0), other.at(0.05 * X, 0.05), (7e3, 1.4e5, 7e3, 210.0, 1.0), strict=True
+    ):
+        np.testing.assert_allclose(mine * unit, theirs, rtol=1e-9, atol=1e-9 * unit)
+
+
+def test_several_joints_at_once_and_json() -> None:
+    """Tables of several joints give what each gives alone; JSON keeps every digit."""
+    curves = [yielding_curve(onset) for onset in (0.4, 0.8)]
+    names = [name for name in vars(curves[0]) if name not in ("x", "length", "force", "pressure", "about")]
+    both = replace(curves[0], **{name: np.stack([getattr(curve, name) for curve in curves]) for name in names})
+    for deepest in (0.0, 2.0):
+        for row, curve in enumerate(curves):
+            np.testing.assert_array_equal(both.at(X, deepest).load[row], curve.at(X, deepest).load)
+    again = JointCurve.from_json(curves[0].to_json())
+    np.testing.assert_array_equal(again.at(X, 1.0).load, curves[0].at(X, 1.0).load)
+    with pytest.raises(ValueError, match="no table"):
+        JointCurve.from_json("{}")
