@@ -135,7 +135,7 @@ class JointCurve:
         f, df, y = np.broadcast_arrays(f[..., None, :], df[..., None, :], y[..., None])
         f, df, y = f.reshape(-1, len(self.x)), df.reshape(-1, len(self.x)), y[..., 0]
         shape, rows = y.shape, np.arange(f.shape[0])
-        values = y.ravel()
+        values: Array = y.ravel()
         i = np.clip((f <= values[:, None]).sum(-1) - 1, 0, len(self.x) - 2)
         x0, h = self.x[i], self.x[i + 1] - self.x[i]
         f0, f1, d0, d1 = f[rows, i], f[rows, i + 1], h * df[rows, i], h * df[rows, i + 1]
@@ -170,7 +170,9 @@ class JointCurve:
         """The curve in ``text``. Raises ValueError if it is none."""
         try:
             data = json.loads(text)
-            given = {f.name: np.array(data[f.name]) if f.type == "Array" else data[f.name] for f in fields(cls)}
+            given: dict[str, Any] = {
+                f.name: np.array(data[f.name]) if f.type == "Array" else data[f.name] for f in fields(cls)
+            }
         except (KeyError, TypeError) as error:
             raise ValueError(f"is no table of a joint's law: {error}") from None
         return cls(**given)
