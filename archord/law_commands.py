@@ -109,6 +109,7 @@ def _joint(
     values = {name: value for name, value in given.items() if value is not None}
     if "nu" in values:
         values["pin_nu"] = None  # one for both
+    strength = values.pop("yield_stress", None)
     if scene is not None:
         from archord.scene.file import load_scene
         from archord.scene.scene import Scene
@@ -119,13 +120,22 @@ def _joint(
         units, thick = loaded.units.model_dump(), loaded.analysis.thickness
         units["force"] = loaded.units.force_of(thick)
         units["stiffness"] = units["stress"] if thick is None else f"{units['force']}/{units['length']}"
-        return dataclasses.replace(LawJoint.from_scene(loaded), **values), units, loaded.thickness
+        joint = dataclasses.replace(LawJoint.from_scene(loaded), **values)
+        return _yielding(joint, strength), units, loaded.thickness
     if overrides:
         raise InputError("--set: changes a scene; give one with --scene.")
     missing = [f"--{name.replace('_', '-')}" for name in ("radius", "clearance", "E_star") if name not in values]
     if missing:
         raise InputError(f"{', '.join(missing)}: missing; give radius, clearance and E* of the joint, or a --scene.")
-    return LawJoint(**values), {}, 1.0
+    return _yielding(LawJoint(**values), strength), {}, 1.0
+
+
+def _yielding(joint: LawJoint, strength: float | None) -> LawJoint:
+    """``joint`` with the yield ``strength``, if one is given, in those of its bodies that yield, or in both."""
+    if strength is None:
+        return joint
+    pin = strength if joint.yielding != "block" and joint.pin_share else None
+    return dataclasses.replace(joint, pin_yield=pin, block_yield=None if joint.yielding == "pin" else strength)
 
 
 @click.command()

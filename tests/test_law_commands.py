@@ -30,7 +30,7 @@ def test_law_prints_its_numbers(capsys):
     numbers = ["--yield-stress", "230", "--c", "1.5", "--points", "4", "--to", "1"]
     assert run(["law", "paper-plastic", *JOINT, *numbers]) == 0
     columns = table(capsys.readouterr().out)
-    state = LAWS["paper-plastic"].at_displacement(LawJoint(10, 0.05, 115385, yield_stress=230, c=1.5), columns["delta"])
+    state = LAWS["paper-plastic"].at_displacement(LawJoint(10, 0.05, 115385, block_yield=230, c=1.5), columns["delta"])
     assert columns["delta/dR"] == pytest.approx([0.25, 0.5, 0.75, 1])
     assert columns["P"] == pytest.approx(state.load, rel=1e-5)
     assert columns["P/E*R"] == pytest.approx(columns["P"] / 1153850, rel=1e-5)

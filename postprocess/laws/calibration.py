@@ -169,7 +169,7 @@ def dimensionless_law(quantity: str, run: RunCurve, delta: Array, k: float, c: f
 
 def _joint(run: RunCurve, k: float, c: float | None = None) -> LawJoint:
     """The joint of ``run`` with these coefficients; elastic without ``c``."""
-    return LawJoint(run.R, run.dR, run.E_star, run.sigY if c else None, k=k, c=c or 1.0)
+    return LawJoint(run.R, run.dR, run.E_star, block_yield=run.sigY if c else None, k=k, c=c or 1.0)
 
 
 def _selected(run: RunCurve, load_range: tuple[float, float]) -> npt.NDArray[np.bool_]:
@@ -241,7 +241,7 @@ def check_compatible(runs: list[RunCurve]) -> None:
     first = runs[0]
     for run in runs[1:]:
         own, wanted = (LawJoint.from_scene(each.scene) for each in (run, first))
-        ours, theirs = ((joint.dundurs_alpha, joint.nu or 0.0, joint.pin_nu or 0.0) for joint in (own, wanted))
+        ours, theirs = ((joint.pin_share, joint.nu or 0.0, joint.pin_nu or 0.0) for joint in (own, wanted))
         softer, fault = abs(own.softer[0] - wanted.softer[0]), ""
         if own.plane != wanted.plane:
             fault = f"analysis.plane = {run.plane!r} does not fit: {first.name} is in plane {first.plane}"

@@ -45,7 +45,7 @@ def plastic_winkler(joint: LawJoint, delta: Array) -> LawState:
 
 def parabola(joint: LawJoint, delta: Array) -> LawState:
     """Elastic NFD (eqs 8, 9): `plastic_winkler` without a yield stress."""
-    return plastic_winkler(replace(joint, yield_stress=None), delta)
+    return plastic_winkler(replace(joint, pin_yield=None, block_yield=None), delta)
 
 
 def liu(joint: LawJoint, delta: Array) -> LawState:

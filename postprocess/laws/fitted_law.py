@@ -51,7 +51,7 @@ class FittedLaw(BaseModel):
         return self
 
     def _state(self, delta: ArrayLike) -> LawState:
-        joint = LawJoint(self.R, self.dR, self.E_star, self.sigY, k=self.k, c=self.c or 1.0)
+        joint = LawJoint(self.R, self.dR, self.E_star, block_yield=self.sigY, k=self.k, c=self.c or 1.0)
         return plastic_winkler(joint, np.maximum(delta, 0.0))
 
     def force(self, delta: ArrayLike) -> Array:

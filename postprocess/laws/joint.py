@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from archord.materials.elasticity import contact_modulus
-from archord.materials.material import Plane
 from archord.scene.scene import Scene
+from archord.scene.sections import Solid
 
 Array = npt.NDArray[np.floating]
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are
@@ -21,76 +22,106 @@ _SOFTER, _SOFTEST = 1.4, 2.5  # fall of P in a block of W, times (W/R)^2: of lik
 class LawJoint:
     """A pin of radius ``radius`` (R1) in a hole of radius R2 = R1 + ``clearance``, in any consistent units.
 
-    ``E_star`` is the contact modulus of the plane, ``yield_stress`` that of the weaker body, ``k`` Winkler's
+    ``E_star`` is the contact modulus of the plane, ``pin_share`` the share of the pin in the compliance 1/E* (0: a
+    rigid pin, 1/2: like bodies), ``pin_yield`` and ``block_yield`` the yield stresses (None: elastic), ``k`` Winkler's
     coefficient and ``c`` the plateau of the pressure over the yield stress (Hu et al., eqs 6 and 10), ``length`` along
-    the axis. ``dundurs_alpha`` = (E1' - E2')/(E1' + E2') is positive where the pin is the stiffer body,
-    ``dundurs_beta`` goes with it; both are zero for like bodies. Only the calibrated law asks for ``plane``, ``nu`` of
-    the block, ``pin_nu`` (None: the block's, or rigid), and which bodies have the yield stress, ``yielding`` ("unlike":
-    each its own). Laws of P(delta) are for a pin in a wide block, and say so of a ``ring``, where ``block_size`` (None:
-    wide) is small, or the pin is ``whole``, not cut at the pressed diameter; those with yielding say so where a body
-    ``hardens``. Raises ValueError for values that make no joint.
+    the axis. ``plane`` is "strain" or "stress", ``nu`` Poisson's ratio of the block, ``pin_nu`` that of the pin (None:
+    the block's, or rigid). ``pin_hardening`` and ``block_hardening`` are d(yield stress)/d(PEEQ) over Young's modulus
+    of the body (0: perfect plasticity, None: no straight line). Laws of P(delta) are for a pin in a wide block, and say
+    so of a ``ring``, where ``block_size`` (None: wide) is small, or the pin is ``whole``, not cut at the pressed
+    diameter. Raises ValueError for values that make no joint.
     """
 
     radius: float
     clearance: float
     E_star: float
-    yield_stress: float | None = None
+    pin_yield: float | None = None
+    block_yield: float | None = None
     k: float = 0.85
     c: float = 1.0
     length: float | None = None
-    dundurs_alpha: float = 0.0
-    dundurs_beta: float = 0.0
+    pin_share: float = 0.5
     plane: str | None = None
     nu: float | None = None
     pin_nu: float | None = None
-    yielding: str = "both"
+    pin_hardening: float | None = 0.0
+    block_hardening: float | None = 0.0
     ring: bool = False
     block_size: float | None = None
-    hardens: bool = False
     whole: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name in ("radius", "clearance", "E_star", "k", "c", "yield_stress", "length", "block_size"):
+        for name in ("radius", "clearance", "E_star", "k", "c", "pin_yield", "block_yield", "length", "block_size"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value:g} must be a positive number.")
-        for name, most in (("dundurs_alpha", 1), ("dundurs_beta", 0.5)):
-            if not abs(getattr(self, name)) <= most:
-                raise ValueError(f"{name} = {getattr(self, name):g} must be between {-most:g} and {most:g}.")
+        if not 0 <= self.pin_share <= 1:
+            raise ValueError(f"pin_share = {self.pin_share:g} must be between 0 and 1.")
         for name, value in (("nu", self.nu), ("pin_nu", self.pin_nu)):
             if value is not None and not -1 < value < 0.5:
                 raise ValueError(f"{name} = {value:g} must be between -1 and 0.5.")
-        for name, known in (("plane", (None, "strain", "stress")), ("yielding", ("both", "block", "pin", "unlike"))):
-            if getattr(self, name) not in known:
-                raise ValueError(f"{name} = {getattr(self, name)!r} must be one of {', '.join(filter(None, known))}.")
+        for name, value in (("pin_hardening", self.pin_hardening), ("block_hardening", self.block_hardening)):
+            if value is not None and not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"{name} = {value:g} must be a number that is not negative.")
+        if self.plane not in (None, "strain", "stress"):
+            raise ValueError(f"plane = {self.plane!r} must be one of strain, stress.")
 
     @classmethod
     def from_scene(cls, scene: Scene) -> LawJoint:
-        """The joint of ``scene``; of two yield stresses the lower one, of hardening only whether there is any."""
+        """The joint of ``scene``."""
         plane, pin, block = scene.analysis.plane, scene.solids.get("pin"), scene.block
-        alpha, first, yields, second = 1.0, 0.0, [None, block.yield_stress], _transverse(block.nu, plane)
+        given: dict[str, Any] = {"pin_share": 0.0}
         if pin is not None:
             ratio = contact_modulus(pin.E, pin.nu, plane) / contact_modulus(block.E, block.nu, plane)
-            alpha, first, yields[0] = (ratio - 1) / (ratio + 1), _transverse(pin.nu, plane), pin.yield_stress
+            given = {"pin_share": 1 / (1 + ratio), "pin_yield": pin.yield_stress, "pin_hardening": _hardening(pin)}
         return cls(
             scene.joint.radius,
             scene.joint.dR,
             scene.E_star,
+            block_yield=block.yield_stress,
             length=scene.analysis.thickness,
-            yield_stress=min((stress for stress in yields if stress is not None), default=None),
-            dundurs_alpha=alpha,
-            # in the compliances 1/E1' = (1 - alpha)/(2 E*), 1/E2' = (1 + alpha)/(2 E*)
-            dundurs_beta=((1 + alpha) * second - (1 - alpha) * first) / 2,
             plane=plane,
             nu=block.nu,
             pin_nu=scene.pin.nu,
-            yielding=_yielding(*yields),
+            block_hardening=_hardening(block),
             ring=not scene.joint.is_block,
             block_size=scene.joint.W,
-            hardens=not all(solid.perfectly_plastic for solid in scene.solids.values()),
             whole=scene.pin.whole,
+            **given,
         )
+
+    @property
+    def yield_stress(self) -> float | None:
+        """Yield stress of the weaker body; None if neither yields."""
+        return min((stress for stress in (self.pin_yield, self.block_yield) if stress is not None), default=None)
+
+    @property
+    def yielding(self) -> str:
+        """Which bodies yield: "none", "pin", "block", "both" at one stress, or "unlike", each at its own."""
+        pin, block = self.pin_yield, self.block_yield
+        if pin is None or block is None:
+            return "pin" if pin is not None else "block" if block is not None else "none"
+        return "both" if math.isclose(pin, block, rel_tol=1e-6) else "unlike"
+
+    @property
+    def hardens(self) -> bool:
+        """Whether a body that yields hardens."""
+        pairs = (self.pin_yield, self.pin_hardening), (self.block_yield, self.block_hardening)
+        return any(stress is not None and hardening != 0 for stress, hardening in pairs)
+
+    @property
+    def dundurs_alpha(self) -> float:
+        """``(E1' - E2')/(E1' + E2')``: positive where the pin is the stiffer body."""
+        return 1 - 2 * self.pin_share
+
+    @property
+    def dundurs_beta(self) -> float:
+        """Dundurs' other constant; zero where plane and nu are unknown, as for like bodies."""
+        if self.plane is None or self.nu is None:
+            return 0.0
+        pin, block = (_transverse(self.nu if nu is None else nu, self.plane) for nu in (self.pin_nu, self.nu))
+        return (1 - self.pin_share) * block - self.pin_share * pin
 
     @property
     def relative_radius(self) -> float:
@@ -126,13 +157,13 @@ class LawJoint:
         return self.radius * self.threshold / (self.k * self.E_star)
 
 
-def _yielding(pin: float | None, block: float | None) -> str:
-    if pin is not None and block is not None:
-        return "both" if math.isclose(pin, block, rel_tol=1e-6) else "unlike"
-    return "pin" if pin is not None else "block" if block is not None else "both"
+def _hardening(solid: Solid) -> float | None:
+    """d(yield stress)/d(PEEQ) over Young's modulus; None where that is no constant."""
+    straight = None if solid.back_stresses else solid.law.linear
+    return None if straight is None else straight[1] / solid.E
 
 
-def _transverse(nu: float, plane: Plane) -> float:
+def _transverse(nu: float, plane: str) -> float:
     """``(kappa - 1)/(kappa + 1)`` with Kolosov's constant: the part of Dundurs' beta that a body brings."""
     kappa = 3 - 4 * nu if plane == "strain" else (3 - nu) / (1 + nu)
     return (kappa - 1) / (kappa + 1)

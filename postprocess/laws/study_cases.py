@@ -163,10 +163,11 @@ def split(cases: Cases) -> tuple[Cases, Cases]:
 def joint_of_case(case: Any, k: float, c: float) -> LawJoint:
     """The joint of a ``case`` in units of R = E* = 1 with these coefficients; elastic where c is nan or infinite."""
     plastic = math.isfinite(c) and math.isfinite(case.strength)
-    return LawJoint(1.0, case.clearance, 1.0, case.strength if plastic else None, k=k, c=c if plastic else 1.0,
-                    dundurs_alpha=case.alpha, plane=case.plane, nu=case.nu,
-                    pin_nu=None if math.isnan(case.pin_nu) else case.pin_nu,
-                    yielding="both" if case.yielding == "none" else case.yielding)  # fmt: skip
+    strength, yields = case.strength if plastic else None, case.yielding
+    return LawJoint(1.0, case.clearance, 1.0, None if yields == "block" else strength,
+                    None if yields == "pin" else strength, k=k, c=c if plastic else 1.0,
+                    pin_share=(1 - case.alpha) / 2, plane=case.plane, nu=case.nu,
+                    pin_nu=None if math.isnan(case.pin_nu) else case.pin_nu)  # fmt: skip
 
 
 def case_table(cases: Cases) -> Table:

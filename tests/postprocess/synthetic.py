@@ -22,7 +22,7 @@ def curve(k, c=None, *, dR=0.005, sigY=None, R=1.0, modulus=1.0, noise=0.0, seed
     scene = paper_joint(joint=joint, pin=material, block=material, analysis=analysis or {})
     E_star, gap = scene.E_star, dR * R
     delta = LOADS * gap
-    law = LawJoint(R, gap, E_star, sigY * modulus if c and sigY else None, k=k, c=c or 1.0)
+    law = LawJoint(R, gap, E_star, block_yield=sigY * modulus if c and sigY else None, k=k, c=c or 1.0)
     state, peeq = plastic_winkler(law, delta), np.maximum(delta - law.first_yield, 0.0)
     random = np.random.default_rng(seed)
     P = state.load + noise * E_star * gap * random.standard_normal(len(delta))

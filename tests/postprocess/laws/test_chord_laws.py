@@ -10,7 +10,7 @@ from archord.postprocess.laws.chord_laws import parabola, plastic_winkler
 from archord.postprocess.laws.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
 
-JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, yield_stress=300.0)
+JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, block_yield=300.0)
 DEPTHS = JOINT.clearance * np.array([1e-3, 0.1, 0.5, 1.0, 2.0])
 
 
@@ -74,7 +74,7 @@ def test_plastic_law_joins_the_elastic_one_smoothly():
 
 def test_far_beyond_yield_the_chord_is_under_the_yield_stress():
     """P -> 2 sigY l, and no digit is lost on the way."""
-    soft = LawJoint(radius=1.0, clearance=1e-3, E_star=1.0, yield_stress=1e-12, k=0.8, c=1.3)
+    soft = LawJoint(radius=1.0, clearance=1e-3, E_star=1.0, block_yield=1e-12, k=0.8, c=1.3)
     delta = np.array([0.1, 1.0]) * 1e-3
     u = soft.first_yield / delta
     state, chord = plastic_winkler(soft, delta), 2 * np.sqrt(delta / (2 * (1e-3 + delta)))

@@ -144,7 +144,7 @@ def test_persson_has_a_largest_angle():
     """84.83 degrees for like bodies at zero clearance; larger loads come nearer."""
     largest = np.radians(ROWS[-1]["eps_deg"])
     assert LAWS["persson"].at_load(JOINT, 1e12 * UNIT).angle == pytest.approx(largest, rel=1e-9)
-    soft = replace(JOINT, dundurs_alpha=-1.0)
+    soft = replace(JOINT, pin_share=1.0)
     assert LAWS["persson"].at_load(soft, 1e12 * UNIT).angle == pytest.approx(np.pi, rel=1e-3)
     assert np.isinf(persson_load(JOINT, largest + 1e-6))
     assert np.isfinite(persson_load(JOINT, largest - 1e-6))
@@ -160,7 +160,7 @@ def test_persson_satisfies_the_contact_equation(alpha, load):
     (kappa2 - 1)]/(4 mu2 (n^2 - 1)) and p_0/(2 mu2). With beta = 0 their sum depends on E* and alpha only, and on the
     arc it is delta cos(phi) - dR (1 - cos(phi)), where n = 1 is a translation like delta.
     """
-    joint = LawJoint(radius=1.0, clearance=1e-3, E_star=1.0, dundurs_alpha=alpha)
+    joint = LawJoint(radius=1.0, clearance=1e-3, E_star=1.0, pin_share=(1 - alpha) / 2)
     P = np.array(load * 1e-3)
     eps = LAWS["persson"].at_load(joint, P).angle
     # with phi = eps sin(t) the integrands are smooth and periodic, for which the midpoint rule is exact
