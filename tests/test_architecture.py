@@ -27,6 +27,7 @@ ROOMS = [
     "postprocess",
     "postprocess.pictures",
     "postprocess.laws",
+    "postprocess.laws.exports",
     "postprocess.decks",
     "studies",
     "benchmarks",
@@ -47,6 +48,7 @@ BANNED = {
     "solver.contact": ["archord.scene"],
     "solver.linear": ["archord.scene"],
     "postprocess.laws": [*FE, "archord.solver", "archord.benchmarks"],
+    "postprocess.laws.exports": [*FE, "archord.solver", "archord.benchmarks"],
     "postprocess": ["archord.benchmarks"],
 }
 

@@ -23,12 +23,12 @@ import numpy.typing as npt
 from archord.postprocess.laws.joint import Array
 
 _ITERATIONS = 6  # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
-_BISECTIONS = 60
+_BRACKETED = 60  # iterations at most of Newton's method for an inverse, which bisects where it must
 
 
 class CurveState(NamedTuple):
     """What a joint's law says at displacements ``(...)``: force, dP/d(delta), and the error of the force expected of 9
-    in 10 joints; largest pressure and semi-angle [rad] of the contact on first loading, nan where it goes back."""
+    in 10 joints; largest pressure and semi-angle [rad] of the contact, nan on the way back after yielding."""
 
     load: Array
     stiffness: Array
@@ -70,6 +70,12 @@ class JointCurve:
     about: dict[str, Any] = field(default_factory=dict)
 
     @property
+    def yields(self) -> bool:
+        """Whether the way back is another than first loading."""
+        same = np.array_equal(self.y, self.back) and np.array_equal(self.dy, self.dback)
+        return not (same and (self.ratio == 1).all() and (self.dratio == 0).all())
+
+    @property
     def limit(self) -> Any:
         """Largest displacement that the table covers."""
         return self.length * self.x[-1]
@@ -87,7 +93,7 @@ class JointCurve:
         )
         error = y * linear(self.x, self.error, x)
         returning = x < most
-        if returning.any():
+        if returning.any() and self.yields:
             ymost, _ = self._loading(most)
             ratio = np.maximum(hermite(self.x, self.ratio, self.dratio, most)[0], 1e-3)
             u = (x - most) / ratio + self._back_displacement(ymost / ratio)
@@ -98,8 +104,7 @@ class JointCurve:
             y, dy = np.where(returning, yb, y), np.where(returning, dyb, dy)
             error = np.where(returning, ymost * linear(self.x, self.back_error, most), error)
             peak, angle = (np.where(returning, np.nan, values) for values in (peak, angle))
-        shut = x > 0
-        y, dy, error, peak, angle = (np.where(shut, values, 0.0) for values in (y, dy, error, peak, angle))
+        y, dy, error, peak, angle = (np.where(x <= 0, 0.0, values) for values in (y, dy, error, peak, angle))
         return CurveState(
             y * self.force, dy * self.force / self.length, error * self.force, peak * self.pressure, angle
         )
@@ -125,10 +130,9 @@ class JointCurve:
         """``f`` and its slope at ``x >= 0``."""
         y, dy = hermite(self.x, f, df, x)
         if self.touch.size:
-            early = np.minimum(x, self.x[1])
-            ty, tdy = first_touch(self.touch, np.where(early > 0, early, self.x[1]))
+            ty, tdy = first_touch(self.touch, np.clip(x, 1e-290, self.x[1]))
             y, dy = np.where(x < self.x[1], ty, y), np.where(x < self.x[1], tdy, dy)
-        return np.where(x > 0, y, 0.0), np.where(x > 0, dy, 0.0)
+        return np.where(x <= 0, 0.0, y), np.where(x <= 0, 0.0, dy)
 
     def _inverse(self, f: Array, df: Array, y: Array) -> Array:
         """The ``x`` at which the rising curve ``f`` is ``y``; 0 where ``y <= 0``."""
@@ -139,14 +143,18 @@ class JointCurve:
         i = np.clip((f <= values[:, None]).sum(-1) - 1, 0, len(self.x) - 2)
         x0, h = self.x[i], self.x[i + 1] - self.x[i]
         f0, f1, d0, d1 = f[rows, i], f[rows, i + 1], h * df[rows, i], h * df[rows, i + 1]
-        low, high = np.zeros_like(values), np.ones_like(values)
-        for _ in range(_BISECTIONS):
-            t = (low + high) / 2
-            short = _cubic(t, f0, f1, d0, d1) < values
-            low, high = np.where(short, t, low), np.where(short, high, t)
-        x = x0 + h * (low + high) / 2
+        rise = np.where(f1 > f0, f1 - f0, 1.0)
+        goal = np.clip(values, f0, f1)
+        low, high, t = np.zeros_like(goal), np.ones_like(goal), (goal - f0) / rise
+        for _ in range(_BRACKETED):
+            miss, slope, last = _cubic(t, f0, f1, d0, d1) - goal, _cubic_slope(t, f0, f1, d0, d1), t
+            low, high = np.where(miss < 0, t, low), np.where(miss < 0, high, t)
+            t = t - miss / np.maximum(slope, 1e-100)
+            t = np.where((t - low) * (high - t) < 0, (low + high) / 2, t)
+            if not (np.abs(t - last) >= 1e-12).any():
+                break
         end = self.x[-1] + (values - f[:, -1]) / df[:, -1]
-        x = np.where(values > f[:, -1], end, x).reshape(shape)
+        x = np.where(values > f[:, -1], end, x0 + h * t).reshape(shape)
         if self.touch.size:
             a, b, c = np.moveaxis(self.touch, -1, 0)[..., None]
             early = (y > 0) & (y < f[rows, 1].reshape(shape))
@@ -159,11 +167,12 @@ class JointCurve:
         return np.where(y > 0, x, 0.0)
 
     def to_json(self) -> str:
-        """The curve as JSON; numbers in full."""
+        """The curve as JSON; numbers in full, null for nan."""
         data = {
-            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in asdict(self).items()
+            name: np.where(np.isnan(value), np.array(None), value).tolist() if isinstance(value, np.ndarray) else value
+            for name, value in asdict(self).items()
         }
-        return json.dumps(data, indent=1) + "\n"
+        return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> JointCurve:
@@ -171,7 +180,7 @@ class JointCurve:
         try:
             data = json.loads(text)
             given: dict[str, Any] = {
-                f.name: np.array(data[f.name]) if f.type == "Array" else data[f.name] for f in fields(cls)
+                f.name: np.array(data[f.name], float) if f.type == "Array" else data[f.name] for f in fields(cls)
             }
         except (KeyError, TypeError) as error:
             raise ValueError(f"is no table of a joint's law: {error}") from None
@@ -197,7 +206,7 @@ def hermite(nodes: Array, f: Array, df: Array, x: Array) -> tuple[Array, Array]:
     h = nodes[i + 1] - nodes[i]
     f0, f1, d0, d1 = _at(f, i), _at(f, i + 1), h * _at(df, i), h * _at(df, i + 1)
     t = (inside - nodes[i]) / h
-    slope = (d0 + t * (2 * (3 * (f1 - f0) - 2 * d0 - d1) + t * 3 * (2 * (f0 - f1) + d0 + d1))) / h
+    slope = _cubic_slope(t, f0, f1, d0, d1) / h
     return _cubic(t, f0, f1, d0, d1) + slope * (x - inside), slope
 
 
@@ -215,3 +224,7 @@ def _at(f: Array, i: npt.NDArray[np.intp]) -> Array:
 
 def _cubic(t: Array, f0: Array, f1: Array, d0: Array, d1: Array) -> Array:
     return f0 + t * (d0 + t * (3 * (f1 - f0) - 2 * d0 - d1 + t * (2 * (f0 - f1) + d0 + d1)))
+
+
+def _cubic_slope(t: Array, f0: Array, f1: Array, d0: Array, d1: Array) -> Array:
+    return d0 + t * (2 * (3 * (f1 - f0) - 2 * d0 - d1) + t * 3 * (2 * (f0 - f1) + d0 + d1))

@@ -1,0 +1,1 @@
+"""A joint's law as a file for other programs: Python, C, Modelica, Matlab/Octave and JSON."""

@@ -1,0 +1,222 @@
+"""The law of one joint as a program of numbers: what ``JointCurve.at`` says, in the few words that all languages have.
+
+``translate.py`` prints these functions in other languages. So they keep to assignments, ``if``, ``while``, ``for`` and
+``break``, have one ``return``, of names, at their end, and change no parameter. What ``WITH_...`` switches off and what
+is never called is left out of an export. Tables are in the joint's units; an export has its own instead of those below.
+"""
+
+# ruff: noqa: SIM102, SIM300, RUF059 (no "and", and a name for every result: words that all languages have)
+
+from __future__ import annotations
+
+import math
+
+Table = tuple[float, ...]
+
+WITH_TOUCH = True  # the logarithmic law below the first node
+WITH_WAY_BACK = True  # a way back below first loading, after yielding
+
+LAST = 1  # index of the last node
+RANGE = 1.0  # displacement up to which the tables reach
+LENGTH = 1.0  # clearance dR
+FORCE = 1.0  # unit of force of the logarithmic law
+NODES: Table = (0.0, 1.0)  # displacements of the tables
+LOAD: Table = (0.0, 1.0)  # force of first loading
+LOAD_SLOPE: Table = (1.0, 1.0)
+BACK: Table = (0.0, 1.0)  # force of the curve that unloading follows
+BACK_SLOPE: Table = (1.0, 1.0)
+RATIO: Table = (1.0, 1.0)  # its scale, by the deepest displacement
+RATIO_SLOPE: Table = (0.0, 0.0)
+TOUCH: Table = (2.0, 0.0, 0.0)  # a, b, c of the logarithmic law
+PEAK: Table = (1.0, 1.0)  # largest pressure over the root of the force
+PEAK_SLOPE: Table = (0.0, 0.0)
+ANGLE: Table = (1.0, 1.0)  # semi-angle over the root of the force
+ANGLE_SLOPE: Table = (0.0, 0.0)
+ERROR: Table = (0.0, 0.0)  # expected error on first loading, over the force
+BACK_ERROR: Table = (0.0, 0.0)  # on the way back, over the largest force
+
+
+def warn_outside(delta: float) -> None:
+    """Say where the law is used beyond its tables: a function of each language's own."""
+
+
+def interval(table: Table, value: float) -> int:
+    """The last i below the last node with table[i] <= value, or 0: bisection."""
+    low: int = 0
+    high: int = LAST
+    while high - low > 1:
+        middle: int = (low + high) // 2
+        if table[middle] <= value:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def cubic(f: Table, df: Table, x: float) -> tuple[float, float]:
+    """Hermite's cubic through f with slopes df at x, and its slope; straight on beyond the last node."""
+    i: int = interval(NODES, x)
+    inside = min(x, NODES[LAST])
+    width = NODES[i + 1] - NODES[i]
+    t = (inside - NODES[i]) / width
+    rise = f[i + 1] - f[i]
+    d0 = width * df[i]
+    d1 = width * df[i + 1]
+    slope = (d0 + t * (2 * (3 * rise - 2 * d0 - d1) + t * 3 * (d0 + d1 - 2 * rise))) / width
+    value = f[i] + t * (d0 + t * (3 * rise - 2 * d0 - d1 + t * (d0 + d1 - 2 * rise))) + slope * (x - inside)
+    return value, slope
+
+
+def straight(f: Table, x: float) -> float:
+    """f at x, straight between nodes, constant beyond the last one."""
+    i: int = interval(NODES, x)
+    t = max(0.0, min((x - NODES[i]) / (NODES[i + 1] - NODES[i]), 1.0))
+    value = f[i] * (1 - t) + f[i + 1] * t
+    return value
+
+
+def first_touch(delta: float) -> tuple[float, float]:
+    """Force and stiffness of line contact: pi x t - ln(1 + t) = a + b x + c x^2, t = FORCE/P, by Newton's method."""
+    x = max(delta / LENGTH, 1e-290)
+    level = TOUCH[0] + x * (TOUCH[1] + x * TOUCH[2])
+    t = (level + math.log(1 + level / (math.pi * x))) / (math.pi * x)
+    for _ in range(6):
+        t = t - (math.pi * x * t - math.log(1 + t) - level) / (math.pi * x - 1 / (1 + t))
+    P = FORCE / t
+    stiffness = (math.pi - (TOUCH[1] + 2 * TOUCH[2] * x) / t) / (math.pi * x * t - t / (1 + t)) * FORCE / LENGTH
+    return P, stiffness
+
+
+def curve(f: Table, df: Table, delta: float) -> tuple[float, float]:
+    """Force and stiffness by the tables f and df; 0 where the joint is open."""
+    if delta <= 0:
+        P = 0.0
+        stiffness = 0.0
+    else:
+        P, stiffness = cubic(f, df, delta)
+        if WITH_TOUCH:
+            if delta < NODES[1]:
+                P, stiffness = first_touch(delta)
+    return P, stiffness
+
+
+def touch_displacement(P: float) -> float:
+    """The displacement at which the line contact has the force P > 0: Newton's method."""
+    y = P / FORCE
+    x = y * (TOUCH[0] + math.log(1 + 1 / y)) / math.pi
+    for _ in range(6):
+        miss = math.pi * x / y - TOUCH[0] - x * (TOUCH[1] + TOUCH[2] * x) - math.log(1 + 1 / y)
+        x = x - miss / (math.pi / y - TOUCH[1] - 2 * TOUCH[2] * x)
+    delta = x * LENGTH
+    return delta
+
+
+def table_displacement(P: float) -> float:
+    """The displacement between nodes at which the table BACK has the force P: Newton's method, bracketed."""
+    i: int = interval(BACK, P)
+    width = NODES[i + 1] - NODES[i]
+    rise = BACK[i + 1] - BACK[i]
+    d0 = width * BACK_SLOPE[i]
+    d1 = width * BACK_SLOPE[i + 1]
+    low = 0.0
+    high = 1.0
+    t = (P - BACK[i]) / rise
+    for _ in range(60):
+        miss = BACK[i] + t * (d0 + t * (3 * rise - 2 * d0 - d1 + t * (d0 + d1 - 2 * rise))) - P
+        slope = d0 + t * (2 * (3 * rise - 2 * d0 - d1) + t * 3 * (d0 + d1 - 2 * rise))
+        if miss < 0:
+            low = t
+        else:
+            high = t
+        last = t
+        t = last - miss / max(slope, 1e-100)
+        if (t - low) * (high - t) < 0:
+            t = (low + high) / 2
+        if abs(t - last) < 1e-12:
+            break
+    delta = NODES[i] + width * t
+    return delta
+
+
+def back_displacement(P: float) -> float:
+    """The displacement at which the curve of unloading has the force P; 0 where P <= 0."""
+    delta = 0.0
+    if P > BACK[LAST]:
+        delta = NODES[LAST] + (P - BACK[LAST]) / BACK_SLOPE[LAST]
+    elif P > 0:
+        delta = table_displacement(P)
+        if WITH_TOUCH:
+            if P < BACK[1]:
+                delta = touch_displacement(P)
+    return delta
+
+
+def scale(deepest: float) -> float:
+    """The clearance, over that of the joint, of the elastic joint that it is on its way back."""
+    ratio, slope = cubic(RATIO, RATIO_SLOPE, deepest)
+    ratio = max(ratio, 1e-3)
+    return ratio
+
+
+def way_back(delta: float, deepest: float) -> tuple[float, float]:
+    """Force and stiffness below the deepest displacement: r BACK((delta - z)/r), which meets first loading there."""
+    ratio = scale(deepest)
+    largest, stiffness = curve(LOAD, LOAD_SLOPE, deepest)
+    P, stiffness = curve(BACK, BACK_SLOPE, (delta - deepest) / ratio + back_displacement(largest / ratio))
+    P = ratio * P
+    return P, stiffness
+
+
+def force(delta: float, deepest: float = 0.0) -> tuple[float, float]:
+    """Force P and stiffness dP/d(delta) at a displacement, after the joint has been as deep as deepest."""
+    warn_outside(max(delta, deepest))
+    P, stiffness = curve(LOAD, LOAD_SLOPE, delta)
+    if WITH_WAY_BACK:
+        if delta < deepest:
+            below, slope = way_back(delta, deepest)
+            if below <= P:
+                P = below
+                stiffness = slope
+    return P, stiffness
+
+
+def residual(deepest: float) -> float:
+    """The displacement at which the joint opens on its way back: residual clearance."""
+    z = 0.0
+    if WITH_WAY_BACK:
+        start = max(deepest, 0.0)
+        ratio = scale(start)
+        largest, slope = curve(LOAD, LOAD_SLOPE, start)
+        z = start - ratio * back_displacement(largest / ratio)
+    return z
+
+
+def expected_error(delta: float, deepest: float = 0.0) -> float:
+    """The error of the force, in its unit, below which 9 of 10 joints stay."""
+    place = delta
+    share = straight(ERROR, delta)
+    if WITH_WAY_BACK:
+        if delta < deepest:
+            place = deepest
+            share = straight(BACK_ERROR, deepest)
+    P, slope = curve(LOAD, LOAD_SLOPE, place)
+    error = P * share
+    if delta <= 0:
+        error = 0.0
+    return error
+
+
+def peak_pressure(delta: float) -> float:
+    """The largest contact pressure on first loading."""
+    P, slope = curve(LOAD, LOAD_SLOPE, delta)
+    root, slope = cubic(PEAK, PEAK_SLOPE, max(delta, 0.0))
+    p0 = root * math.sqrt(P)
+    return p0
+
+
+def contact_angle(delta: float) -> float:
+    """The semi-angle of the contact [rad] on first loading."""
+    P, slope = curve(LOAD, LOAD_SLOPE, delta)
+    root, slope = cubic(ANGLE, ANGLE_SLOPE, max(delta, 0.0))
+    angle = root * math.sqrt(P)
+    return angle

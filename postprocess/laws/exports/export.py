@@ -1,0 +1,186 @@
+"""A joint's law as one file for another program: tables in the joint's units, and the functions that read them.
+
+The functions are those of ``algorithm.py`` in every language, less what the law has no need of: the way back of a joint
+that does not yield, the logarithmic law of first touch, pressure and angle where they are unknown.
+"""
+
+from __future__ import annotations
+
+import json
+import keyword
+import re
+import textwrap
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from pprint import pformat
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from archord.postprocess.laws.exports.translate import FUNCTIONS, in_c, in_modelica, in_octave, in_python, select
+from archord.postprocess.laws.joint_curve import JointCurve
+
+Tables = dict[str, Any]  # int, float or list[float] by the names of algorithm.py
+
+_STATE = """The force P and dP/d(delta) follow from the displacement delta and from one number that the joint remembers:
+deepest, the largest delta of all accepted steps, 0 at first. Trial steps leave it as it is. Beyond RANGE, the end of
+the tables, curves go on straight."""
+_ELASTIC = "The joint does not yield: it comes back along its first loading, and deepest changes nothing."
+
+
+@dataclass(frozen=True)
+class _Form:
+    """How a language writes an integer, a number, a table with the ends of its lines, text, and functions."""
+
+    template: str
+    whole: str
+    number: str
+    table: str
+    line_end: str
+    text: Callable[[dict[str, Any]], str]
+    function: Callable[..., str]
+
+
+def _quoted(about: dict[str, Any]) -> str:
+    return json.dumps(json.dumps(about))
+
+
+def _quoted_once(about: dict[str, Any]) -> str:
+    return "'" + json.dumps(about).replace("'", "''") + "'"
+
+
+def _literal(about: dict[str, Any]) -> str:
+    return pformat(about, width=110, sort_dicts=False)
+
+
+_FORMS = {
+    ".py": _Form(
+        "python",
+        "{key} = {value}",
+        "{key} = {value}",
+        "{key}: Table = (\n    {value},\n)",
+        ",\n    ",
+        _literal,
+        in_python,
+    ),
+    ".h": _Form(
+        "c",
+        "static const int {name}_{key} = {value};",
+        "static const double {name}_{key} = {value};",
+        "static const double {name}_{key}[] = {{\n    {value}\n}};",
+        ",\n    ",
+        _quoted,
+        in_c,
+    ),
+    ".mo": _Form(
+        "modelica",
+        "  constant Integer {key} = {value};",
+        "  constant Real {key} = {value};",
+        "  constant Real {key}[{n}] = {{\n    {value}}};",
+        ",\n    ",
+        _quoted,
+        in_modelica,
+    ),
+    ".m": _Form(
+        "octave",
+        "    T.{key} = {value};",
+        "    T.{key} = {value};",
+        "    T.{key} = [ ...\n        {value}];",
+        ", ...\n        ",
+        _quoted_once,
+        in_octave,
+    ),
+}
+_TEMPLATES = tomllib.loads(Path(__file__).with_name("templates.toml").read_text(encoding="utf-8"))
+_TAKEN = {*FUNCTIONS, *keyword.kwlist, "math", "tables"}
+
+
+def export_curve(curve: JointCurve, target: Path) -> str:
+    """The text of the file ``target`` with the law of one joint, in the language that its suffix names: .py, .h (C99),
+    .mo (Modelica), .m (Matlab, Octave), .json. Its stem becomes the name of the law, but in JSON.
+
+    Raises ValueError on another suffix, a stem that is no name, tables of several joints, and tables that have gaps or
+    a way back that does not rise.
+    """
+    if target.suffix not in (*_FORMS, ".json"):
+        raise ValueError(f"{target.name}: a law is exported to files that end in {', '.join(_FORMS)} or .json")
+    if curve.y.ndim != 1 or any(np.size(unit) != 1 for unit in (curve.length, curve.force, curve.pressure)):
+        raise ValueError("a file holds the law of one joint, and this table has several: take them one by one")
+    if target.suffix == ".json":
+        return curve.to_json()
+    name, form = target.stem, _FORMS[target.suffix]
+    if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) or name in _TAKEN:
+        raise ValueError(f"{target.name}: {name} cannot name a law; letters, digits and _ can, but for words in use")
+    tables = _tables(curve)
+    wanted = ["force", "residual", "expected_error"]
+    wanted += [
+        f for f, key in (("peak_pressure", "PEAK"), ("contact_angle", "ANGLE")) if np.isfinite(tables[key]).all()
+    ]
+    functions, used = select(wanted, {"WITH_TOUCH": curve.touch.size > 0, "WITH_WAY_BACK": curve.yields})
+    tables = {key: values for key, values in tables.items() if key in {*used, "RANGE"}}
+    _check(tables)
+    title = str(curve.about.get("title", "law of a pin joint"))
+    return Template(_TEMPLATES[form.template].lstrip()).substitute(
+        name=name,
+        title=title.replace("\\", "/").replace('"', "'"),
+        header=_header(title, curve),
+        about=form.text(curve.about),
+        tables="\n".join(_table(form, name, key, values) for key, values in tables.items()),
+        functions="\n\n".join(form.function(node, name) for node in functions),
+        handles="\n".join(f"    the_law.{function} = @{function};" for function in wanted),
+    )
+
+
+def _tables(curve: JointCurve) -> Tables:
+    """All numbers of the law, in the units of the joint."""
+    length, force, pressure = (float(np.squeeze(unit)) for unit in (curve.length, curve.force, curve.pressure))
+    root = np.sqrt(force)
+    arrays = {
+        "NODES": length * curve.x,
+        "LOAD": force * curve.y,
+        "LOAD_SLOPE": force / length * curve.dy,
+        "BACK": force * curve.back,
+        "BACK_SLOPE": force / length * curve.dback,
+        "RATIO": curve.ratio,
+        "RATIO_SLOPE": curve.dratio / length,
+        "TOUCH": curve.touch,
+        "PEAK": pressure / root * curve.peak,
+        "PEAK_SLOPE": pressure / root / length * curve.dpeak,
+        "ANGLE": curve.angle / root,
+        "ANGLE_SLOPE": curve.dangle / root / length,
+        "ERROR": curve.error,
+        "BACK_ERROR": curve.back_error,
+    }
+    numbers = {"LAST": len(curve.x) - 1, "RANGE": float(length * curve.x[-1]), "LENGTH": length, "FORCE": force}
+    return numbers | {key: values.tolist() for key, values in arrays.items()}
+
+
+def _check(tables: Tables) -> None:
+    bad = [key for key, values in tables.items() if not np.isfinite(values).all()]
+    if bad:
+        raise ValueError(f"a law with gaps in its tables cannot be exported: {', '.join(bad)}")
+    if "BACK" in tables and not ((np.diff(tables["BACK"]) > 0).all() and tables["BACK_SLOPE"][-1] > 0):
+        raise ValueError("a law whose way back does not rise throughout cannot be exported")
+
+
+def _table(form: _Form, name: str, key: str, values: Any) -> str:
+    if isinstance(values, list):
+        rows = [", ".join(map(repr, values[i : i + 5])) for i in range(0, len(values), 5)]
+        return form.table.format(name=name, key=key, n=len(values), value=form.line_end.join(rows))
+    kind = form.whole if isinstance(values, int) else form.number
+    return kind.format(name=name, key=key, value=repr(values))
+
+
+def _header(title: str, curve: JointCurve) -> str:
+    """What the file is, where it comes from and how it is used, fit for a comment of any language."""
+    about = {key: value for key, value in curve.about.items() if key != "title"}
+    lines = [f"{key}: {value if isinstance(value, str) else json.dumps(value)}" for key, value in about.items()]
+    lines = [textwrap.fill(line, 110, subsequent_indent="    ") for line in lines]
+    rule = " ".join((_STATE if curve.yields else f"{_STATE} {_ELASTIC}").split())
+    text = "\n".join([title, "", *lines, "", textwrap.fill(rule, 110)])
+    for mark, instead in (("\\", "/"), ('"""', "'''"), ("*/", "* /"), ("/*", "/ *")):
+        text = text.replace(mark, instead)
+    return text

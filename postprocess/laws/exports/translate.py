@@ -1,0 +1,246 @@
+"""The functions of ``algorithm.py`` in other languages: their syntax trees, pruned and printed line by line."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from archord.postprocess.laws.exports import algorithm
+
+_TREE = ast.parse(inspect.getsource(algorithm))
+FUNCTIONS = {node.name: node for node in _TREE.body if isinstance(node, ast.FunctionDef)}
+TABLES = {name for name in vars(algorithm) if name.isupper()}
+
+
+def select(wanted: list[str], flags: dict[str, bool]) -> tuple[list[ast.FunctionDef], set[str]]:
+    """The functions that ``wanted`` ones call, less what ``flags`` switch off; and the names of the tables they use."""
+    todo, used, tables = list(wanted), dict[str, ast.FunctionDef](), set[str]()
+    while todo:
+        name = todo.pop()
+        used[name] = node = _Prune(flags).visit(ast.parse(ast.unparse(FUNCTIONS[name])).body[0])
+        names = {n.id for statement in node.body for n in ast.walk(statement) if isinstance(n, ast.Name)}
+        tables |= names & TABLES
+        todo += (names & FUNCTIONS.keys()) - used.keys() - {"warn_outside"}
+    return [used[name] for name in FUNCTIONS if name in used], tables
+
+
+class _Prune(ast.NodeTransformer):
+    def __init__(self, flags: dict[str, bool]) -> None:
+        self.flags = flags
+
+    def visit_If(self, node: ast.If) -> Any:
+        self.generic_visit(node)
+        if isinstance(node.test, ast.Name):
+            return node.body if self.flags[node.test.id] else node.orelse
+        return node
+
+
+@dataclass(frozen=True)
+class Language:
+    """How a language writes names, entries of tables (from ``base`` on), statements and the ends of blocks."""
+
+    words: dict[str, str]
+    base: int
+    entry: str
+    half: str
+    assign: str
+    several: str
+    if_: str
+    else_: str
+    while_: str
+    for_: str
+    ends: tuple[str, str, str]
+    call: str
+    types: dict[str, str]
+    table: str = "{}"
+    function: str = "{}"
+
+    def expression(self, node: ast.AST) -> str:
+        """An expression of ``algorithm.py``."""
+        return ast.unparse(_Words(self).visit(node))
+
+    def statements(self, body: list[ast.stmt], indent: str) -> list[str]:
+        """The lines of a block."""
+        return [indent + line for statement in body for line in self._statement(statement)]
+
+    def _statement(self, node: ast.stmt) -> list[str]:
+        match node:
+            case ast.Assign(targets=[ast.Tuple(elts=[first, second])], value=value):
+                open_call = self.expression(value)[:-1]
+                return [self.several.format(ast.unparse(first), ast.unparse(second), open_call)]
+            case ast.Assign(targets=[target], value=value) | ast.AnnAssign(target=target, value=ast.expr() as value):
+                return [self.assign.format(ast.unparse(target), self.expression(value))]
+            case ast.If():
+                other = [self.else_, *self.statements(node.orelse, "    ")] if node.orelse else []
+                test = self.if_.format(self.expression(node.test))
+                return [test, *self.statements(node.body, "    "), *other, self.ends[0]]
+            case ast.While():
+                return [
+                    self.while_.format(self.expression(node.test)),
+                    *self.statements(node.body, "    "),
+                    self.ends[1],
+                ]
+            case ast.For(iter=ast.Call(args=[count])):
+                return [self.for_.format(ast.unparse(count)), *self.statements(node.body, "    "), self.ends[2]]
+            case ast.Break():
+                return ["break;"]
+            case ast.Expr(value=ast.Call() as value):
+                return [self.call.format(self.expression(value))] if self.call else []
+        raise NotImplementedError(ast.unparse(node))
+
+
+class _Words(ast.NodeTransformer):
+    """Replaces the nodes of an expression by the words of a language."""
+
+    def __init__(self, language: Language) -> None:
+        self.language = language
+
+    def visit_Name(self, node: ast.Name) -> ast.Name:
+        own = self.language
+        form = own.table if node.id in TABLES else own.function if node.id in FUNCTIONS else "{}"
+        return ast.Name(form.format(own.words.get(node.id, node.id)))
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        return ast.Constant(math.pi) if node.attr == "pi" else ast.Name(node.attr)
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        return (
+            ast.Name(self.language.half.format(ast.unparse(node.left))) if isinstance(node.op, ast.FloorDiv) else node
+        )
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.Name:
+        table, place = (ast.unparse(self.visit(part)) for part in (node.value, node.slice))
+        start, _, more = place.partition(" + ")
+        number = int(more or 0) + self.language.base
+        place = f"{int(place) + self.language.base}" if place.isdigit() else f"{start} + {number}" if number else start
+        return ast.Name(self.language.entry.format(table, place))
+
+
+@dataclass(frozen=True)
+class Signature:
+    """A function's name, doc, inputs and locals with their types, the names that it returns, and its body."""
+
+    name: str
+    doc: str
+    inputs: dict[str, str]
+    outputs: list[str]
+    locals: dict[str, str]
+    body: list[ast.stmt]
+
+    @classmethod
+    def of(cls, node: ast.FunctionDef) -> Signature:
+        """Taken from the syntax tree."""
+        *body, last = node.body[1:]
+        assert isinstance(last, ast.Return)
+        assert last.value is not None
+        inputs = {arg.arg: ast.unparse(arg.annotation) for arg in node.args.args if arg.annotation}
+        own: dict[str, str] = {}
+        for part in (n for statement in body for n in ast.walk(statement)):
+            if isinstance(part, ast.AnnAssign):
+                own[ast.unparse(part.target)] = ast.unparse(part.annotation)
+            elif isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store) and part.id != "_":
+                own.setdefault(part.id, "float")
+        outputs = ast.unparse(last.value).strip("()").split(", ")
+        return cls(node.name, ast.get_docstring(node) or "", inputs, outputs, own, body)
+
+
+def in_python(node: ast.FunctionDef, name: str) -> str:
+    """The function in Python."""
+    return ast.unparse(node) + "\n"
+
+
+def in_c(node: ast.FunctionDef, name: str) -> str:
+    """The function in C99; the second of two results by a pointer."""
+    prefix, f = f"{name}_", Signature.of(node)
+    c = _c(prefix)
+    result, *more = f.outputs
+    inputs = [f"{c.types[kind]}{name}" for name, kind in f.inputs.items()] + [f"double *{name}_out" for name in more]
+    body = c.statements(f.body, "")
+    kinds = {kind: [name for name, own in f.locals.items() if own == kind] for kind in f.locals.values()}
+    lines = [f"{c.types[kind]}{', '.join(names)};" for kind, names in kinds.items()]
+    lines += [f"(void){name};" for name in f.inputs if not any(re.search(rf"\b{name}\b", line) for line in body)]
+    lines += [*body, *(f"*{name}_out = {name};" for name in more), f"return {result};"]
+    head = f"/* {f.doc} */\nstatic inline {c.types[f.locals[result]]}{prefix}{f.name}({', '.join(inputs)}) {{\n"
+    return head + "".join(f"    {line}\n" for line in lines) + "}"
+
+
+def in_modelica(node: ast.FunctionDef, name: str) -> str:
+    """The function in Modelica."""
+    f = Signature.of(node)
+    inner = {name: kind for name, kind in f.locals.items() if name not in f.outputs}
+    lines = [f"    input {MODELICA.types[kind].format(name)};" for name, kind in f.inputs.items()]
+    lines += [f"    output {MODELICA.types[f.locals[name]].format(name)};" for name in f.outputs]
+    lines += ["  protected"] if inner else []
+    lines += [f"    {MODELICA.types[kind].format(name)};" for name, kind in inner.items()]
+    lines += ["  algorithm", *MODELICA.statements(f.body, "    "), f"  end {f.name};"]
+    return f'  function {f.name} "{f.doc}"\n' + "\n".join(lines)
+
+
+def in_octave(node: ast.FunctionDef, name: str) -> str:
+    """The function in Matlab and Octave; tables are a persistent structure ``T``."""
+    f = Signature.of(node)
+    tables = {n.id for statement in f.body for n in ast.walk(statement) if isinstance(n, ast.Name)} & TABLES
+    lines = [f"% {f.doc}"]
+    lines += ["persistent T", "if isempty(T)", "    T = tables();", "end"] if tables else []
+    lines += OCTAVE.statements(f.body, "")
+    head = f"function [{', '.join(f.outputs)}] = {f.name}({', '.join(f.inputs)})\n"
+    return head + "".join(f"    {line}\n" for line in lines) + "end"
+
+
+def _c(prefix: str) -> Language:
+    return Language(
+        words={"min": "fmin", "max": "fmax", "abs": "fabs"},
+        base=0,
+        entry="{}[{}]",
+        half="({}) / 2",
+        assign="{} = {};",
+        several="{0} = {2}, &{1});",
+        if_="if ({}) {{",
+        else_="} else {",
+        while_="while ({}) {{",
+        for_="for (int k = 0; k < {}; k++) {{",
+        ends=("}", "}", "}"),
+        call="",
+        types={"Table": "const double *", "float": "double ", "int": "int "},
+        table=f"{prefix}{{}}",
+        function=f"{prefix}{{}}",
+    )
+
+
+MODELICA = Language(
+    words={},
+    base=1,
+    entry="{}[{}]",
+    half="div({}, 2)",
+    assign="{} := {};",
+    several="({0}, {1}) := {2});",
+    if_="if {} then",
+    else_="else",
+    while_="while {} loop",
+    for_="for k in 1:{} loop",
+    ends=("end if;", "end while;", "end for;"),
+    call="{};",
+    types={"Table": "Real {}[:]", "float": "Real {}", "int": "Integer {}"},
+)
+
+OCTAVE = Language(
+    words={},
+    base=1,
+    entry="{}({})",
+    half="floor(({}) / 2)",
+    assign="{} = {};",
+    several="[{0}, {1}] = {2});",
+    if_="if {}",
+    else_="else",
+    while_="while {}",
+    for_="for k = 1:{}",
+    ends=("end", "end", "end"),
+    call="{};",
+    types={},
+    table="T.{}",
+)
