@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import shutil
 import sys
 import textwrap
 import warnings
@@ -20,6 +21,8 @@ from archord.scene.errors import InputError
 if TYPE_CHECKING:
     from archord.postprocess.laws.joint import LawJoint
 
+_LINE = 400  # points of a line of the picture
+
 
 @contextmanager
 def _sentences() -> Iterator[None]:
@@ -35,15 +38,22 @@ def laws() -> int:
     """List the closed-form laws: name, title, range and source."""
     from archord.postprocess.laws.laws import LAWS
 
+    width = max(40, min(110, shutil.get_terminal_size((110, 24)).columns))
     for entry in LAWS.values():
-        print(f"{entry.name}: {entry.title}")
+        print(textwrap.fill(f"{entry.name}: {entry.title}", width, subsequent_indent="    "))
         for text in (f"range: {entry.range}", f"source: {entry.source}"):
-            print(textwrap.fill(text, 110, initial_indent="    ", subsequent_indent="        "))
+            print(textwrap.fill(text, width, initial_indent="    ", subsequent_indent="        "))
     return 0
 
 
 @click.command()
-@argument("names", "NAME...", "laws, as archord laws lists them [calibrated]", nargs=-1, type=str)
+@argument(
+    "names",
+    "NAME...",
+    "laws, as archord laws lists them [paper, or paper-plastic with a yield stress]",
+    nargs=-1,
+    type=str,
+)
 @file("--scene", "take the joint from this scene file", None)
 @overrides()
 @click.option("--radius", type=float, help="radius of the pin")
@@ -53,8 +63,8 @@ def laws() -> int:
 @click.option("--length", type=float, help="length of the joint, for the laws that need one")
 @click.option("--k", type=float, help="Winkler's coefficient [0.85]")
 @click.option("--c", type=float, help="plateau of the pressure over the yield stress [1]")
-@click.option("--plane", help="strain or stress, for the calibrated law")
-@click.option("--nu", type=float, help="Poisson's ratio of both bodies, for the calibrated law")
+@click.option("--plane", help="plane of the joint: strain or stress")
+@click.option("--nu", type=float, help="Poisson's ratio of both bodies")
 @flag("--by-load", "rows in equal loads, as for laws that give no displacement")
 @click.option("--to", type=float, default=2.0, help="last row: delta in clearances, or P in E* dR")
 @click.option("--points", type=int, default=20, help="rows, in equal steps from zero")
@@ -75,29 +85,44 @@ def law(
     """Print a table of closed-form laws, or draw them against each other."""
     from archord.output.user_file import check_target
     from archord.postprocess.laws.law import LawRangeWarning
-    from archord.postprocess.laws.law_report import draw_laws, law_table
-    from archord.postprocess.laws.laws import find_law
+    from archord.postprocess.laws.law_report import draw_laws, law_table, sample, says_nothing
+    from archord.postprocess.laws.laws import default_law, find_law
     from archord.scene.file import files_read
 
-    chosen = [find_law(name) for name in dict.fromkeys(names or ["calibrated"])]
+    chosen = [find_law(name) for name in dict.fromkeys(names)]
     if not 0 < to < math.inf:
         raise InputError(f"--to {to:g}: must be a positive number.")
     if not 1 <= points <= 100000:
         raise InputError(f"--points {points}: must be between 1 and 100000.")
     joint, units, thickness = _joint(scene, overrides, given)
+    chosen = chosen or [default_law(joint)]
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
-    said: list[object]
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", LawRangeWarning)
-        if plot:
-            check_target(plot, files_read(scene, overrides) if scene else [], force=True)
-            said = [draw_laws(chosen, joint, plot, by_load, to, extrapolate)]
+    if plot:
+        check_target(plot, files_read(scene, overrides) if scene else [], force=True)
+    states, said, silent = [], [], []
+    for entry in chosen:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", LawRangeWarning)
+            state = sample(entry, joint, by_load, to, _LINE if plot else points, extrapolate)
+        told = [str(warning.message) for warning in caught]
+        if says_nothing(state, by_load):
+            silent.append([f"{entry.name}: has no number here", *told][-1])
         else:
-            said = [law_table(entry, joint, by_load, to, points, extrapolate, units, thickness) for entry in chosen]
-    print(*said, sep="\n\n")
-    for message in dict.fromkeys(str(w.message) for w in caught):
-        print(f"archord: warning: {message}.", file=sys.stderr)
+            states.append((entry, state))
+            said += told
+    if not states:
+        raise InputError(f"{'; '.join(silent)}.")
+    if plot:
+        print(draw_laws(states, joint, plot, by_load, to))
+    else:
+        print(*(law_table(entry, joint, state, units, thickness) for entry, state in states), sep="\n\n")
+    _warn(*said, *silent)
     return 0
+
+
+def _warn(*messages: str) -> None:
+    for message in dict.fromkeys(messages):
+        print(f"archord: warning: {message}.", file=sys.stderr)
 
 
 def _joint(
@@ -139,14 +164,13 @@ def _yielding(joint: LawJoint, strength: float | None) -> LawJoint:
 
 
 @click.command()
-@argument("folders", "RUN...|SWEEP", "run folders, or the folder of a sweep, or its fit.csv", nargs=-1, required=True)
+@argument("folders", "RUN...|SWEEP", "run folders, or the folder of a sweep", nargs=-1, required=True)
 @click.option(
     "--range", "load_range", type=(float, float), help="steps to fit: delta from ... to ..., in clearances [all]"
 )
 @file("--json", "write law and fits", parameter="json_file")
 @file("--picture", "draw data, law and residuals")
 @file("--python", "write force and stiffness over delta as a module that needs only math")
-@file("--law", "sweep: write the model of k and c as JSON", parameter="law_file")
 @flag("--force", "overwrite files other than pictures and SWEEP/fit.csv")
 @_sentences()
 def fit(
@@ -155,12 +179,11 @@ def fit(
     json_file: Path | None,
     picture: Path | None,
     python: Path | None,
-    law_file: Path | None,
     force: bool,
 ) -> int:
     """Fit the plastic-Winkler law to P(delta) of runs: k, and c where the joint yields.
 
-    Of a sweep, k and c of every case, and a model of both over all that decides a joint.
+    Of a sweep, k and c of every case, printed and in SWEEP/fit.csv.
     """
     from archord.output.folder import FILES, is_sweep
     from archord.output.user_file import check_target
@@ -169,12 +192,10 @@ def fit(
     from archord.postprocess.run import Run
 
     deltas, first = load_range or (0.0, math.inf), folders[0]
-    if any(is_sweep(folder) or folder.suffix == ".csv" for folder in folders):
+    if any(map(is_sweep, folders)):
         if len(folders) > 1 or json_file or python or picture:
             raise InputError(f"{first}: a sweep is fitted alone; --json, --python and --picture are for runs.")
-        return _fit_sweep(first, deltas, law_file, force)
-    if law_file:
-        raise InputError(f"{first}: --law is for a sweep, and this is none.")
+        return _fit_sweep(first, deltas)
     calibration = calibrate([Run(folder).curve.loading() for folder in folders], deltas)
     inputs, files = [folder / name for folder in folders for name in FILES], []
     if picture:
@@ -184,20 +205,15 @@ def fit(
         [(json_file, fit_report.as_json(calibration)), (python, calibration.law().to_python())], inputs, force
     )
     print(fit_report.summary_table(calibration), "", *fit_report.notes(calibration), *files, sep="\n")
+    _warn(*fit_report.doubts(calibration))
     return 0
 
 
-def _fit_sweep(sweep: Path, deltas: tuple[float, float], law: Path | None, force: bool) -> int:
-    from archord.postprocess.laws.study_cases import as_csv
+def _fit_sweep(sweep: Path, deltas: tuple[float, float]) -> int:
     from archord.studies.sweep_fit import fit_sweep
 
-    found, inputs = fit_sweep(sweep, deltas), [sweep, sweep / "sweep.toml"]
-    if law and found.model is None:
-        raise InputError(f"{law}: no law to write: {found.too_few}.")
-    files = _write([(law, found.model.to_json() if found.model else "")], inputs, force)
-    if sweep.is_dir():
-        files += _write([(sweep / "fit.csv", as_csv(found.cases, found.notes))], inputs, force=True)
-    print(found, *files, sep="\n")
+    found = fit_sweep(sweep, deltas)
+    print(found, *_write([(sweep / "fit.csv", found.as_csv())], [sweep / "sweep.toml"], force=True), sep="\n")
     return 0
 
 

@@ -23,7 +23,7 @@ def table(text: str) -> dict[str, np.ndarray]:
 def test_laws_lists_every_law(capsys):
     assert run(["laws"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line for line in lines if not line.startswith(" ")] == [f"{law.name}: {law.title}" for law in LAWS.values()]
+    assert [line for line in lines if line[0] != " "] == [f"{law.name}: {law.title}" for law in LAWS.values()]
 
 
 def test_law_prints_its_numbers(capsys):
@@ -102,7 +102,7 @@ def test_a_small_block_is_told_with_the_size_of_its_effect(capsys, width, share)
 )
 def test_hardening_is_told_by_the_laws_that_yield(capsys, sets):
     """Once each; the numbers stay those of perfect plasticity."""
-    words = ["law", "paper", "paper-plastic", "calibrated", "--scene", SCENE, "--points", "3"]
+    words = ["law", "paper", "paper-plastic", "--scene", SCENE, "--points", "3"]
     outs = []
     for more in ([], ["--set", f"block.{sets}"]):
         assert run([*words, *more]) == 0
@@ -110,13 +110,14 @@ def test_hardening_is_told_by_the_laws_that_yield(capsys, sets):
     assert outs[0].out == outs[1].out
     assert outs[0].err == ""
     told = [line.split(":")[2:] for line in outs[1].err.splitlines()]
-    assert [name for name, _ in told] == [" paper-plastic", " calibrated"]
+    assert [name for name, _ in told] == [" paper-plastic"]
     assert all("is a law of perfect plasticity" in said and "too low beyond yield" in said for _, said in told)
 
 
 def test_a_whole_pin_is_told_by_the_laws_that_give_a_displacement(capsys):
     """Their numbers are those of half a pin. The thickness is the length of the laws that need one."""
-    words = ["law", "paper", "persson", "esdu-78035", "lankarani-nikravesh", "--scene", SCENE, "--points", "3"]
+    laws = ["paper", "persson", "esdu-78035", "lankarani-nikravesh"]
+    words = ["law", *laws, "--scene", SCENE, "--points", "3", "--to", "0.1"]
     assert run([*words, "--set", "pin.whole=true", "--set", "analysis.thickness=40"]) == 0
     told = [line for line in capsys.readouterr().err.splitlines() if "half a pin" in line]
     assert [line.split(":")[2] for line in told] == [" paper", " esdu-78035", " lankarani-nikravesh"]
@@ -139,15 +140,45 @@ def test_a_law_is_not_drawn_over_its_scene(tmp_path, capsys):
     assert (tmp_path / "laws.svg").read_text().count("<svg") == 1
 
 
-def test_calibrated_law_beside_the_paper_s(capsys):
-    """Of a scene, or of numbers; it is the law that is meant where none is named."""
-    numbers = [*JOINT, "--yield-stress", "230.77", "--points", "2", "--plane", "strain", "--nu", "0.3"]
-    assert run(["law", "calibrated", "paper-plastic", *numbers]) == 0
-    ours, paper = capsys.readouterr().out.split("\n\n")
-    assert table(ours)["P/E*dR"][-1] > 1.3 * table(paper)["P/E*dR"][-1]
-    assert run(["law", *numbers]) == 0
-    assert capsys.readouterr().out == f"{ours}\n"
-    assert run(["law", "--scene", SCENE, "--set", "block.yield_stress=400"]) == 0
+def test_where_no_law_is_named_it_is_the_paper_s(capsys):
+    """Elastic, or with the plateau where the joint yields."""
+    for numbers, law in ([], "paper"), (["--yield-stress", "230.77"], "paper-plastic"):
+        assert run(["law", *JOINT, *numbers, "--points", "2"]) == 0
+        said = capsys.readouterr().out
+        assert run(["law", law, *JOINT, *numbers, "--points", "2"]) == 0
+        assert capsys.readouterr().out == said
+
+
+def test_a_yield_stress_is_that_of_the_bodies_that_yield(capsys):
+    """Of both, of the block alone, of a rigid pin's block; as in the scene."""
+    words = ["law", "paper-plastic", "--points", "2", "--scene"]
+    rigid = str(Path(SCENE).with_name("rigid_pin.toml"))
+    for scene, keys in (SCENE, ("pin", "block")), (rigid, ("block",)):
+        assert run([*words, scene, "--yield-stress", "400"]) == 0
+        said = capsys.readouterr().out
+        assert run([*words, scene, *(word for key in keys for word in ("--set", f"{key}.yield_stress=400"))]) == 0
+        assert capsys.readouterr().out == said
+
+
+def test_a_law_with_nothing_to_say_is_one_sentence(tmp_path, capsys, refused):
+    """No row of nan; beside other laws a warning in its place, also in a picture."""
+    far = [*JOINT, "--points", "1"]
+    said = "johnson: delta = 2 dR is outside 0 to 0.5413 dR (range: up to its load limit"
+    assert refused(["law", "johnson", *far]).startswith(said)
+    assert run(["law", "johnson", "paper", *far]) == 0
     out, err = capsys.readouterr()
-    assert "the bodies have unlike yield stresses" in err
-    assert "nan" in out
+    assert "nan" not in out
+    assert "johnson" not in out
+    assert err.startswith(f"archord: warning: {said}")
+    wide = ["law", "paper", "winkler", *JOINT, "--clearance", "2", "--plot", str(tmp_path / "laws.png")]
+    assert "paper: dR/R = 0.2 is no small clearance" in refused(wide)
+    assert not (tmp_path / "laws.png").exists()
+
+
+@pytest.mark.parametrize(("columns", "width"), [("60", 60), ("200", 110), ("5", 40)])
+def test_laws_fit_the_terminal(monkeypatch, capsys, columns, width):
+    """Lines as wide as it is, between what can be read."""
+    monkeypatch.setenv("COLUMNS", columns)
+    assert run(["laws"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert width - 10 < max(map(len, lines)) <= width

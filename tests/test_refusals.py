@@ -43,7 +43,6 @@ RUN, OTHER = "{coarse}", "{elastic}"
         (["law", "johnson", "--radius", "1"], "--clearance, --E-star: missing"),
         (["law", "johnson", *JOINT, "--clearance", "-1"], "clearance = -1 must be a positive number."),
         (["law", "paper-plastic", *JOINT], "paper-plastic: this law needs yield_stress."),
-        (["law", "calibrated", *JOINT, "--yield-stress", "1", "--plane", "strain"], "calibrated: this law needs nu.\n"),
         (["law", "paper", *JOINT, "--to", "-2"], "--to -2: must be a positive number."),
         (["law", "paper", *JOINT, "--points", "0"], "--points 0: must be between 1 and 100000."),
         (["law", "paper", *JOINT, "--set", "joint.radius=1"], "--set: changes a scene"),

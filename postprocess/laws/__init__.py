@@ -1,1 +1,1 @@
-"""P(delta) as formulas and fits: closed forms, calibration, the calibrated law."""
+"""P(delta) as formulas and fits: closed forms, their calibration on runs, tables."""

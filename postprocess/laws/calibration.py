@@ -22,6 +22,7 @@ from archord.postprocess.laws.fitted_law import FittedLaw
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.scene.errors import InputError
 
+POOR = 0.05  # rms of law/run - 1 from which on a fit is worth a warning
 _LIKE = 0.01  # share of P by which the blocks of runs of one fit may change it
 _STARTS_OF_C = (0.7, 1.0, 1.5, 2.5)  # one start may miss the best side of the onset
 
@@ -210,6 +211,7 @@ class Calibration:
         loads, units = np.concatenate([part.load for part in parts]), run.scene.units
         numbers |= {"sigY": run.sigY if "c" in found else None, "fitted_to": tuple(part.name for part in parts)}
         numbers |= {"length_unit": units.length, "force_unit": units.force_of(None)}
+        _, numbers["rms"], numbers["largest"], _ = self.joint.quality
         return FittedLaw(**numbers, fitted_range=(float(loads.min()), float(loads.max())))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from archord.output.user_file import writing
-from archord.postprocess.laws.calibration import Calibration, dimensionless_law
+from archord.postprocess.laws.calibration import POOR, Calibration, dimensionless_law
 from archord.report.figure import new_figure, save
 from archord.report.table import Table
 
@@ -62,6 +62,14 @@ def notes(calibration: Calibration) -> list[str]:
     threshold = "" if law.c is None else f", c = {law.c:.5f}"
     low, high = law.fitted_range
     return [*said, f"law: k = {law.k:.5f}{threshold}, from P(delta), delta = {low:g} to {high:g} dR"]
+
+
+def doubts(calibration: Calibration) -> list[str]:
+    """A sentence where the law misses the runs by more than `POOR`."""
+    _, rms, largest, _ = calibration.joint.quality
+    if rms <= POOR:
+        return []
+    return [f"the law misses P of its own runs by {rms:.1%} rms, {largest:+.1%} at worst: theirs has another shape"]
 
 
 def as_json(calibration: Calibration) -> str:

@@ -1,4 +1,4 @@
-"""The calibrated law of a joint: P(delta) for use elsewhere, as an object, as JSON and as plain Python."""
+"""The law calibrated on runs of a joint: P(delta) for use elsewhere, as an object, as JSON and as plain Python."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class FittedLaw(BaseModel):
     and ``sigY``.
 
     Errors are standard errors with the mesh's in quadrature. ``fitted_range`` is that of ``delta/dR``; outside it the
-    law extrapolates. Lengths, stresses and forces per unit thickness in the named units. Raises ValueError for values
-    that no joint has.
+    law extrapolates. ``rms`` and ``largest`` are of ``law/run - 1`` of P in that range (None: unknown). Lengths,
+    stresses and forces per unit thickness in the named units. Raises ValueError for values that no joint has.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -43,6 +43,8 @@ class FittedLaw(BaseModel):
     length_unit: str = "mm"
     force_unit: str = "N/mm"
     fitted_to: tuple[str, ...] = ()
+    rms: float | None = None
+    largest: float | None = None
 
     @model_validator(mode="after")
     def _together(self) -> FittedLaw:
@@ -85,6 +87,7 @@ class FittedLaw(BaseModel):
             "units": json.dumps(f"{self.length_unit}; force per unit thickness: {self.force_unit}"),
             "sources": json.dumps(", ".join(self.fitted_to)),
             "plane": self.plane,
+            "quality": "unknown" if self.rms is None else f"{self.rms:.2%} rms, {self.largest or 0.0:+.2%} at worst",
         }
         template = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["module"]
         return Template(template).substitute(values)

@@ -13,8 +13,6 @@ from archord.postprocess.laws.law import Law, LawState
 from archord.report.figure import new_figure, save
 from archord.report.table import Table
 
-_POINTS = 400  # of a line of the picture
-
 
 def sample(law: Law, joint: LawJoint, by_load: bool, to: float, points: int, extrapolate: bool) -> LawState:
     """``points`` states of ``law`` in equal steps up to delta = ``to`` clearances, or P = ``to`` E* dR (``by_load``);
@@ -26,19 +24,15 @@ def sample(law: Law, joint: LawJoint, by_load: bool, to: float, points: int, ext
     return law.at_displacement(joint, steps, extrapolate)._replace(delta=steps)
 
 
-def law_table(
-    law: Law,
-    joint: LawJoint,
-    by_load: bool,
-    to: float,
-    points: int,
-    extrapolate: bool,
-    units: dict[str, str],
-    thickness: float = 1.0,
-) -> str:
+def says_nothing(state: LawState, by_load: bool) -> bool:
+    """Whether a law has no number at any of the points of its `sample`."""
+    told = (state.delta if by_load else state.load, state.peak_pressure, state.angle)
+    return not any(np.isfinite(values).any() for values in told)
+
+
+def law_table(law: Law, joint: LawJoint, state: LawState, units: dict[str, str], thickness: float = 1.0) -> str:
     """The law's title and its `sample`, a row for each point, in ``units`` of length, force, stiffness and stress where
     they are known, forces of a joint of this ``thickness``; without columns that the law says nothing of."""
-    state = sample(law, joint, by_load, to, points, extrapolate)
     moving, one = law.gives_displacement, joint.clearance
     columns = [
         ("delta", "length", state.delta, moving),
@@ -56,15 +50,12 @@ def law_table(
     return f"{law.name}: {law.title}\n{table}"
 
 
-def draw_laws(
-    laws: Sequence[Law], joint: LawJoint, target: Path, by_load: bool, to: float, extrapolate: bool = False
-) -> Path:
-    """Draw force, peak pressure and contact angle of ``laws``, ``by_load`` displacement, pressure and angle over the
-    force, as ``target``; returns the file. Raises `InputError` if it cannot be written."""
+def draw_laws(states: Sequence[tuple[Law, LawState]], joint: LawJoint, target: Path, by_load: bool, to: float) -> Path:
+    """Draw force, peak pressure and contact angle of laws with their `sample`, ``by_load`` displacement, pressure and
+    angle over the force, as ``target``; returns the file. Raises `InputError` if it cannot be written."""
     figure = new_figure(14, 4.4)
     axes = figure.subplots(1, 3)
-    for law in laws:
-        state = sample(law, joint, by_load, to, _POINTS, extrapolate)
+    for law, state in states:
         x, y = (state.delta / joint.clearance, state.load / joint.unit)[:: -1 if by_load else 1]
         for axis, values in zip(axes, (y, state.peak_pressure / joint.E_star, np.degrees(state.angle)), strict=True):
             axis.plot(x, values, label=law.name)

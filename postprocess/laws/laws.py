@@ -6,7 +6,6 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,19 +13,12 @@ import numpy as np
 
 from archord.postprocess.laws import chord_laws as chord
 from archord.postprocess.laws import elastic_laws as elastic
-from archord.postprocess.laws.calibrated import calibrated
 from archord.postprocess.laws.joint import Array, LawJoint
 from archord.postprocess.laws.law import Law, LawState
 
 _THIN = 0.1  # dR/R up to which R1 = R2 = R is an approximation
 _ALIKE = 0.01  # Dundurs' beta that counts as zero
 _DEEPEST = 2.0  # displacement over clearance up to which Hu et al. compare their law with finite elements
-
-
-def _calibrated(joint: LawJoint, delta: Array) -> LawState:
-    found = calibrated(joint)
-    known = replace(joint, k=found.k, c=found.c if math.isfinite(found.c) else 1.0)
-    return chord.plastic_winkler(known, delta)
 
 
 def _thick(joint: LawJoint) -> str:
@@ -54,17 +46,9 @@ def _half_spaces(A: float, q: float, hertz: bool = True) -> dict[str, Any]:
     return {"state": state, "limit": lambda joint: elastic.turning_point(joint, A, q), **gives}
 
 
-_DEEP: dict[str, Any] = {"limit": lambda joint: _DEEPEST * joint.clearance}
-_CHORD = {**_DEEP, "unfit": _thick}
+_CHORD: dict[str, Any] = {"limit": lambda joint: _DEEPEST * joint.clearance, "unfit": _thick}
 _OF_LOAD = {"gives": ("pressure", "contact angle")}
 _FUNCTIONS: dict[str, dict[str, Any]] = {
-    "calibrated": {
-        "state": _calibrated,
-        **_DEEP,
-        "unfit": lambda joint: calibrated(joint).outside,
-        "needs": ("plane", "nu"),
-        "plastic": True,
-    },
     "paper": {"state": chord.parabola, **_CHORD},
     "paper-plastic": {"state": chord.plastic_winkler, "needs": ("yield_stress",), "plastic": True, **_CHORD},
     "winkler": {"state": chord.winkler, **_CHORD},
@@ -94,6 +78,11 @@ _FUNCTIONS: dict[str, dict[str, Any]] = {
 _WORDS = tomllib.loads((Path(__file__).parent / "laws.toml").read_text(encoding="utf-8"))
 
 LAWS: dict[str, Law] = {name: Law(name, **_WORDS[name], **functions) for name, functions in _FUNCTIONS.items()}
+
+
+def default_law(joint: LawJoint) -> Law:
+    """The law of ``joint`` where none is named."""
+    return LAWS["paper" if joint.yield_stress is None else "paper-plastic"]
 
 
 def find_law(name: str) -> Law:

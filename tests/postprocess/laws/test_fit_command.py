@@ -32,6 +32,17 @@ def test_fit_prints_a_table_and_writes_what_is_asked_for(runs, tmp_path, capsys)
     np.testing.assert_allclose(forces, law.force(history.delta), rtol=1e-14)
 
 
+@pytest.mark.parametrize("name", ["elastic", "plastic"])
+def test_a_law_that_misses_its_runs_is_told(runs, tmp_path, name, capsys):
+    """From 5 % rms on, and in the exported law; the table has the same numbers."""
+    assert run(["fit", str(runs[name]), "--json", str(tmp_path / "law.json")]) == 0
+    data = json.loads((tmp_path / "law.json").read_text())
+    law, row = FittedLaw.model_validate(data["law"]), data["fits"][0]
+    assert (law.rms, law.largest) == (row["rms"], row["largest"])
+    said = f"archord: warning: the law misses P of its own runs by {law.rms:.1%} rms, {law.largest:+.1%} at worst"
+    assert capsys.readouterr().err.startswith(said if law.rms > 0.05 else "")
+
+
 def test_files_of_others_and_of_runs_stay(runs, tmp_path, capsys):
     """A file that is there needs --force, and no force touches what a run is made of."""
     law, module = files = [tmp_path / name for name in ("law.json", "law.py")]
