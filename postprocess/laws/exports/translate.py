@@ -41,7 +41,8 @@ class _Prune(ast.NodeTransformer):
 
 @dataclass(frozen=True)
 class Language:
-    """How a language writes names, entries of tables (from ``base`` on), statements and the ends of blocks."""
+    """How a language writes names, entries of tables (from ``base`` on), statements, the ends of blocks, and
+    what takes the place of ``warn_outside``."""
 
     words: dict[str, str]
     base: int
@@ -54,7 +55,7 @@ class Language:
     while_: str
     for_: str
     ends: tuple[str, str, str]
-    call: str
+    warning: str
     types: dict[str, str]
     table: str = "{}"
     function: str = "{}"
@@ -88,8 +89,8 @@ class Language:
                 return [self.for_.format(ast.unparse(count)), *self.statements(node.body, "    "), self.ends[2]]
             case ast.Break():
                 return ["break;"]
-            case ast.Expr(value=ast.Call() as value):
-                return [self.call.format(self.expression(value))] if self.call else []
+            case ast.Expr(value=ast.Call(args=[delta])):
+                return [self.warning.format(self.expression(delta))] if self.warning else []
         raise NotImplementedError(ast.unparse(node))
 
 
@@ -205,7 +206,7 @@ def _c(prefix: str) -> Language:
         while_="while ({}) {{",
         for_="for (int k = 0; k < {}; k++) {{",
         ends=("}", "}", "}"),
-        call="",
+        warning="",
         types={"Table": "const double *", "float": "double ", "int": "int "},
         table=f"{prefix}{{}}",
         function=f"{prefix}{{}}",
@@ -224,7 +225,7 @@ MODELICA = Language(
     while_="while {} loop",
     for_="for k in 1:{} loop",
     ends=("end if;", "end while;", "end for;"),
-    call="{};",
+    warning='assert({} <= RANGE, "delta is beyond the tables of this law", AssertionLevel.warning);',
     types={"Table": "Real {}[:]", "float": "Real {}", "int": "Integer {}"},
 )
 
@@ -240,7 +241,7 @@ OCTAVE = Language(
     while_="while {}",
     for_="for k = 1:{}",
     ends=("end", "end", "end"),
-    call="{};",
+    warning="warn_outside({});",
     types={},
     table="T.{}",
 )
