@@ -241,7 +241,7 @@ OCTAVE = Language(
     while_="while {}",
     for_="for k = 1:{}",
     ends=("end", "end", "end"),
-    warning="warn_outside({});",
+    warning="warn_outside({}, T.RANGE);",
     types={},
     table="T.{}",
 )
