@@ -171,6 +171,10 @@ def _yielding(joint: LawJoint, strength: float | None) -> LawJoint:
 @file("--json", "write law and fits", parameter="json_file")
 @file("--picture", "draw data, law and residuals")
 @file("--python", "write force and stiffness over delta as a module that needs only math")
+@click.option(
+    "--table", "tables", type=Path, multiple=True, help="write P(delta) of one run, and back: .json .py .h .mo .m"
+)
+@click.option("--of", help="--table: the load of a general scene that P and delta are of, if it has several")
 @flag("--force", "overwrite files other than pictures and SWEEP/fit.csv")
 @_sentences()
 def fit(
@@ -179,6 +183,8 @@ def fit(
     json_file: Path | None,
     picture: Path | None,
     python: Path | None,
+    tables: tuple[Path, ...],
+    of: str | None,
     force: bool,
 ) -> int:
     """Fit the plastic-Winkler law to P(delta) of runs: k, and c where the joint yields.
@@ -191,6 +197,10 @@ def fit(
     from archord.postprocess.laws.calibration import calibrate
     from archord.postprocess.run import Run
 
+    if tables or of:
+        if not tables or len(folders) > 1 or any((load_range, json_file, picture, python)):
+            raise InputError("--table: takes one run, and but for --of and --force no other option.")
+        return _write_table(folders[0], tables, of, force)
     deltas, first = load_range or (0.0, math.inf), folders[0]
     if any(map(is_sweep, folders)):
         if len(folders) > 1 or json_file or python or picture:
@@ -206,6 +216,19 @@ def fit(
     )
     print(fit_report.summary_table(calibration), "", *fit_report.notes(calibration), *files, sep="\n")
     _warn(*fit_report.doubts(calibration))
+    return 0
+
+
+def _write_table(folder: Path, targets: tuple[Path, ...], of: str | None, force: bool) -> int:
+    from archord.output.folder import FILES
+    from archord.postprocess.laws.exports.export import export_curve
+    from archord.postprocess.laws.run_table import run_table
+    from archord.postprocess.run import Run
+
+    curve = run_table(Run(folder), of)
+    texts: list[tuple[Path | None, str]] = [(target, export_curve(curve, target)) for target in targets]
+    files = _write(texts, [folder / name for name in FILES], force)
+    print(*(f"{name}: {value}" for name, value in curve.about.items()), *files, sep="\n")
     return 0
 
 

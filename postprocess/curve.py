@@ -58,12 +58,18 @@ class RunCurve:
         A joint that yields comes back from unloading a little deeper and softer, to the first loading's curve only
         beyond: the first step that counts again is one whose P is larger than ever before, too.
         """
-        deepest, largest = (np.maximum.accumulate([0.0, *values])[:-1] for values in (self.delta, self.P))
-        first, going_on = [], True
-        for deeper, stronger in zip(self.delta > deepest * (1 + 1e-9), largest * (1 + _SAME) < self.P, strict=True):
-            going_on = bool(deeper and (going_on or stronger))
-            first.append(going_on)
+        first = on_first_loading(self.delta, self.P)
         return replace(self, **{name: getattr(self, name)[first] for name in CURVES})
+
+
+def on_first_loading(delta: Array, P: Array) -> np.ndarray:
+    """Whether each of the steps ``(n,)`` is one of `RunCurve.loading`."""
+    deepest, largest = (np.maximum.accumulate([0.0, *values])[:-1] for values in (delta, P))
+    first, going_on = [], True
+    for deeper, stronger in zip(delta > deepest * (1 + 1e-9), largest * (1 + _SAME) < P, strict=True):
+        going_on = bool(deeper and (going_on or stronger))
+        first.append(going_on)
+    return np.array(first, dtype=bool)
 
 
 def first_loading(load: Array) -> slice:
