@@ -118,7 +118,8 @@ class JointCurve:
         """The displacement ``(..., k)`` at which the joint opens on its way back from ``deepest``."""
         most = np.maximum(np.asarray(deepest, float) / self.length, 0.0)
         ratio = np.maximum(hermite(self.x, self.ratio, self.dratio, most)[0], 1e-3)
-        return (most - ratio * self._back_displacement(self._loading(most)[0] / ratio)) * self.length
+        opens = most - ratio * self._back_displacement(self._loading(most)[0] / ratio)
+        return np.maximum(opens, 0.0) * self.length
 
     def _loading(self, x: Array) -> tuple[Array, Array]:
         return self._curve(self.y, self.dy, x)

@@ -106,7 +106,8 @@ def read_steps(run: Run, of: str | None = None) -> RunSteps:
             raise InputError(f"{run.folder}: is the run of a joint, which has one load; --of is for general scenes.")
         gap = abs(scene.joint.dR)
         units = gap, scene.E_star * gap * scene.thickness, scene.E_star * gap / scene.joint.radius
-        names, begin = ["delta", "P", "p0", "eps"], 0
+        known = scene.joint.dR > 0  # or the fit presses without a load
+        names, begin = ["delta", "P", *(("p0", "eps") if known else ("unknown", "unknown"))], 0
     else:
         loads = [load.name for load in scene.load]
         if of not in loads and (of or len(loads) > 1):

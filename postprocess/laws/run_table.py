@@ -7,7 +7,7 @@ shifts by dz the work P dz is lost: from any other displacement the joint opens 
     z(delta) = z0 + c int dD/P,
 
 D the plastic dissipation, z0 where contact begins, and c such that the unloading that was solved opens where it did.
-The ratio of `JointCurve` follows from that both curves meet; B is no stiffer where it opens than the first step.
+The ratio of `JointCurve` follows from that both curves meet; B is softer where it opens than the first step.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ _FEWEST, _FEWEST_BACK = 6, 3  # steps with contact
 _UNSEEN = 0.03  # error of ways back that were not solved, over the force they begin at (docs/calibration.md)
 _FIRST = 4.0  # error at first touch over that at the first step: 5 to 8 % of P against the logarithm of line contact
 _BISECTIONS, _LARGEST = 60, 7.0  # of ln(ratio)
+_SOFTER = 0.9  # slope of the way back where it opens over that up to the first step, at most
 _LEAST = 1e-3  # slope at an end over that of the last two nodes
 
 
@@ -126,7 +127,7 @@ def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
     x, y = steps.x[on], steps.y[on]
     z = _opening(x, y, steps.x[off])
     curve = _cubic(np.append(0.0, x - z), np.append(0.0, y), touching=True)
-    curve.df[0] = min(curve.df[0], loading.f[-len(k)] / (loading.x[-len(k)] - start))
+    curve.df[0] = min(curve.df[0], _SOFTER * loading.f[-len(k)] / (loading.x[-len(k)] - start))
     lost = np.append(np.zeros(len(loading.x) - len(k)), steps.dissipated[k])
     shift = np.cumsum(np.append(0.0, np.diff(lost) / ((loading.f[1:] + loading.f[:-1]) / 2).clip(_SAME * y[-1])))
     deepest = loading.x == x[-1]

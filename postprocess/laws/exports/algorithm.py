@@ -187,7 +187,7 @@ def residual(deepest: float) -> float:
         start = max(deepest, 0.0)
         ratio = scale(start)
         largest, slope = curve(LOAD, LOAD_SLOPE, start)
-        z = start - ratio * back_displacement(largest / ratio)
+        z = max(start - ratio * back_displacement(largest / ratio), 0.0)
     return z
 
 
