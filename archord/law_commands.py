@@ -189,7 +189,8 @@ def fit(
 ) -> int:
     """Fit the plastic-Winkler law to P(delta) of runs: k, and c where the joint yields.
 
-    Of a sweep, k and c of every case, printed and in SWEEP/fit.csv.
+    Of a sweep, k and c of every case, printed and in SWEEP/fit.csv. With --table no fit, but P(delta) of the run itself
+    and its way back, of any scene.
     """
     from archord.output.folder import FILES, is_sweep
     from archord.output.user_file import check_target

@@ -66,12 +66,16 @@ class RunSteps:
                     f"{self.said(force=self.y[b])}; in a table it must."
                 )
 
+    @property
+    def accuracy(self) -> float | None:
+        """The error of mesh and steps that `analysis.accuracy` estimates of force or displacement, over the largest."""
+        known = self.run.scene.accurate in self.names
+        return (self.run.summary.get("accuracy") or {}).get("estimated") if known else None
+
     def mesh_error(self, slope: Array) -> Array | float:
-        """What `analysis.accuracy` estimates of mesh and steps, as an error of y where its slope is ``slope``; 0
-        without an estimate."""
-        accuracy = (self.run.summary.get("accuracy") or {}).get("estimated") or 0.0
-        of_displacement = self.run.scene.accurate.endswith(("delta", "displacement"))
-        return accuracy * (self.x.max() * slope if of_displacement else self.y.max())
+        """`accuracy` as an error of y where its slope is ``slope``; 0 if unknown."""
+        of_displacement = self.run.scene.accurate == self.names[0]
+        return (self.accuracy or 0.0) * (self.x.max() * slope if of_displacement else self.y.max())
 
     @property
     def about(self) -> dict[str, Any]:
@@ -79,7 +83,7 @@ class RunSteps:
         run, scene = self.run, self.run.scene
         sha = hashlib.sha256(resolved(scene).encode()).hexdigest()[:16]
         joint = {"R": scene.joint.radius, "dR": scene.joint.dR, "E*": scene.E_star} if run.is_joint else {}
-        thick, accuracy = scene.analysis.thickness, (run.summary.get("accuracy") or {}).get("estimated")
+        thick, accuracy = scene.analysis.thickness, self.accuracy
         units = ", ".join(f"{name} in {run.units.get(name, '-')}" for name in self.names)
         said = "unknown: the scene asks for no analysis.accuracy"
         return {
