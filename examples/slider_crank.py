@@ -142,8 +142,9 @@ def study(curve, steps=STEPS, turns=TURNS):
     exec(export_curve(curve, Path("joint.py")), module := {"__name__": "joint"})  # `archord law --export` writes it
     columns, whole, inside, calls = simulate(module["force"], curve.displacement([START]).item(), steps, turns)
     P, parts = energies(columns, curve)
+    angle = columns[0] * SPEED
     return columns, P, parts, {
-        "first impacts [kN]": f"{P[columns[0] * SPEED < pi].max() / 1e3:.3f}",
+        "first impacts [kN]": f"{P[(angle > pi / 3) & (angle < pi)].max() / 1e3:.3f}",
         "largest force [kN]": f"{P.max() / 1e3:.3f}",
         "deepest/dR": f"{columns[5, -1] / DR:.3f}",
         "lost by the law [N mm]": f"{parts['lost, law'][-1]:.1f}",
