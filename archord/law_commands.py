@@ -19,7 +19,7 @@ from archord.options import argument, file, flag, overrides
 from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
-    from archord.postprocess.laws.joint import LawJoint
+    from archord.postprocess.laws.general.joint import LawJoint
 
 _LINE = 400  # points of a line of the picture
 
@@ -50,7 +50,7 @@ def laws() -> int:
 @argument(
     "names",
     "NAME...",
-    "laws, as archord laws lists them [paper, or paper-plastic with a yield stress]",
+    "laws, as archord laws lists them [archord; without plane and nu paper or paper-plastic]",
     nargs=-1,
     type=str,
 )
@@ -69,7 +69,17 @@ def laws() -> int:
 @click.option("--to", type=float, default=2.0, help="last row: delta in clearances, or P in E* dR")
 @click.option("--points", type=int, default=20, help="rows, in equal steps from zero")
 @flag("--extrapolate", "evaluate formulas outside the range of the law")
+@click.option("--deepest", type=float, default=0.0, help="archord: the way back from this displacement, in clearances")
 @file("--plot", "draw the laws into this file instead of a table", None)
+@click.option(
+    "--export",
+    "exports",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="archord: write the joint's law as .py, .h (C99), .mo (Modelica), .m (Matlab, Octave) or .json",
+)
+@flag("--force", "overwrite exports")
 @_sentences()
 def law(
     names: tuple[str, ...],
@@ -79,10 +89,13 @@ def law(
     to: float,
     points: int,
     extrapolate: bool,
+    deepest: float,
     plot: Path | None,
+    exports: tuple[Path, ...],
+    force: bool,
     **given: Any,
 ) -> int:
-    """Print a table of closed-form laws, or draw them against each other."""
+    """Print a table of laws of the joint, draw them against each other, or export archord's."""
     from archord.output.user_file import check_target
     from archord.postprocess.laws.law import LawRangeWarning
     from archord.postprocess.laws.law_report import draw_laws, law_table, sample, says_nothing
@@ -96,6 +109,13 @@ def law(
         raise InputError(f"--points {points}: must be between 1 and 100000.")
     joint, units, thickness = _joint(scene, overrides, given)
     chosen = chosen or [default_law(joint)]
+    if exports or deepest:
+        if [entry.name for entry in chosen] != ["archord"]:
+            raise InputError(
+                f"{'--export' if exports else '--deepest'}: is for the law archord, which needs plane and nu."
+            )
+        if exports:
+            return _export(joint, units, thickness, exports, files_read(scene, overrides) if scene else [], force)
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
     if plot:
         check_target(plot, files_read(scene, overrides) if scene else [], force=True)
@@ -103,7 +123,7 @@ def law(
     for entry in chosen:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", LawRangeWarning)
-            state = sample(entry, joint, by_load, to, _LINE if plot else points, extrapolate)
+            state = sample(entry, joint, by_load, to, _LINE if plot else points, extrapolate, deepest)
         told = [str(warning.message) for warning in caught]
         if says_nothing(state, by_load):
             silent.append([f"{entry.name}: has no number here", *told][-1])
@@ -120,6 +140,21 @@ def law(
     return 0
 
 
+def _export(
+    joint: LawJoint, units: dict[str, str], thickness: float, exports: tuple[Path, ...], inputs: list[Path], force: bool
+) -> int:
+    from archord.postprocess.laws.exports.export import export_curve
+    from archord.postprocess.laws.general.general_law import general_law, outside
+
+    if reason := outside(joint):
+        raise InputError(f"archord: {reason}.")
+    law = general_law(joint)
+    about = law.about | {"units": {name: units[name] for name in ("length", "force", "stress") if name in units}}
+    law = dataclasses.replace(law, force=law.force * thickness, about=about)
+    print(*_write([(file, export_curve(law, file)) for file in exports], inputs, force), sep="\n")
+    return 0
+
+
 def _warn(*messages: str) -> None:
     for message in dict.fromkeys(messages):
         print(f"archord: warning: {message}.", file=sys.stderr)
@@ -129,7 +164,7 @@ def _joint(
     scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any]
 ) -> tuple[LawJoint, dict[str, str], float]:
     """The joint of the scene, or of the options, which come before it; the names of the units; and the thickness."""
-    from archord.postprocess.laws.joint import LawJoint
+    from archord.postprocess.laws.general.joint import LawJoint
 
     values = {name: value for name, value in given.items() if value is not None}
     if "nu" in values:

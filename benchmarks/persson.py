@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from archord.benchmarks.case import paper_joint, varied
 from archord.postprocess.laws.elastic_laws import persson_pressure
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.scene.scene import Scene
 
 DR = 1e-4

@@ -26,8 +26,8 @@ from scipy.integrate import cumulative_trapezoid
 
 import archord
 from archord.postprocess.laws.exports.export import export_curve
-from archord.postprocess.laws.joint import LawJoint
-from archord.postprocess.laws.joint_curve import JointCurve
+from archord.postprocess.laws.general.joint import LawJoint
+from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.laws import LAWS
 from archord.report.figure import new_figure, save
 from archord.report.table import Table

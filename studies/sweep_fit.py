@@ -12,7 +12,7 @@ from typing import Any
 
 from archord.postprocess.convergence import Refined, group
 from archord.postprocess.laws.calibration import POOR, check_compatible, fit_curve
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.run import Run
 from archord.report.table import Table
 from archord.report.version import VERSION

@@ -26,8 +26,9 @@ ROOMS = [
     "output",
     "postprocess",
     "postprocess.pictures",
-    "postprocess.laws",
+    "postprocess.laws.general",
     "postprocess.laws.exports",
+    "postprocess.laws",
     "postprocess.decks",
     "studies",
     "benchmarks",
@@ -48,6 +49,7 @@ BANNED = {
     "solver.contact": ["archord.scene"],
     "solver.linear": ["archord.scene"],
     "postprocess.laws": [*FE, "archord.solver", "archord.benchmarks"],
+    "postprocess.laws.general": [*FE, "archord.solver", "archord.benchmarks"],
     "postprocess.laws.exports": [*FE, "archord.solver", "archord.benchmarks"],
     "postprocess": ["archord.benchmarks"],
 }

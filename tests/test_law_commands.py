@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from archord.cli import run
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "steel_pin.toml")

@@ -19,7 +19,7 @@ from archord.postprocess.convergence import group
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.fields import BODIES, read_fields
 from archord.postprocess.laws.calibration import fit_curve
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.report.table import Table
 

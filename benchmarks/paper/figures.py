@@ -19,7 +19,7 @@ from archord.postprocess.arc import read_contact
 from archord.postprocess.chord import arc_angle, read_chord_pressure
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.elastic_laws import hertz, persson_load, persson_pressure
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.postprocess.pictures.joint import field_panel
 from archord.report.figure import new_figure, save

@@ -19,7 +19,7 @@ from archord.postprocess.convergence import Order, Refined, group
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.fitted_law import FittedLaw
-from archord.postprocess.laws.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.scene.errors import InputError
 
 POOR = 0.05  # rms of law/run - 1 from which on a fit is worth a warning

@@ -18,7 +18,7 @@ import math
 import numpy as np
 from scipy.special import lambertw
 
-from archord.postprocess.laws.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.law import NOTHING, ROUND_OFF, LawState, rising_root
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from archord.postprocess.laws.chord_laws import plastic_winkler
-from archord.postprocess.laws.joint import Array, LawJoint
+from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.law import LawState, rising_root
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

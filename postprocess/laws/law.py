@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from archord.postprocess.laws.joint import LARGE, Array, LawJoint
+from archord.postprocess.laws.general.joint import LARGE, Array, LawJoint
 
 _FELT = 1e-3  # share of P by which a small block must change it to be worth a word
 ROUND_OFF = 1e-9  # a grid up to the limit may overshoot it
@@ -32,6 +32,7 @@ class LawState(NamedTuple):
     stiffness: Array
     peak_pressure: Array = NOTHING
     angle: Array = NOTHING
+    error: Array = NOTHING  # of the load, which 9 in 10 joints keep
 
 
 @dataclass(frozen=True)

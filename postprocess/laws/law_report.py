@@ -8,20 +8,29 @@ from pathlib import Path
 import numpy as np
 
 from archord.output.user_file import writing
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.law import Law, LawState
 from archord.report.figure import new_figure, save
 from archord.report.table import Table
 
 
-def sample(law: Law, joint: LawJoint, by_load: bool, to: float, points: int, extrapolate: bool) -> LawState:
+def sample(
+    law: Law, joint: LawJoint, by_load: bool, to: float, points: int, extrapolate: bool, deepest: float = 0.0
+) -> LawState:
     """``points`` states of ``law`` in equal steps up to delta = ``to`` clearances, or P = ``to`` E* dR (``by_load``);
-    outside the range nan but for the steps themselves."""
+    outside the range nan but for the steps themselves. With archord's law the joint may have been at ``deepest``
+    clearances before."""
     steps = np.arange(1, points + 1) * (to / points) * joint.clearance
     if by_load:
         load = steps * joint.E_star
         return law.at_load(joint, load, extrapolate)._replace(load=load)
-    return law.at_displacement(joint, steps, extrapolate)._replace(delta=steps)
+    state = law.at_displacement(joint, steps, extrapolate)._replace(delta=steps)
+    if deepest:
+        found = general_law(joint).at(steps, deepest * joint.clearance)
+        quantities = found.load, found.stiffness, found.peak_pressure, found.angle, found.error
+        state = LawState(steps, *(np.where(np.isnan(state.load), np.nan, values) for values in quantities))
+    return state
 
 
 def says_nothing(state: LawState, by_load: bool) -> bool:
@@ -43,6 +52,7 @@ def law_table(law: Law, joint: LawJoint, state: LawState, units: dict[str, str],
         ("dP/ddelta", "stiffness", state.stiffness * thickness, moving),
         ("p0", "stress", state.peak_pressure, "pressure" in law.gives),
         ("eps/deg", "", np.degrees(state.angle), "contact angle" in law.gives),
+        ("+-P", "force", state.error * thickness, bool(np.isfinite(state.error).any())),
     ]
     shown = [(f"{name} [{units[of]}]" if of in units else name, values) for name, of, values, given in columns if given]
     rows = np.transpose([values for _, values in shown])

@@ -13,12 +13,18 @@ import numpy as np
 
 from archord.postprocess.laws import chord_laws as chord
 from archord.postprocess.laws import elastic_laws as elastic
-from archord.postprocess.laws.joint import Array, LawJoint
+from archord.postprocess.laws.general import general_law as general
+from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.law import Law, LawState
 
 _THIN = 0.1  # dR/R up to which R1 = R2 = R is an approximation
 _ALIKE = 0.01  # Dundurs' beta that counts as zero
 _DEEPEST = 2.0  # displacement over clearance up to which Hu et al. compare their law with finite elements
+
+
+def _archord(joint: LawJoint, delta: Array) -> LawState:
+    found = general.general_law(joint).at(delta)
+    return LawState(delta, found.load, found.stiffness, found.peak_pressure, found.angle, found.error)
 
 
 def _thick(joint: LawJoint) -> str:
@@ -49,6 +55,12 @@ def _half_spaces(A: float, q: float, hertz: bool = True) -> dict[str, Any]:
 _CHORD: dict[str, Any] = {"limit": lambda joint: _DEEPEST * joint.clearance, "unfit": _thick}
 _OF_LOAD = {"gives": ("pressure", "contact angle")}
 _FUNCTIONS: dict[str, dict[str, Any]] = {
+    "archord": {
+        "state": _archord,
+        "limit": lambda joint: general.NODES[-1] * joint.clearance,
+        "unfit": general.outside,
+        "needs": ("plane", "nu"),
+    },
     "paper": {"state": chord.parabola, **_CHORD},
     "paper-plastic": {"state": chord.plastic_winkler, "needs": ("yield_stress",), "plastic": True, **_CHORD},
     "winkler": {"state": chord.winkler, **_CHORD},
@@ -82,6 +94,8 @@ LAWS: dict[str, Law] = {name: Law(name, **_WORDS[name], **functions) for name, f
 
 def default_law(joint: LawJoint) -> Law:
     """The law of ``joint`` where none is named."""
+    if joint.plane is not None and joint.nu is not None:
+        return LAWS["archord"]
     return LAWS["paper" if joint.yield_stress is None else "paper-plastic"]
 
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from archord.materials.material import Array
-from archord.postprocess.laws.joint_curve import JointCurve, hermite
+from archord.postprocess.laws.general.joint_curve import JointCurve, hermite
 from archord.postprocess.laws.run_steps import RunSteps, read_steps
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError

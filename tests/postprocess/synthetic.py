@@ -7,7 +7,7 @@ import numpy as np
 from archord.benchmarks.case import E, paper_joint
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.chord_laws import plastic_winkler
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 
 LOADS = np.linspace(0.1, 2.0, 20)
 

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from archord.benchmarks.persson import DR, UNLIKE, persson_joint, theory, unlike
 from archord.output.run import solve_scene
 from archord.postprocess.laws.elastic_laws import persson_pressure
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.presets.joint_account import core_peeq
 from archord.presets.measures import energy_balance
 from archord.scene.sections import Load

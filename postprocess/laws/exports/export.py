@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from archord.postprocess.laws.exports.translate import FUNCTIONS, in_c, in_modelica, in_octave, in_python, select
-from archord.postprocess.laws.joint_curve import JointCurve
+from archord.postprocess.laws.general.joint_curve import JointCurve
 
 Tables = dict[str, Any]  # int, float or list[float] by the names of algorithm.py
 

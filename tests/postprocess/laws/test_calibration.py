@@ -8,7 +8,7 @@ import pytest
 from archord.postprocess.convergence import group
 from archord.postprocess.laws.calibration import calibrate, fit_curve
 from archord.postprocess.laws.fit_report import notes
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from tests.output.run_files import solved

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from archord.postprocess.laws.chord_laws import parabola, plastic_winkler
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
 
 JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, block_yield=300.0)

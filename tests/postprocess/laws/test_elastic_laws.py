@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
 from archord.postprocess.laws.elastic_laws import hertz, persson_load, persson_pressure
-from archord.postprocess.laws.joint import LawJoint
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import LAWS
 
 JOINT = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5, length=11.0)

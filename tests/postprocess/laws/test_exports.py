@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from archord.postprocess.laws.exports.export import export_curve
-from archord.postprocess.laws.joint_curve import JointCurve
+from archord.postprocess.laws.general.joint_curve import JointCurve
 from tests.postprocess.laws.curves import yielding_curve
 from tests.postprocess.laws.modelica import functions_of
 

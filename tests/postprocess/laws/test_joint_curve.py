@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archord.postprocess.laws.joint_curve import JointCurve, first_touch
+from archord.postprocess.laws.general.joint_curve import JointCurve, first_touch
 from tests.postprocess.laws.curves import yielding_curve
 
 X = np.linspace(0.0, 3.3, 500)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archord.postprocess.laws.joint import LARGE, LawJoint
+from archord.postprocess.laws.general.joint import LARGE, LawJoint
 from archord.postprocess.laws.law import LawRangeWarning, rising_root
 from archord.postprocess.laws.laws import LAWS
 from archord.scene.file import load_scene

@@ -10,7 +10,7 @@ import pytest
 
 from archord.benchmarks.case import paper_joint
 from archord.cli import run as command
-from archord.postprocess.laws.joint_curve import JointCurve
+from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.run_table import run_table
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from archord.postprocess.laws.joint import Array
+from archord.postprocess.laws.general.joint import Array
 
 _ITERATIONS = 6  # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
 _BRACKETED = 60  # iterations at most of Newton's method for an inverse, which bisects where it must
@@ -154,10 +154,10 @@ class JointCurve:
             t = np.where((t - low) * (high - t) < 0, (low + high) / 2, t)
             if not (np.abs(t - last) >= 1e-12).any():
                 break
-        end = self.x[-1] + (values - f[:, -1]) / df[:, -1]
+        end = self.x[-1] + (values - f[:, -1]) / np.maximum(df[:, -1], 1e-100)
         x = np.where(values > f[:, -1], end, x0 + h * t).reshape(shape)
         if self.touch.size:
-            a, b, c = np.moveaxis(self.touch, -1, 0)[..., None]
+            a, b, c = _each(self.touch)
             early = (y > 0) & (y < f[rows, 1].reshape(shape))
             v = np.where(early, y, 1.0)
             log = np.log1p(1 / v)
@@ -189,10 +189,19 @@ class JointCurve:
 
 
 def first_touch(touch: Array, x: Array) -> tuple[Array, Array]:
-    """``y`` and ``dy/dx`` of the logarithmic law at ``x > 0``: ``t = 1/y`` solves ``pi x t - ln(1 + t) = F(x)``, which
-    is convex in t, by Newton's method."""
-    a, b, c = np.moveaxis(touch, -1, 0)[..., None]
-    F, slope = a + x * (b + c * x), b + 2 * c * x
+    """``y`` and ``dy/dx`` of the logarithmic law of ``touch`` ``(..., 3)`` at ``x > 0`` ``(..., k)``."""
+    a, b, c = _each(touch)
+    return line_contact(x, a + x * (b + c * x), b + 2 * c * x)
+
+
+def _each(touch: Array) -> Array:
+    """a, b, c of `first_touch` ``(3, ..., 1)``, of one joint ``(3,)``."""
+    return touch if touch.ndim == 1 else np.moveaxis(touch, -1, 0)[..., None]
+
+
+def line_contact(x: Array, F: Array, slope: Array) -> tuple[Array, Array]:
+    """``y`` and ``dy/dx`` at ``x > 0`` where F(x) and its ``slope`` are these: ``t = 1/y`` solves
+    ``pi x t - ln(1 + t) = F``, which is convex in t, by Newton's method."""
     t = (F + np.log1p(F / (np.pi * x))) / (np.pi * x)
     for _ in range(_ITERATIONS):
         t = t - (np.pi * x * t - np.log1p(t) - F) / (np.pi * x - 1 / (1 + t))

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from archord.materials.elasticity import contact_modulus
-from archord.scene.scene import Scene
-from archord.scene.sections import Solid
+
+if TYPE_CHECKING:
+    from archord.scene.scene import Scene
+    from archord.scene.sections import Solid
 
 Array = npt.NDArray[np.floating]
 LARGE = 100.0  # width of the block over R, for which the laws of P(delta) are

@@ -1,0 +1,113 @@
+"""The elastic joint: P(delta), p0 and eps as polynomials of what decides it, the same in plane strain and stress.
+
+With the pin's share ``p`` of the compliance 1/E*, ``q = 1 - p``, and ``m``, ``n`` of pin and block, ``nu/(1 - nu)`` in
+plane strain and ``nu`` in plane stress, three functions of ``x = delta/dR`` say all of ``y = P/(E* dR)``:
+
+    F = pi x/y + ln(y/(1 + y)),    p0 R/(E* dR sqrt(y)),    eps/sqrt(y)
+
+F is constant at first touch, where the contact is a line contact's (Johnson 1985, eq. 5.57), and a compliance at depth.
+Each is a sum of Chebyshev polynomials of x/(1 + x) times products of p, p m, q n and dR/R: elastic_model.json, which
+law_fit.py fits.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from archord.postprocess.laws.general.joint import Array
+from archord.postprocess.laws.general.joint_curve import line_contact
+
+TABLE = Path(__file__).parent / "elastic_model.json"
+FARTHEST = 3.8  # delta/dR at the end of the polynomials; what is fitted ends at 3
+_CLEARANCE = 0.02  # dR/R of which dR/R is counted
+
+
+class Elastic(NamedTuple):
+    """What decides elastic joints, each ``(m,)``: share of the pin p, ``m`` and ``n`` of pin and block, ``clearance``
+    dR/R."""
+
+    p: Array
+    m: Array
+    n: Array
+    clearance: Array
+
+
+class ElasticState(NamedTuple):
+    """Of joints at ``x`` ``(m, k)``: y and dy/dx, F and dF/dx, p0 R/(E* dR) and eps [rad]."""
+
+    y: Array
+    slope: Array
+    F: Array
+    F_slope: Array
+    peak: Array
+    angle: Array
+
+
+def products(joints: Elastic, exponents: Array) -> Array:
+    """``p^a (p m)^b (q n)^c d^e`` ``(m, terms)`` for the rows a, b, c, e of ``exponents``."""
+    p, m, n, clearance = map(np.asarray, joints)
+    factors = np.stack([p, p * m, (1 - p) * n, clearance / _CLEARANCE])
+    return np.prod(factors[:, :, None] ** exponents.T[:, None, :], axis=0)
+
+
+def depth(x: Array) -> Array:
+    """x on Chebyshev's interval from -1, first touch, to 1."""
+    return 2 * (x / (1 + x)) * (1 + FARTHEST) / FARTHEST - 1
+
+
+@dataclass(frozen=True)
+class Polynomials:
+    """One of the three functions: ``coefficients`` ``(terms, degree + 1)`` of the products with ``exponents``."""
+
+    exponents: Array
+    coefficients: Array
+
+    def at(self, joints: Elastic, x: Array) -> tuple[Array, Array]:
+        """The function and its derivative by x ``(m, k)``, at ``x`` ``(k,)`` of all or ``(m, k)`` of each joint."""
+        series = (products(joints, self.exponents) @ self.coefficients).T[..., None]
+        slope = 2 * (1 + FARTHEST) / FARTHEST / (1 + x) ** 2
+        value, rise = (chebyshev.chebval(depth(x), c, tensor=False) for c in (series, chebyshev.chebder(series)))
+        return value, rise * slope
+
+
+@dataclass(frozen=True)
+class ElasticModel:
+    """The three functions."""
+
+    F: Polynomials
+    peak: Polynomials
+    angle: Polynomials
+
+    def at(self, joints: Elastic, x: Array) -> ElasticState:
+        """All quantities of ``joints`` at ``x > 0``, ``(k,)`` or ``(m, k)``."""
+        (F, F_slope), (peak, _), (angle, _) = (of.at(joints, x) for of in (self.F, self.peak, self.angle))
+        y, slope = line_contact(np.asarray(x), F, F_slope)
+        return ElasticState(y, slope, F, F_slope, peak * np.sqrt(y), angle * np.sqrt(y))
+
+    def to_json(self) -> str:
+        """The model as a table: a row for each product, its exponents and coefficients in six digits."""
+        lines = []
+        for name, of in vars(self).items():
+            rows = [[*map(int, e), *(float(f"{c:.6g}") for c in row)]
+                    for e, row in zip(of.exponents, of.coefficients, strict=True)]  # fmt: skip
+            lines.append(f' "{name}": [\n  ' + ",\n  ".join(map(json.dumps, rows)) + "\n ]")
+        return "{\n" + ",\n".join(lines) + "\n}\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> ElasticModel:
+        """The model in ``text``, as `to_json` writes it."""
+        tables: dict[str, Any] = {name: np.array(rows) for name, rows in json.loads(text).items()}
+        return cls(**{name: Polynomials(rows[:, :4], rows[:, 4:]) for name, rows in tables.items()})
+
+
+@cache
+def elastic_model() -> ElasticModel:
+    """The model that comes with archord."""
+    return ElasticModel.from_json(TABLE.read_text(encoding="utf-8"))

@@ -1,0 +1,77 @@
+"""Regression of curves by a Gaussian process: several outputs at once, of which later ones are known of fewer points.
+
+Rasmussen and Williams (2006), sections 2.2, 2.7 and 5.4. The kernel is Matern's of order 7/2 with a length for each
+input, beside a linear mean with wide prior; outputs share it but for their size. Points are ordered so that output j is
+known of the first n_j: then one Cholesky factor serves all outputs, as its leading block is that of the leading points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from archord.postprocess.laws.general.joint import Array
+
+_WIDE = 1.0  # prior variance of the linear mean's coefficients over that of the rest
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """``lengths`` ``(d,)`` of the inputs, and ``noise``, the variance of data over that of the process."""
+
+    lengths: Array
+    noise: float
+
+    def between(self, one: Array, other: Array) -> Array:
+        """Covariances ``(n, m)`` of points ``(n, d)`` and ``(m, d)``."""
+        a, b = one / self.lengths, other / self.lengths
+        distance = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2 * a @ b.T
+        r = np.sqrt(7 * np.maximum(distance, 0.0))
+        return (1 + r + 0.4 * r**2 + r**3 / 15) * np.exp(-r) + _WIDE * (1 + one @ other.T)
+
+    def at(self, points: Array) -> Array:
+        """Variances ``(n,)`` at points ``(n, d)``."""
+        return 1 + _WIDE * (1 + (points**2).sum(1))
+
+
+class Process:
+    """A Gaussian process through ``values`` ``(n, outputs)`` at ``points`` ``(n, d)``, nan from some row on in every
+    column: ``size`` ``(outputs,)`` is the variance of each, ``likelihood`` the logarithm of all data's."""
+
+    def __init__(self, kernel: Kernel, points: Array, values: Array) -> None:
+        self.kernel, self.points = kernel, points
+        covariance = kernel.between(points, points)
+        covariance[np.diag_indices_from(covariance)] += kernel.noise
+        self.factor = cholesky(covariance, lower=True, check_finite=False)
+        self.known = ~np.isnan(values)
+        self.weights = solve_triangular(self.factor, np.where(self.known, values, 0.0), lower=True, check_finite=False)
+        self.weights *= self.known
+        count = self.known.sum(0)
+        self.size = (self.weights**2).sum(0) / np.maximum(count, 1)
+        told = np.cumsum(np.log(np.diag(self.factor)))[np.maximum(count, 1) - 1]
+        self.likelihood = -(0.5 * count * np.log(np.maximum(self.size, 1e-300)) + told)[count > 0].sum()
+
+    def predict(self, points: Array) -> tuple[Array, Array]:
+        """Means and standard deviations ``(m, outputs)`` at ``points`` ``(m, d)``; of the process, without noise."""
+        reduced = solve_triangular(
+            self.factor, self.kernel.between(self.points, points), lower=True, check_finite=False
+        )
+        told = (reduced**2).T @ self.known
+        left = np.maximum(self.kernel.at(points)[:, None] - told, 0.0)
+        return reduced.T @ self.weights, np.sqrt(left * self.size)
+
+    def left_out(self) -> tuple[Array, Array]:
+        """What each point's values ``(n, outputs)`` are predicted to be by the others, less what they are, and the
+        standard deviation of that (section 5.4.2); nan where unknown."""
+        off, deviation = np.full((2, *self.known.shape), np.nan)
+        for count in np.unique(self.known.sum(0)):
+            if count < 2:
+                continue
+            inverse = solve_triangular(self.factor[:count, :count], np.eye(count), lower=True, check_finite=False)
+            precision = (inverse**2).sum(0)
+            columns = np.flatnonzero(self.known.sum(0) == count)
+            off[:count, columns] = -(inverse.T @ self.weights[:count, columns]) / precision[:, None]
+            deviation[:count, columns] = np.sqrt(self.size[columns] / precision[:, None])
+        return off, deviation
