@@ -26,6 +26,7 @@ from scipy.integrate import cumulative_trapezoid
 
 import archord
 from archord.postprocess.laws.exports.export import export_curve
+from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.laws import LAWS
@@ -179,13 +180,9 @@ def draw(runs, target):
 
 
 def laws():
-    """The laws by name: those of the literature, and those of solved runs of the joint, without a yield stress and with
-    it, from `archord fit RUN --table`."""
+    """The laws by name: those of the literature, and archord's own of the joint without a yield stress and with it."""
     curves = {name: table(LAWS[name]) for name in ("paper", "paper-plastic", "lankarani-nikravesh", "johnson")}
-    for name in ("elastic", "yielding"):
-        curve = JointCurve.from_json((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-        curves[name] = replace(curve, force=curve.force / WIDTH)
-    return curves
+    return curves | {"elastic": general_law(replace(JOINT, block_yield=None)), "yielding": general_law(JOINT)}
 
 
 if __name__ == "__main__":
