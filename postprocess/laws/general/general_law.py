@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
@@ -38,16 +39,24 @@ def general_law(joint: LawJoint) -> JointCurve:
     return replace(found, **tables, **units, about=about)
 
 
-def law_of_numbers(numbers: tuple[float, ...]) -> JointCurve:
-    """The law of the joint with these ``numbers`` (see `joint_numbers`) in units of dR, E* dR and E* dR/R, in tables of
-    one row; a body that yields beyond the range is elastic."""
-    strain, *rest = (np.array([number]) for number in numbers)
-    elastic, stresses = Elastic(*rest[:4]), rest[4:]
-    late = [ELASTIC_BELOW * first_yield(elastic_model(), bool(strain), elastic, s) >= NODES[-1] for s in stresses]
-    yielding = Yielding(*(np.where(beyond, np.inf, s) for beyond, s in zip(late, stresses, strict=True)))
-    if np.isinf(yielding).all():
-        return reduce_joints("", elastic)
-    return reduce_joints(sides_of((float(strain[0]), *yielding.pin, *yielding.block))[0], elastic, yielding)
+def law_of_numbers(numbers: npt.ArrayLike) -> JointCurve:
+    """The laws of joints with these ``numbers`` ``(m, 7)`` (see `joint_numbers`) in units of dR, E* dR and E* dR/R, in
+    tables of a row each; a body that yields beyond the range is elastic."""
+    rows = np.atleast_2d(np.asarray(numbers, float)).copy()
+    for strain in np.unique(rows[:, 0]):
+        of = rows[:, 0] == strain
+        for body in (5, 6):
+            begins = first_yield(elastic_model(), bool(strain), Elastic(*rows[of, 1:5].T), rows[of, body])
+            rows[of, body] = np.where(ELASTIC_BELOW * begins < NODES[-1], rows[of, body], np.inf)
+    sides = np.array(["" if np.isinf(row[5:]).all() else sides_of(row)[0] for row in rows])
+    tables: dict[str, Array] = {}
+    for side in np.unique(sides):
+        of = sides == side
+        found = reduce_joints(side, Elastic(*rows[of, 1:5].T), Yielding(*rows[of, 5:].T) if side else None)
+        for name, value in vars(found).items():
+            if np.ndim(value) == 2:
+                tables.setdefault(name, np.empty((len(rows), value.shape[1])))[of] = value
+    return JointCurve(NODES, **tables)
 
 
 def outside(joint: LawJoint) -> str:

@@ -17,6 +17,8 @@ from archord.postprocess.laws.general.general_law import (
     RATIOS,
     SMALLEST_S,
     general_law,
+    joint_numbers,
+    law_of_numbers,
     outside,
 )
 from archord.postprocess.laws.general.joint import LawJoint
@@ -128,6 +130,16 @@ def test_units_do_not_matter(pin: LawJoint, length: float, stress: float) -> Non
     mine, theirs = general_law(pin).at(x, x[120]), general_law(replace(pin, **scaled)).at(x * length, x[120] * length)
     np.testing.assert_allclose(theirs.load, mine.load * stress * length, rtol=1e-6, atol=1e-12 * stress * length)
     np.testing.assert_allclose(theirs.angle, mine.angle, rtol=1e-6)
+
+
+def test_many_joints_at_once_are_each_alone() -> None:
+    """Laws of joints of all kinds in one call, evaluated at once, are those of each."""
+    kinds = ("none", "both", "pin", "block", "pin weaker", "block weaker")
+    pins = [joint(plane, 2.0, (0.2, 0.4), 0.004, 0.4, kind, 1.6) for plane in SMALLEST_S for kind in kinds]
+    many = law_of_numbers([joint_numbers(pin) for pin in pins]).at(X, 1.5)
+    for row, pin in enumerate(pins):
+        alone = general_law(pin).at(X * 0.004, 1.5 * 0.004)
+        np.testing.assert_allclose(many.load[row] * pin.unit, alone.load, rtol=1e-9, atol=1e-12)
 
 
 def test_both_planes_are_one_elastic_law() -> None:
