@@ -117,9 +117,8 @@ def table_of(found: list[Off]) -> Table:
             name: np.concatenate([one.errors.get(name, np.zeros(0)) for one in kinds[kind]])
             for name in (*names, "back inside")
         }
-        cells = [
-            f"{np.sqrt(np.mean(v**2)):.2f}/{np.abs(v).max():.1f}" if len(v) else "-" for v in map(values.get, names)
-        ]
+        shown = [values[name] for name in names]
+        cells = [f"{np.sqrt(np.mean(v**2)):.2f}/{np.abs(v).max():.1f}" if len(v) else "-" for v in shown]
         inside = np.concatenate([one.inside for one in kinds[kind]]), values["back inside"]
         cells += [f"{share.mean():.0%}" if len(share) else "-" for share in inside]
         table.add(kind, len(kinds[kind]), *cells)

@@ -169,7 +169,8 @@ def _opening(x: Array, y: Array, off: Array) -> float:
 
 def _meeting(curve: _Cubic, u: Array, y: Array) -> Array:
     """The ratio r, ``r B(u/r) = y``, which falls with r as B is convex: bisection of its logarithm."""
-    low, high = np.full(len(u), -_LARGEST), np.full(len(u), _LARGEST)
+    low: Array = np.full(len(u), -_LARGEST)
+    high: Array = -low
     for _ in range(_BISECTIONS):
         r = np.exp((low + high) / 2)
         stiff = r * curve.at(u / r)[0] > y

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +37,8 @@ def general_law(joint: LawJoint) -> JointCurve:
     title = f"a pin joint in plane {joint.plane}, by archord's law of solved joints"
     about = {"title": title, "archord": VERSION, "joint": {name: value for name, value in vars(joint).items() if value},
              "outside": outside(joint) or "nothing: inside the range of solved joints"}  # fmt: skip
-    return replace(found, **tables, **units, about=about)
+    changes: dict[str, Any] = {**tables, **units, "about": about}
+    return replace(found, **changes)
 
 
 def law_of_numbers(numbers: npt.ArrayLike) -> JointCurve:
@@ -49,7 +51,7 @@ def law_of_numbers(numbers: npt.ArrayLike) -> JointCurve:
             begins = first_yield(elastic_model(), bool(strain), Elastic(*rows[of, 1:5].T), rows[of, body])
             rows[of, body] = np.where(ELASTIC_BELOW * begins < NODES[-1], rows[of, body], np.inf)
     sides = np.array(["" if np.isinf(row[5:]).all() else sides_of(row)[0] for row in rows])
-    tables: dict[str, Array] = {}
+    tables: dict[str, Any] = {}
     for side in np.unique(sides):
         of = sides == side
         found = reduce_joints(side, Elastic(*rows[of, 1:5].T), Yielding(*rows[of, 5:].T) if side else None)
@@ -112,15 +114,17 @@ def reduce_joints(side: str, joints: Elastic, yielding: Yielding | None = None) 
         error = np.hypot(error, lost.deviation)
         travel = np.clip(lost.travel * x * y / base.y, 1e-3 * x, x)
         travel = x - np.maximum.accumulate(x - travel, axis=1)
-        ratio = _from_zero(np.stack([_ratio(x, *row) for row in zip(base.y, base.slope, y, travel, strict=True)]), 1.0)
+        rows = zip(base.y, base.slope, y, travel, strict=True)
+        ratio = _from_zero(np.stack([_ratio(x, *map(np.asarray, row)) for row in rows]), 1.0)
         back_error = _from_zero(lost.travel_deviation)
     root = np.sqrt(y)
     F0 = elastic_model().F.at(joints, np.zeros(1))[0][:, 0]
     rise, end = base.F[:, 0] - F0, base.F_slope[:, 0]
     touch = np.stack([F0, 2 * rise / x[0] - end, end / x[0] - rise / x[0] ** 2], axis=1)
-    tables = [values for f in (ratio, *(_first_again(g / root) for g in (peak, angle))) for values in (f, _slopes(f))]
-    return JointCurve(NODES, _from_zero(y), _from_zero(dy), back, dback, *tables[:2], touch, *tables[2:],
-                      _first_again(error), back_error)  # fmt: skip
+    tables: dict[str, Any] = {"y": _from_zero(y), "dy": _from_zero(dy), "back": back, "dback": dback, "touch": touch}
+    for name, values in (("ratio", ratio), ("peak", _first_again(peak / root)), ("angle", _first_again(angle / root))):
+        tables |= {name: values, f"d{name}": _slopes(values)}
+    return JointCurve(NODES, **tables, error=_first_again(error), back_error=back_error)
 
 
 def _from_zero(values: Array, first: float = 0.0) -> Array:

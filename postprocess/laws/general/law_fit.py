@@ -155,7 +155,8 @@ def yielding_joints(
 ) -> SolvedJoints:
     """The joints that yield relative to ``model``, with those digits that yield_model.npz keeps; of side `PIN_WEAKER`
     beside what the process of ``pins`` tells."""
-    rows, back = [], []
+    rows: list[tuple[Any, ...]] = []
+    back: list[tuple[float, ...]] = []
     for numbers, runs in solved.items():
         joint, yielding = Elastic(*np.array(numbers[1:5])[:, None]), Yielding(*np.array(numbers[5:])[:, None])
         nodes, dense = first_loading(runs), model.at(joint, _FINE)
@@ -171,8 +172,9 @@ def yielding_joints(
             count, curves = _at_multiples(nodes[:, 0] / x0, lost)
             back += [(len(rows), deepest / x0, way) for deepest, way in ways]
             rows.append((SIDES.index(side), numbers, x0, count, curves))
-    side, numbers, x0, count, curves = (np.array(column) for column in zip(*rows, strict=True))
-    return SolvedJoints(side, numbers, x0, count, *np.moveaxis(curves, 1, 0), np.array(back)).stored()
+    index, given, onsets, counts, losses = (np.array(column) for column in zip(*rows, strict=True))
+    force, peak, angle = np.moveaxis(losses, 1, 0)
+    return SolvedJoints(index, given, onsets, counts, force, peak, angle, np.array(back)).stored()
 
 
 def _at_multiples(u: Array, lost: Array) -> tuple[int, Array]:
@@ -256,7 +258,8 @@ def main(folder: Path) -> None:
     model, joints, kernels = fit_law({numbers: runs for numbers, runs in solved.items() if complete(numbers, runs)})
     TABLE.write_text(model.to_json(), encoding="utf-8")
     KERNELS.write_text(json.dumps(kernels, indent=1) + "\n", encoding="utf-8")
-    np.savez_compressed(DATA, **joints.compact())
+    arrays: dict[str, Any] = joints.compact()
+    np.savez_compressed(DATA, **arrays)
     print(error_table(joints, kernels).markdown())
 
 
