@@ -84,19 +84,20 @@ def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
     scale = y[0] / float(law.at([[x[0]]]).load[0, 0])  # the way back is judged by itself: from the same largest P
     load = said.load[0] * scale
     closed = y > 0
-    opens = float(np.interp(0.0, y[closed][::-1], x[closed][::-1]))
-    if (~closed).any():
-        curve = PchipInterpolator(y[closed][::-1], x[closed][::-1], extrapolate=True)
-        opens = max(float(curve(0.0)), float(x[~closed].max()))
+    bracket = (
+        max([0.0, *x[~closed]]),
+        float(x[closed].min()),
+    )  # it opens between the last point open and the first closed
+    opens = sum(bracket) / 2
     fine = np.linspace(0.0, x[0], 400)
     loading = np.vstack([[0.0, 0.0], run.nodes[: run.loading, :2]])
     work = float(trapezoid(PchipInterpolator(*loading.T)(fine), fine))
     solved = np.interp(fine, np.append(opens, x[closed][::-1]), np.append(0.0, y[closed][::-1]))
     returned = [float(trapezoid(values, fine)) for values in (solved, law.at(fine[None], x[0]).load[0] * scale)]
-    off = 100 * (load - y)[1:] / y[0]
+    off, z = 100 * (load - y)[1:] / y[0], float(law.residual([[x[0]]])[0, 0])
     return {
         "back": np.array([np.sqrt(np.mean(off**2))]),
-        "residual": np.array([100 * (float(law.residual([[x[0]]])[0, 0]) - opens)]),
+        "residual": np.array([100 * (z - np.clip(z, *bracket))]),
         "energy": np.array([100 * (returned[0] - returned[1]) / work]),
         "back inside": np.array([float((np.abs(off) <= 100 * said.error[0, 1:] / y[0] + 0.05).mean() >= 0.9)]),
     }
@@ -132,7 +133,8 @@ def other_laws(solved: dict[tuple[float, ...], list[NodeRun]]) -> Table:
     for numbers, runs in solved.items():
         x, y = first_loading(runs)[:, :2].T
         usual = (x > 0.099) & (x <= 2.001)
-        data.append((numbers, x[usual], y[usual]))
+        if usual.sum() > 3:
+            data.append((numbers, x[usual], y[usual]))
 
     def squares(k: float) -> float:
         return sum(float(((_paper(numbers, x, k) / y - 1) ** 2).sum()) for numbers, x, y in data)

@@ -45,7 +45,7 @@ FRESH = {kind: number for kind, number in JOINTS.items() if "soft" not in kind} 
 }
 ELASTIC = [0.01, 0.02, 0.035, 0.06, 0.1, 0.16, 0.25, 0.38, 0.55, 0.8, 1.1, 1.5, 2.0, 2.5, 3.05]  # x of elastic joints
 _BEYOND = 0.03  # of the range, by which the joints to fit to exceed it
-_WAY = np.array([0.12, 0.25, 0.42, 0.62, 0.85, 1.1])  # of the way back
+_WAY = np.array([0.15, 0.4, 0.62, 0.78, 0.9, 1.0, 1.1, 1.22])  # of the way back
 _SOFTENING = {"strain": 0.45, "strain pin": 0.1, "stress": 0.72}  # -d(ln P/P_el)/d(ln x) beyond yield, about
 _CYCLES = 0.25  # share of joints that come back from a smaller displacement, too
 _BASE = {

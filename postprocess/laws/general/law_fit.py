@@ -119,9 +119,11 @@ class NodeRun:
 
 
 def solved_joints(curves: Iterable[RunCurve]) -> dict[tuple[float, ...], list[NodeRun]]:
-    """The runs by the numbers of their joints, as `joint_numbers` has them."""
+    """The runs that are complete by the numbers of their joints, as `joint_numbers` has them."""
     found = defaultdict(list)
     for curve in curves:
+        if len(curve.delta) < sum(curve.scene.load.stage_steps):
+            continue
         numbers = joint_numbers(LawJoint.from_scene(curve.scene))
         found[tuple(float(f"{value:.6g}") for value in numbers)].append(NodeRun.of(curve))
     return dict(found)
