@@ -68,6 +68,7 @@ class NewtonSolver:
         snes.setType("newtonls")
         snes.setFunction(self._guarded(self._residual), self._x.duplicate())
         snes.setConvergenceTest(self._test)
+        snes.setTolerances(stol=0.0)  # else a line search that ends in a short step counts as convergence
         snes.setFromOptions()
         return snes
 

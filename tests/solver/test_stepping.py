@@ -58,3 +58,9 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
 def test_one_large_step_finds_the_plastic_state():
     """Elastic first touch, then the plastic state at 2 dR at once: the force of 20 steps within 0.5 %."""
     assert pytest.approx(0.00669, rel=5e-3) == solve(scene(0.08, 1, yield_stress=0.002)).steps[-1].P
+
+
+def test_a_short_step_is_no_equilibrium():
+    """PETSc's criterion of short steps, by which a line search that fails far from equilibrium converges, is off."""
+    solvers = solve(scene(0.1, 1)).joint.solver.newton._solvers
+    assert [snes.getTolerances()[2] for snes in solvers.values()] == [0.0] * len(solvers)
