@@ -110,10 +110,13 @@ def law(
     joint, units, thickness = _joint(scene, overrides, given)
     chosen = chosen or [default_law(joint)]
     if exports or deepest:
+        option = "--export" if exports else "--deepest"
         if [entry.name for entry in chosen] != ["archord"]:
-            raise InputError(
-                f"{'--export' if exports else '--deepest'}: is for the law archord, which needs plane and nu."
-            )
+            raise InputError(f"{option}: is for the law archord alone, which needs plane and nu.")
+        if by_load or (exports and (deepest or plot)):
+            raise InputError(f"{option}: does not go with {'--by-load' if by_load else '--deepest or --plot'}.")
+        if not 0 <= deepest <= chosen[0].limit(joint) / joint.clearance:
+            raise InputError(f"--deepest {deepest:g}: must be from 0 to 3 clearances, the range of the law.")
         if exports:
             return _export(joint, units, thickness, exports, files_read(scene, overrides) if scene else [], force)
     by_load = by_load or not all(entry.gives_displacement for entry in chosen)
@@ -144,14 +147,18 @@ def _export(
     joint: LawJoint, units: dict[str, str], thickness: float, exports: tuple[Path, ...], inputs: list[Path], force: bool
 ) -> int:
     from archord.postprocess.laws.exports.export import export_curve
-    from archord.postprocess.laws.general.general_law import general_law, outside
+    from archord.postprocess.laws.general.general_law import general_law
+    from archord.postprocess.laws.law import LawRangeWarning
+    from archord.postprocess.laws.laws import LAWS
 
-    if reason := outside(joint):
-        raise InputError(f"archord: {reason}.")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", LawRangeWarning)
+        LAWS["archord"].check(joint)
     law = general_law(joint)
     about = law.about | {"units": {name: units[name] for name in ("length", "force", "stress") if name in units}}
     law = dataclasses.replace(law, force=law.force * thickness, about=about)
     print(*_write([(file, export_curve(law, file)) for file in exports], inputs, force), sep="\n")
+    _warn(*(str(warning.message) for warning in caught))
     return 0
 
 

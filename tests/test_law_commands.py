@@ -182,3 +182,31 @@ def test_laws_fit_the_terminal(monkeypatch, capsys, columns, width):
     assert run(["laws"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert width - 10 < max(map(len, lines)) <= width
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--set", "joint.model=ring", "--set", "load.displacement=none", "--set", "load.relative_force=0.001",
+          "--export", "joint.py"], "ring"),
+        (["--set", "joint.relative_clearance=0.1", "--export", "joint.py"], "dR/R = 0.1 is outside"),
+        (["--deepest", "5"], "must be from 0 to 3 clearances"),
+        (["--deepest", "1", "--by-load"], "does not go with --by-load"),
+        (["--deepest", "1", "--export", "joint.py"], "does not go with --deepest"),
+        (["paper", "--deepest", "1"], "is for the law archord alone"),
+    ],
+)  # fmt: skip
+def test_what_the_law_of_solved_joints_cannot_say_is_refused(options, said, tmp_path, monkeypatch, capsys):
+    """Exit code 2, one sentence, and no file."""
+    monkeypatch.chdir(tmp_path)
+    assert run(["law", *options, "--scene", SCENE]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_export_of_a_small_block_warns(tmp_path, capsys):
+    """The law is of a wide block: the export is written, and the size of the error said."""
+    target = tmp_path / "joint.py"
+    assert run(["law", "--scene", SCENE, "--set", "joint.block_size=100", "--export", str(target)]) == 0
+    assert "the joint is softer" in capsys.readouterr().err
+    assert target.exists()

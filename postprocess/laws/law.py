@@ -78,14 +78,14 @@ class Law:
 
     def at_displacement(self, joint: LawJoint, delta: npt.ArrayLike, extrapolate: bool = False) -> LawState:
         """All quantities at displacements ``delta``."""
-        self._check(joint)
+        self.check(joint)
         if not self.gives_displacement:
             raise ValueError(f"{self.name}: this law gives no displacement, only pressure and angle of a load.")
         return self._known(joint, self._inside(joint, delta, self.limit(joint), "delta", extrapolate))
 
     def at_load(self, joint: LawJoint, load: npt.ArrayLike, extrapolate: bool = False) -> LawState:
         """All quantities at loads ``load``; displacement and stiffness are nan for a law without."""
-        self._check(joint)
+        self.check(joint)
         limit = self.limit(joint)
         if not self.gives_displacement:
             return self._known(joint, self._inside(joint, load, limit, "P", extrapolate))
@@ -113,7 +113,7 @@ class Law:
         warnings.warn(LawRangeWarning(f"{self.name}: {reason} (range: {self.range})"), stacklevel=4)
         return np.where(valid, x, np.nan)
 
-    def _check(self, joint: LawJoint) -> None:
+    def check(self, joint: LawJoint) -> None:
         """Refuse a joint that lacks what the law needs, or whose P(delta) is another one; warn where it is softer or
         stiffer."""
         for name in self.needs:

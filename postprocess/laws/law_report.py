@@ -27,7 +27,7 @@ def sample(
         return law.at_load(joint, load, extrapolate)._replace(load=load)
     state = law.at_displacement(joint, steps, extrapolate)._replace(delta=steps)
     if deepest:
-        found = general_law(joint).at(steps, deepest * joint.clearance)
+        found = general_law(joint, extrapolate=True).at(steps, deepest * joint.clearance)
         quantities = found.load, found.stiffness, found.peak_pressure, found.angle, found.error
         state = LawState(steps, *(np.where(np.isnan(state.load), np.nan, values) for values in quantities))
     return state

@@ -23,7 +23,7 @@ _DEEPEST = 2.0  # displacement over clearance up to which Hu et al. compare thei
 
 
 def _archord(joint: LawJoint, delta: Array) -> LawState:
-    found = general.general_law(joint).at(delta)
+    found = general.general_law(joint, extrapolate=True).at(delta)
     return LawState(delta, found.load, found.stiffness, found.peak_pressure, found.angle, found.error)
 
 

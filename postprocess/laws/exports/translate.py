@@ -91,7 +91,7 @@ class Language:
                 return ["break;"]
             case ast.Expr(value=ast.Call(args=[delta])):
                 return [self.warning.format(self.expression(delta))] if self.warning else []
-        raise NotImplementedError(ast.unparse(node))
+        raise TypeError(f"algorithm.py: other languages have no words for {ast.unparse(node)}")
 
 
 class _Words(ast.NodeTransformer):

@@ -26,17 +26,20 @@ _STEEPEST = 0.999  # secant of the way back over the elastic joint's steepest sl
 
 
 @lru_cache(maxsize=64)
-def general_law(joint: LawJoint) -> JointCurve:
-    """The law of ``joint`` in its units, forces per unit length along its axis, also outside the range: see `outside`.
-    Raises ValueError for a joint that does not tell plane and nu."""
+def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
+    """The law of ``joint`` in its units, forces per unit length along its axis. Raises ValueError for a joint that does
+    not tell plane and nu, or is a ring, and without ``extrapolate`` for one `outside` the range."""
     if joint.plane is None or joint.nu is None:
         raise ValueError(f"archord: this law needs {'plane' if joint.plane is None else 'nu'}.")
+    reason = "this is a ring, and the law is of a pin in a block" if joint.ring else outside(joint)
+    if reason and not extrapolate:
+        raise ValueError(f"archord: {reason}.")
     found = law_of_numbers(joint_numbers(joint))
     tables = {name: value[0] for name, value in vars(found).items() if np.ndim(value) == 2}
     units = {"length": joint.clearance, "force": joint.unit, "pressure": joint.unit / joint.radius}
     title = f"a pin joint in plane {joint.plane}, by archord's law of solved joints"
     about = {"title": title, "archord": VERSION, "joint": {name: value for name, value in vars(joint).items() if value},
-             "outside": outside(joint) or "nothing: inside the range of solved joints"}  # fmt: skip
+             "outside": reason or "nothing: inside the range of solved joints"}  # fmt: skip
     changes: dict[str, Any] = {**tables, **units, "about": about}
     return replace(found, **changes)
 
@@ -69,7 +72,7 @@ def outside(joint: LawJoint) -> str:
     stiffest = math.inf if joint.pin_yield is None else RATIOS[1]
     checks = [("nu of the pin", pin_nu, *NU), ("nu of the block", nu, *NU), ("dR/R", clearance, *CLEARANCES),
               ("E(pin)/E(block)", stiffness, RATIOS[0], stiffest),
-              ("sigY R/(E* dR)", min(stresses), SMALLEST_S[joint.plane or "strain"], math.inf)]  # fmt: skip
+              ("sigY R/(E* dR)", min(stresses), SMALLEST_S["strain" if strain else "stress"], math.inf)]  # fmt: skip
     if joint.hardens:
         return "a body hardens, and the law is of perfect plasticity; archord fit RUN --table makes that of one joint"
     for name, value, low, high in checks:
