@@ -49,6 +49,7 @@ from archord.postprocess.laws.general.yield_model import (
     first_yield,
     side_model,
     sides_of,
+    stored_joints,
     total_loss,
 )
 from archord.postprocess.run import Run
@@ -253,16 +254,18 @@ def error_table(joints: SolvedJoints, kernels: dict[str, Any]) -> Table:
     return table
 
 
-def main(folder: Path) -> None:
-    """Fit the law to the sweep in ``folder``, and write its files beside this one."""
-    finished = (run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists())
-    solved = solved_joints(Run(run).curve for run in finished)
-    model, joints, kernels = fit_law({numbers: runs for numbers, runs in solved.items() if complete(numbers, runs)})
-    TABLE.write_text(model.to_json(), encoding="utf-8")
-    KERNELS.write_text(json.dumps(kernels, indent=1) + "\n", encoding="utf-8")
-    arrays: dict[str, Any] = joints.compact()
-    np.savez_compressed(DATA, **arrays)
-    print(error_table(joints, kernels).markdown())
+def main(folder: Path | None) -> None:
+    """Fit the law to the sweep in ``folder``, if one is given, and write its files beside this one; print how good it
+    is."""
+    if folder:
+        finished = (run for run in sorted((folder / "cases").iterdir()) if (run / "run.json").exists())
+        solved = solved_joints(Run(run).curve for run in finished)
+        model, joints, kernels = fit_law({numbers: runs for numbers, runs in solved.items() if complete(numbers, runs)})
+        TABLE.write_text(model.to_json(), encoding="utf-8")
+        KERNELS.write_text(json.dumps(kernels, indent=1) + "\n", encoding="utf-8")
+        arrays: dict[str, Any] = joints.compact()
+        np.savez_compressed(DATA, **arrays)
+    print(error_table(stored_joints(), json.loads(KERNELS.read_text(encoding="utf-8"))).markdown())
 
 
 def complete(numbers: tuple[float, ...], runs: list[NodeRun]) -> bool:
@@ -272,4 +275,4 @@ def complete(numbers: tuple[float, ...], runs: list[NodeRun]) -> bool:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else None)

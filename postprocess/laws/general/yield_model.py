@@ -244,9 +244,13 @@ def side_model(solved: SolvedJoints, side: str, told: Mapping[str, Any]) -> Yiel
     return YieldModel(side, **solved.of(side), kernels=kernels, spread=told["spread"])
 
 
+def stored_joints() -> SolvedJoints:
+    """The solved joints that come with archord."""
+    with np.load(DATA) as data:
+        return SolvedJoints(**_numbers(data))
+
+
 @cache
 def yield_model(side: str) -> YieldModel:
     """The model of one of `SIDES` that comes with archord."""
-    with np.load(DATA) as data:
-        solved = SolvedJoints(**_numbers(data))
-    return side_model(solved, side, json.loads(KERNELS.read_text(encoding="utf-8"))[side])
+    return side_model(stored_joints(), side, json.loads(KERNELS.read_text(encoding="utf-8"))[side])
