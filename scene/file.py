@@ -22,7 +22,7 @@ ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
     "load": [(*LOADS, "pressure", "path")],
 }
 _BROUGHT = {"material": ("E", "nu", "yield_stress", "hardening")}
-_LARGEST_FILE = 4 * 10**6  # bytes
+_LARGEST_FILE = 10**6  # bytes
 _DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}")

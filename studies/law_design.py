@@ -50,9 +50,10 @@ _SOFTENING = {"strain": 0.45, "strain pin": 0.1, "stress": 0.72}  # -d(ln P/P_el
 _CYCLES = 0.25  # share of joints that come back from a smaller displacement, too
 _BASE = {
     "units": {"length": "R", "stress": "E*"},
-    "joint": {"radius": 1.0, "relative_clearance": 0.005, "relative_element_size": 0.05},
+    "analysis": {"plane": "strain"},
+    "joint": {"radius": 1.0, "clearance": 0.005, "relative_element_size": 0.05},
     "block": {"E": 2.0, "nu": 0.3},
-    "load": {"displacement": 2.0, "steps": 20},
+    "load": {"displacement": 2.0, "steps": 1},
     "output": {"fields": False},
 }
 
@@ -72,9 +73,8 @@ def joints(kind: str, number: int, seed: int, beyond: float = 0.0) -> Iterator[t
         if yields in ("block", "elastic") and not more:  # a tenth of the pins are rigid, others nearly
             p *= float(np.clip((0.9 - u[2]) / 0.03, 0.0, 1.0))
         clearance = _between(CLEARANCES[0] / wide, CLEARANCES[1] * wide, u[3])
-        own: Row = {
-            "analysis.plane": plane,
-            "joint.relative_clearance": clearance,
+        own: Row = ({} if strain else {"analysis.plane": plane}) | {
+            "joint.clearance": clearance,
             "block.E": ends[1] / (1 - p),
             "block.nu": nu[1],
         }
@@ -113,7 +113,7 @@ def training() -> Iterator[Row]:
     for seed, (kind, number) in enumerate(JOINTS.items(), 100):
         for own, (first, x0), (_, chance) in joints(kind, number, seed, _BEYOND):
             if np.isinf(x0):
-                yield own | {"load.displacement": ELASTIC, "load.steps": 1, "joint.relative_element_size": 0.03}
+                yield own | {"load.displacement": ELASTIC, "joint.relative_element_size": 0.03}
                 continue
             x = x0 * MULTIPLES[: int(np.searchsorted(x0 * MULTIPLES, 3.0)) + 1]
             before = 0.95 * first * 1.25 ** np.arange(30)
@@ -128,7 +128,7 @@ def fresh(number: int, seed: int) -> Iterator[Row]:
         for own, (x0, last), (odd, chance) in joints(kind, share, 1000 * seed + offset):
             early = [0.02, 0.05, 0.1]
             if np.isinf(x0):
-                yield own | {"load.displacement": [*early, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0], "load.steps": 1}
+                yield own | {"load.displacement": [*early, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0]}
                 continue
             x = x0 * (0.9 + 0.2 * odd) * 1.16 ** np.arange(30)
             x = np.array([*(e for e in early if e < 0.8 * x0), *x[x < 2.9], 3.0])
@@ -144,19 +144,17 @@ def _yielding(own: Row, kind: str, x0: float, x: Array, chance: float) -> Iterat
         elastic_way = deepest * min(1.0, max(deepest / x0, 1.0) ** -softening)
         return [t for t in deepest - elastic_way * _WAY if t > 0.01]
 
-    yield own | {"load.displacement": [*x, *back(x[-1])], "load.steps": 1}
+    yield own | {"load.displacement": [*x, *back(x[-1])]}
     strength = (
-        min(own.get(f"{body}.yield_stress", np.inf) for body in ("pin", "block")) / own["joint.relative_clearance"]
+        min(own.get(f"{body}.yield_stress", np.inf) for body in ("pin", "block")) / own["joint.clearance"]
     )
     if strength < EARLY:
         yield own | {"load.displacement": [*x], "load.steps": 2}
     if chance < 1 and len(x) > 3:
         i = 2 + int(chance * (len(x) - 3))
         way = back(x[i])
-        yield own | {
-            "load.displacement": [*x[: i + 1], *way, (way[min(2, len(way) - 1)] + x[i]) / 2, *x[i : i + 2]],
-            "load.steps": 1,
-        }
+        again = (way[min(2, len(way) - 1)] + x[i]) / 2
+        yield own | {"load.displacement": [*x[: i + 1], *way, again, *x[i : i + 2]]}
 
 
 def sweep_file(rows: Iterable[Row]) -> str:
@@ -165,10 +163,10 @@ def sweep_file(rows: Iterable[Row]) -> str:
     def short(value: Any) -> Any:
         if isinstance(value, list | tuple):
             return [float(f"{v:.4g}") for v in value]
-        return float(f"{value:.6g}") if isinstance(value, float) else value
+        return float(f"{value:.5g}") if isinstance(value, float) else value
 
-    lines = (", ".join(f"{key} = {toml_value(short(value))}" for key, value in row.items()) for row in rows)
-    return "list = [\n" + "".join(f"    {{ {line} }},\n" for line in lines) + "]\n\n" + tomli_w.dumps({"base": _BASE})
+    lines = (",".join(f"{key}={toml_value(short(value)).replace(' ', '')}" for key, value in row.items()) for row in rows)
+    return "list = [\n" + "".join(f"{{{line}}},\n" for line in lines) + "]\n\n" + tomli_w.dumps({"base": _BASE})
 
 
 def main() -> None:
