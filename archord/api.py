@@ -14,7 +14,7 @@ from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.scene import file as scene_file
 from archord.scene.errors import InputError
-from archord.scene.file import AnyScene
+from archord.scene.file import ABSENT, AnyScene
 from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
 from archord.scene.problem import GIVEN, LIVE, ProblemScene
@@ -32,8 +32,9 @@ def load(folder: str | Path) -> Any:
 
 
 def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> AnyScene:
-    """Read a scene file with ``changes`` like ``{"joint.clearance": 0.01}`` (None drops a key). Raises `InputError`."""
-    given = ((key, "" if value is None else toml_value(plain(value))) for key, value in (changes or {}).items())
+    """Read a scene file with ``changes`` like ``{"joint.clearance": 0.01}``; None or "none" drops a key. Raises
+    `InputError`."""
+    given = ((key, ABSENT if value is None else toml_value(plain(value))) for key, value in (changes or {}).items())
     return scene_file.load_scene(path, [f"{key}={value}" for key, value in given])
 
 

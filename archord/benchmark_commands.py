@@ -9,7 +9,7 @@ from time import perf_counter
 
 import click
 
-from archord.options import argument, output, quiet
+from archord.options import Group, argument, output, quiet
 from archord.scene.errors import InputError
 
 Say = Callable[[str], None]
@@ -65,7 +65,7 @@ def reproduce(figures: tuple[str, ...], output: Path, quiet: bool) -> int:
     return 0
 
 
-@click.group()
+@click.group(cls=Group)
 def benchmark() -> None:
     """Benchmarks of the solver."""
 

@@ -15,6 +15,7 @@ from time import perf_counter
 import click
 
 import archord
+from archord.options import Group
 from archord.ranks import COLLECTIVE, launcher_rank, run_on_ranks
 from archord.scene.errors import InputError
 
@@ -28,7 +29,7 @@ FILES = {
 COMMANDS = {command: file for file, commands in FILES.items() for command in commands}
 
 
-class _Commands(click.Group):
+class _Commands(Group):
     """The commands of `COMMANDS`, whose files are imported when they are asked for."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,16 @@ import click
 
 Decorator = Callable[[Any], Any]
 PATH = click.Path(path_type=Path)
+
+
+class Group(click.Group):
+    """Commands; of a name that is none of them the message says which may be meant."""
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        if self.get_command(ctx, args[0]) is None and args[0][:1] != "-":
+            near = difflib.get_close_matches(args[0], self.list_commands(ctx), 1)
+            ctx.fail(" ".join([f"No such command {args[0]!r}.", *(f"Did you mean {name}?" for name in near)]))
+        return super().resolve_command(ctx, args)
 
 
 class _Argument(click.Argument):
@@ -50,7 +61,7 @@ def quiet(but: str = "errors") -> Decorator:
 
 def overrides(of: str = "scene") -> Decorator:
     """The option ``--set``."""
-    help = f"override a key of the {of}; may be repeated"
+    help = f"override a key of the {of}, or drop it: =none; may be repeated"
     return click.option("--set", "overrides", metavar="SECTION.KEY=VALUE", multiple=True, help=help)
 
 

@@ -39,11 +39,13 @@ def solve(
 
     With --restart and --extend, the run folder may stand in the place of the scene.
     """
+    from archord.output.folder import refuse_folder
     from archord.scene.file import load_scene
 
     if restart + extend + force > 1:
         raise click.UsageError("choose one of --force, --restart and --extend")
     if not (restart or extend):
+        refuse_folder(scene)
         folder = output or Path("runs") / scene.stem
         return _solve(lambda: load_scene(scene, overrides), folder, begun, quiet, force=force)
     if output is not None and scene.is_dir():

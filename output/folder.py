@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from archord.output.disk import new_name
 from archord.scene.errors import InputError
@@ -15,6 +17,11 @@ FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", 
 APART = "fields"  # the folder of the files that fields.h5 has links to
 CHECKPOINT = "checkpoint.h5"
 PICTURE = "picture.png"  # drawn later, from the others
+_UNFINISHED = {
+    "running": "did not end, unless archord works there still",
+    "interrupted": "was interrupted",
+    "stopped": "could not go on",
+}
 
 
 def clear(folder: Path) -> None:
@@ -55,7 +62,29 @@ def claim_folder(folder: Path, force: bool) -> None:
         raise InputError(f"{folder}: cannot be used for results: {fault}.")
     if not (empty or force):
         said = "is not empty; choose another folder with -o, or overwrite a run in it with --force"
+        if (status := report_of(folder).get("status")) in _UNFINISHED:
+            said = f"holds a run that {_UNFINISHED[status]}; continue it with --restart, or overwrite it with --force"
         raise InputError(f"{folder}: {said}.")
+
+
+def refuse_folder(scene: Path) -> None:
+    """Raise `InputError` if ``scene`` is a folder, with what can be done with it instead of solving it."""
+    if not scene.is_dir():
+        return
+    said = "is no scene but a folder, and no run is in it"
+    if is_sweep(scene):
+        said = f"is a sweep; archord sweep {scene} solves what it lacks"
+    elif (scene / "scene.toml").is_file():
+        said = f"is a run; --restart or --extend continues it, and its scene is {scene / 'scene.toml'}"
+    raise InputError(f"{scene}: {said}.")
+
+
+def report_of(folder: Path) -> dict[str, Any]:
+    """The run.json in ``folder``; empty if there is none that can be read."""
+    with suppress(OSError, ValueError):
+        if isinstance(report := json.loads((folder / "run.json").read_text(encoding="utf-8")), dict):
+            return report
+    return {}
 
 
 def is_sweep(folder: str | Path) -> bool:

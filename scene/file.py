@@ -21,6 +21,7 @@ ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
     "joint": [("clearance", "relative_clearance"), ("element_size", "relative_element_size")],
     "load": [(*LOADS, "pressure", "path")],
 }
+ABSENT = "none"  # the value that drops a key, so that its default holds
 _BROUGHT = {"material": ("E", "nu", "yield_stress", "hardening")}
 _LARGEST_FILE = 10**6  # bytes
 _DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
@@ -55,7 +56,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
     if "base" in data and "joint" not in data:
         raise InputError(f"{path}: is a sweep, not a scene; archord sweep solves it.")
     _give_way(data, overrides)
-    origin = {override_key(data, o): f"--set {o}" for o in in_order(overrides)}
+    origin = {override_key(data, o): f"--set {o}" for o in in_order(overrides, "--set ")}
     read_targets(data, Path(path))
     find_mesh(data.get("mesh"), Path(path).parent)
     return parse_any(data, str(path), origin)
@@ -67,12 +68,25 @@ def find_mesh(mesh: Any, folder: Path) -> None:
         mesh["file"] = str((folder / mesh["file"]).absolute())
 
 
-def in_order(overrides: Iterable[str]) -> list[str]:
+def in_order(overrides: Iterable[str], by: str = "") -> list[str]:
     """The last of ``overrides`` of each key: those that drop it come first, then a rigid pin and materials, so that
-    what they drop is what the file says, not another override."""
+    what they drop is what the file says, not another override. Raises `InputError`, which begins with ``by``, for two
+    keys that are alternatives, as two loads are."""
     last = {override.partition("=")[0].strip(): override for override in overrides}
+    given: dict[tuple[str, ...], str] = {}
+    for key, override in last.items():
+        part, _, name = key.rpartition(".")
+        for names in ALTERNATIVES.get(part.partition(".")[0], []):
+            if name in names and not _drops(override) and given.setdefault((part, *names), override) != override:
+                said = f"does not go with {given[part, *names]}; give one of them"
+                raise InputError(f"{by}{override}: {said}.")
     brought = sorted(last, key=lambda key: not key.endswith((".rigid", ".material")))
-    return sorted((last[key] for key in brought), key=lambda override: not override.rstrip().endswith("="))
+    return sorted((last[key] for key in brought), key=lambda override: not _drops(override))
+
+
+def _drops(override: str) -> bool:
+    """Whether a ``key=value`` drops its key."""
+    return override.partition("=")[2].strip().strip("\"'") == ABSENT
 
 
 def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
@@ -87,7 +101,7 @@ def files_read(path: Path, overrides: Sequence[str] = ()) -> list[Path]:
 
 def _give_way(data: dict[str, Any], overrides: Sequence[str]) -> None:
     """Drop from the file's ``data`` a mesh and steps if an accuracy is given instead, and the other way round."""
-    given = {key.strip() for key, _, value in (o.partition("=") for o in overrides) if value.strip()}
+    given = {override.partition("=")[0].strip() for override in overrides if not _drops(override)}
     dropped = CHOSEN if "analysis.accuracy" in given else ["analysis.accuracy"] if given & {*CHOSEN} else []
     for section, name in (key.split(".") for key in dropped):
         if isinstance(data.get(section), dict):
@@ -145,10 +159,12 @@ def _parsed(text: str) -> dict[str, Any]:
 
 def override_key(data: dict[str, Any], override: str) -> str:
     """Set one ``a.b=value`` in ``data``, or ``a.NAME.b=value`` in a table by its name, or number from 1 (value: TOML, a
-    number, else text; nothing: drop it); returns the key as faults name it. Raises `InputError`."""
+    number, else text; none: drop it); returns the key as faults name it. Raises `InputError`."""
     key, sign, text = override.partition("=")
     section, dot, name = key.strip().partition(".")
-    value = _value(text.strip()) if text.strip() else None
+    if sign and not text.strip():
+        raise InputError(f"--set {override!r}: must have a value; {ABSENT} drops the key.")
+    value = _value(text.strip())
     tables = data.get(section)
     if not isinstance(tables, list):
         if "\n" in override or not (sign and dot and section and name and "." not in name):
@@ -166,7 +182,7 @@ def override_key(data: dict[str, Any], override: str) -> str:
 
 
 def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) -> None:
-    """Set a key of scene ``data``, or drop it if ``value`` is None; what it is an alternative to goes, too.
+    """Set a key of scene ``data``, or drop it if ``value`` is `ABSENT`; what it is an alternative to goes, too.
 
     Raises `InputError`, beginning with ``said``, if there can be no such section.
     """
@@ -178,7 +194,7 @@ def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) ->
         table.pop(other, None)
     if (section, name, value) == ("pin", "rigid", True):
         table.clear()
-    if value is not None:
+    if value != ABSENT:
         table[name] = value
 
 

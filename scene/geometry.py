@@ -36,7 +36,7 @@ class JointGeometry(Section):
         name = given(self, ("clearance", "relative_clearance"))
         require(1e-30 <= self.radius <= 1e30, "radius", "must be between 1e-30 and 1e30; choose other units")
         dR, h = self.dR / self.radius, self.h / self.radius
-        require(dR > 0 or self.is_ring, name, "must be positive: only a ring may have an interference")
+        require(dR > 0 or self.is_ring, name, 'must be positive; an interference is for joint.model = "ring"')
         require(1e-6 <= abs(dR) <= 0.5, name, "must be between 1e-6 and 0.5 times the radius, in a ring or minus that")
         sizes = "element_size", "relative_element_size"
         name = sizes[0] if self.relative_element_size is None else given(self, sizes)

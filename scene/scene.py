@@ -91,8 +91,9 @@ class Scene(Checked):
             require(not pin.rigid, "pin.rigid", 'must be false where joint.model is "ring"')
             require(not pin.whole, "pin.whole", 'is for joint.model = "block": the pin of a ring is whole anyway')
         scale, what = (self.E_star * self.thickness, "E* R") if self.force_controlled else (1.0, "the radius")
-        most = 0.5 * scale * joint.radius
-        require(max(map(abs, self.targets)) <= most, load, f"must not exceed half {what} ({most:g})")
+        most, unit = 0.5 * scale * joint.radius, " clearances" if self.load.kind == "displacement" else ""
+        said = f"must not exceed {most / self.load_unit:g}{unit}, half {what}"
+        require(max(map(abs, self.targets)) <= most, load, said)
         return self
 
     def require_mesh(self) -> None:

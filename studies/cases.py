@@ -20,6 +20,7 @@ from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.scene.faults import shortened
 from archord.scene.file import (
+    ABSENT,
     ALTERNATIVES,
     in_order,
     override_key,
@@ -32,7 +33,6 @@ from archord.scene.file import (
 from archord.scene.keys import Section, toml_value
 from archord.scene.scene import Scene
 
-ABSENT = "none"  # the value that drops a key, so that its default holds
 Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
 MOST_CASES = 100_000
 _MOST_SENTENCES = 20
@@ -128,7 +128,7 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
         sweep = SweepFile.model_validate(data)
     except ValidationError as error:
         raise InputError("\n".join(_sentence(fault, path) for fault in error.errors())) from None
-    for override in in_order(overrides):
+    for override in in_order(overrides, "--set "):
         override_key(sweep.base, override)
     read_targets(sweep.base, source)
     for table in (*sweep.list_, sweep.zip, sweep.grid):
@@ -284,8 +284,9 @@ def run_name(scene: Scene) -> str:
 def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:
     """The base with ``overrides``, checked. Raises `InputError`."""
     data = copy.deepcopy(base)
-    for key in in_order(overrides):
+    for override in in_order(f"{key}={toml_value(value)}" for key, value in overrides.items()):
+        key = override.partition("=")[0]
         section, _, name = key.partition(".")
-        put(data, section, name, None if overrides[key] == ABSENT else overrides[key], key)
+        put(data, section, name, overrides[key], key)
     read_targets(data, path)
     return parse_scene(data, str(path))

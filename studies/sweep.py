@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import re
 from collections.abc import Iterable
 from contextlib import suppress
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from archord.output.disk import replace_file
-from archord.output.folder import occupied
+from archord.output.folder import occupied, report_of
 from archord.scene.errors import InputError
 from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
@@ -46,14 +45,6 @@ class Result:
 def of_case(case: Case, folder: Path) -> Path:
     """The run folder of ``case`` in the sweep's ``folder``."""
     return folder / CASES / case.run
-
-
-def report_of(folder: Path) -> dict[str, Any]:
-    """The run.json of a case; empty if it has none that can be read."""
-    with suppress(OSError, ValueError):
-        if isinstance(report := json.loads((folder / "run.json").read_text(encoding="utf-8")), dict):
-            return report
-    return {}
 
 
 def result_of(case: Case, folder: Path) -> Result:

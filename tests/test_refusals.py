@@ -39,6 +39,13 @@ RUN, OTHER = "{coarse}", "{elastic}"
             ["solve", SCENE, "--set", "analysis.accuracy=0.02", "--set", "joint.growth=0.5"],
             "--set joint.growth=0.5: joint.growth must not be given together with analysis.accuracy, which chooses it.",
         ),
+        (["solve", RUN], f"{RUN}: is a run; --restart or --extend continues it, and its scene is {RUN}/scene.toml."),
+        (["solve", "empty"], "empty: is no scene but a folder, and no run is in it."),
+        (
+            ["solve", SCENE, "--set", "load.force=1", "--set", "load.displacement=1"],
+            "--set load.displacement=1: does not go with load.force=1; give one of them.",
+        ),
+        (["solve", SCENE, "--set", "pin.E="], "--set 'pin.E=': must have a value; none drops the key."),
         (["law", "jonson", *JOINT], "jonson: is not a known law; did you mean johnson?"),
         (["law", "johnson", "--radius", "1"], "--clearance, --E-star: missing"),
         (["law", "johnson", *JOINT, "--clearance", "-1"], "clearance = -1 must be a positive number."),
@@ -63,7 +70,8 @@ def test_bad_input_is_one_sentence(runs, tmp_path, monkeypatch, refused, argumen
     ("ranks", "arguments", "said"),
     [
         (0, ["solve", "bad.toml"], "bad.toml: joint.radius = -10.0 must be greater than 0."),
-        (0, ["slove", "--help"], "No such command 'slove'."),
+        (0, ["slove", "--help"], "No such command 'slove'. Did you mean solve?"),
+        (0, ["benchmark", "stabilty"], "No such command 'stabilty'. Did you mean stability?"),
         (2, ["solve", "bad.toml"], "bad.toml: joint.radius = -10.0 must be greater than 0."),
         (2, ["solve", "--bogus", "nowhere.toml"], "No such option: --bogus"),
         (2, ["scene", "--bogus"], "No such option: --bogus"),

@@ -8,7 +8,7 @@ import pytest
 from tests.test_cli import COARSE, ENVIRONMENT, SCENE
 
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
-ELASTIC = ["--set", "pin.yield_stress=", "--set", "block.yield_stress="]
+ELASTIC = ["--set", "pin.yield_stress=none", "--set", "block.yield_stress=none"]
 SOLVER = {"dolfinx", "petsc4py", "mpi4py", "gmsh"}
 PLOTTING = {"matplotlib", "pyvista", "vtk"}
 LAUNCHER = {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "2", "PMIX_RANK": "0"}

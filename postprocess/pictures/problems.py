@@ -34,7 +34,7 @@ def draw_cells(axes: Any, run: Run, fields: Fields, x: Array, shown: np.ndarray,
     """PEEQ, or von Mises stress where nothing has yielded, in the ``shown`` cells ``(m,)`` with the nodes at ``x``; the
     colours end at the largest of the ``ranged`` ones."""
     values, label, cmap = fields.von_mises, f"von Mises stress [{run.scene.units.stress}]", "viridis"
-    if fields.peeq is not None and (run.is_joint or fields.peeq.any()):
+    if fields.peeq is not None and fields.peeq.any():
         values, label, cmap = 100 * fields.peeq, "equivalent plastic strain [%]", "inferno_r"
     triangles, most = fields.triangles[shown], values[ranged].max() or None
     colours = {"facecolors": np.repeat(values[shown], triangles.shape[1]), "cmap": cmap}

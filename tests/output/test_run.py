@@ -172,8 +172,13 @@ def test_results_are_not_overwritten_by_accident(tmp_path):
     """An occupied folder needs force; a file is no folder."""
     claim_folder(tmp_path / "new", False)
     (tmp_path / "new" / "history.csv").write_text("kept")
-    with pytest.raises(InputError, match="--force"):
+    with pytest.raises(InputError, match=r"is not empty; .* --force"):
         claim_folder(tmp_path / "new", False)
+    ends = {"running": "did not end, unless", "interrupted": "was interrupted", "stopped": "could not go on"}
+    for status, said in ends.items():
+        (tmp_path / "new" / "run.json").write_text(json.dumps({"status": status}))
+        with pytest.raises(InputError, match=f"new: holds a run that {said}.*; continue it with --restart, or over"):
+            claim_folder(tmp_path / "new", False)
     claim_folder(tmp_path / "new", True)
     assert (tmp_path / "new" / "history.csv").read_text() == "kept"
     with pytest.raises(InputError, match="cannot be used for results: File exists"):

@@ -8,7 +8,9 @@ import pytest
 
 from archord.benchmarks.case import paper_joint
 from archord.cli import run as command
+from archord.postprocess.pictures.joint import field_panel
 from archord.postprocess.run import Run
+from archord.report.figure import new_figure
 from tests.output.run_files import solved
 
 
@@ -26,6 +28,20 @@ def test_show_prints_the_run_and_draws_it(runs, tmp_path, capsys):
     assert f"plastic strain first at step {first + 1}\n" in printed
     assert printed.endswith(f"\n{target}\n")
     assert matplotlib.image.imread(target).std() > 0.05
+
+
+def test_the_field_of_a_joint_is_its_stress_until_it_yields(tmp_path):
+    """A picture of PEEQ that is zero everywhere tells nothing."""
+    run = Run(
+        solved({"run": paper_joint(0.2, 2, 0.005, load={"displacement": [0.2, 2.0], "steps": 1})}, tmp_path)["run"]
+    )
+    labels = []
+    for step in (1, 2):
+        figure = new_figure(4, 4)
+        field_panel(figure.subplots(), run, step)
+        labels.append(figure.axes[-1].get_ylabel())
+    assert [peeq > 0 for peeq in run.columns["peeq_max"]] == [False, True]
+    assert labels == ["von Mises stress [MPa]", "equivalent plastic strain [%]"]
 
 
 def test_show_draws_what_there_is_of_other_runs(tmp_path, capsys):

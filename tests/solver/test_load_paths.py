@@ -169,7 +169,7 @@ CYCLE, IN_A_ROW = 'path = "cycle.csv"', "cycle.csv: must have a number in every 
         (CYCLE, "displacement\n0,5\n", f"{IN_A_ROW}: '0,5'"),
         (CYCLE, "displacement\n", r"load.displacement = \[\] must not be empty"),
         (CYCLE, "displacement\n1\ninf\n", "entry 2 must be a finite number"),
-        (CYCLE, "displacement\n1\n1e9\n", "must not exceed half the radius"),
+        (CYCLE, "displacement\n1\n1e9\n", "must not exceed .* half the radius"),
         ("displacement = []", None, "must not be empty"),
         ('displacement = "far"', None, "must be a number"),
         ('displacement = [1.0, "far"]', None, "entry 2 must be a number"),

@@ -92,7 +92,7 @@ def test_overrides_mean_what_set_means(tmp_path):
     options = [
         ["pin.rigid=true", "joint.relative_clearance=0.01"],
         ["block.yield_stress=0.002"],
-        ["load.displacement=", "load.relative_force=[0.001, 0.002]"],
+        ["load.displacement=none", "load.relative_force=[0.001, 0.002]"],
     ]
     found = read_sweep(written(tmp_path, text)).cases
     assert [resolved(case.scene) for case in found] == [resolved(load_scene(ELASTIC, some)) for some in options]

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from archord.output.folder import report_of
 from archord.output.ranks import agreed
 from archord.studies.cases import Case, read_sweep
 from archord.studies.farm import solve_case, solve_cases
-from archord.studies.sweep import CASES, of_case, open_cases, report_of, result_of
+from archord.studies.sweep import CASES, of_case, open_cases, result_of
 from tests.studies.parts import SOFT, break_mesh, written
 
 SIX = "[grid]\npin.E = [0.5, 0.6, 0.7, 0.8, 1.0, 1.82]\n"

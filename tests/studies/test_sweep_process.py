@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from archord.studies.sweep import report_of
+from archord.output.folder import report_of
 from tests.studies.parts import numbers, sweep, table, times, written
 from tests.test_cli import ENVIRONMENT, archord
 
