@@ -1,0 +1,35 @@
+"""The pages as a site: ``python3 -m sphinx -W docs runs/site``, with Sphinx, MyST and Furo (`pip install .[docs]`)."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import archord
+
+project, author, version = "archord", "the authors of archord", archord.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
+exclude_patterns = ["cluster", "figures"]
+html_theme, html_title, html_show_copyright = "furo", f"archord {version}", False
+myst_heading_anchors = 4  # as on GitHub
+default_role = "code"
+autodoc_default_options = {"members": True, "member-order": "bysource", "exclude-members": "model_config"}
+autodoc_typehints = "signature"
+# What solves is documented without being installed, too.
+autodoc_mock_imports = [
+    name for name in ("dolfinx", "petsc4py", "mpi4py", "gmsh", "basix", "ufl") if importlib.util.find_spec(name) is None
+]
+
+
+def pages_above(app: object, name: str, source: list[str]) -> None:
+    """Put a page of the folder above, with links from here, in front of the one that stands for it."""
+    if above := {"index": "README.md", "contributing": "CONTRIBUTING.md"}.get(name):
+        text = Path(__file__).parents[1].joinpath(above).read_text(encoding="utf-8")
+        text = re.sub(r"\]\((?!https?:|#)", "](../", text).replace("](../docs/", "](")
+        source[0] = text.replace("](../CONTRIBUTING.md", "](contributing.md") + source[0].partition("---\n")[2]
+
+
+def setup(app: object) -> None:
+    """Sphinx calls this."""
+    app.connect("source-read", pages_above)
