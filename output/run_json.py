@@ -13,11 +13,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import dolfinx
 import numpy as np
-from mpi4py import MPI
-from petsc4py import PETSc
 
+from archord.kernels.compat import versions
 from archord.output.disk import replace_file
 from archord.presets.account import Account
 from archord.presets.joint_account import APART
@@ -49,9 +47,7 @@ class Report:
             "command": before.get("command", sys.argv),
             "versions": {
                 "archord": VERSION,
-                "dolfinx": dolfinx.__version__,
-                "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
-                "mpi": MPI.Get_library_version().split(",")[0].strip(),
+                **versions(),
                 "numpy": np.__version__,
                 "python": platform.python_version(),
             },

@@ -1,1 +1,3 @@
-"""Scene file, bulk and contact terms, nonlinear solve, load stepping, results on disk."""
+"""Bulk and contact terms, equilibrium, Newton's method, load stepping."""
+
+import archord.kernels.compat  # noqa: F401  (before dolfinx)

@@ -10,7 +10,7 @@ import numpy as np
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
-from archord.geometry.interpolation import Interpolation
+from archord.geometry.meshes.interpolation import Interpolation
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.system import System
 

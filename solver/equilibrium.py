@@ -14,7 +14,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.geometry.meshes.fenicsx import create_vector
+from archord.kernels.compat import ghosted_vector
 from archord.materials.material import Points
 from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.bulk import Bulk
@@ -48,7 +48,7 @@ class Equilibrium:
         self.drives = drives = Drives(problem, V, contact, self._stiffest)
         self.levels: Array = np.zeros(len(drives.rate))
         self.fixed, self._rate_of_fixed = drives.fixed, drives.rate[:, drives.fixed]
-        self._force = create_vector(index_map, 2)
+        self._force = ghosted_vector(index_map, 2)
         self._reaction = np.zeros((self.n_owned, 2))
         self.changes = 0
         self.reaction_norm = self.noise = self.largest_reaction = 0.0
@@ -79,7 +79,7 @@ class Equilibrium:
 
     def vector(self) -> PETSc.Vec:
         """A vector of all unknowns of this rank."""
-        return self.border.vector() if self.border else create_vector(self.V.dofmap.index_map, 2)
+        return self.border.vector() if self.border else ghosted_vector(self.V.dofmap.index_map, 2)
 
     def _join(self, x: PETSc.Vec, u: Array, levels: Array) -> None:
         """Put displacements (or forces) ``u`` and unknown levels (or what their equations lack) into ``x``."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Iterator
 
+import basix
 import numpy as np
 from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
@@ -73,7 +74,7 @@ class MeshOrder:
                 self.nodes_of_cell = np.searchsorted(np.sort(first), first[of_cells])
             self._index = system.comm.bcast(first)[numbers]
         self._nodes = Gather(system.comm, self._index[: self._n_owned])
-        corners = slice(mesh.ufl_cell().num_vertices())  # come first in every cell
+        corners = slice(len(basix.topology(mesh.basix_cell())[0]))  # come first in every cell
         self._dof_of_vertex = np.zeros(len(geometry.x), dtype=np.int64)
         self._dof_of_vertex[geometry.dofmap[:, corners]] = dofs[:, corners]
 

@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
+from archord.kernels.compat import RESIDUAL_NOT_FINITE
 from archord.report.timer import BEFORE_SOLVING
 from archord.solver.equilibrium import Equilibrium
 from archord.solver.linear.lagged import Lagged
@@ -184,7 +185,7 @@ class NewtonSolver:
             self._failure = f"{'no stiffness is left' if pressed else 'nothing resists the force'}{of} (singular mode)"
             return reasons.DIVERGED_LINEAR_SOLVE
         if not np.isfinite(norm):
-            return reasons.DIVERGED_FNORM_NAN
+            return RESIDUAL_NOT_FINITE
         if norm <= max(self._goal * reaction, at.noise):
             return reasons.CONVERGED_FNORM_RELATIVE
         patience = _PATIENCE if any(result.active_set_changes[-CIRCLING:]) else CIRCLING
@@ -200,5 +201,5 @@ _REASONS = {
     _R.DIVERGED_MAX_IT: "no convergence within the allowed iterations",
     _R.DIVERGED_LINE_SEARCH: "the line search found no smaller residual",
     _R.DIVERGED_LINEAR_SOLVE: "the linear system could not be factorised",
-    _R.DIVERGED_FNORM_NAN: "the residual is not a number",
+    RESIDUAL_NOT_FINITE: "the residual is not a number",
 }

@@ -7,7 +7,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
-from archord.geometry.meshes.fenicsx import create_vector
+from archord.kernels.compat import ghosted_vector
 from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.bulk import Bulk, assemble, matrix
 from archord.solver.contact.contact import Contact
@@ -154,7 +154,7 @@ class TangentMatrix:
         D = np.tensordot(self._row_rate, on_rows, ((0, 1), (0, 1))) - rate @ load.T + load @ rate.T
         B, C = -load.T, load.T.copy()
         for level in range(m):
-            b = create_vector(self.V.dofmap.index_map, 2)
+            b = ghosted_vector(self.V.dofmap.index_map, 2)
             if drives.moving[drives.unknown[level]]:
                 self._direction.x.array[:] = drives.unknown_rate[level].ravel()
                 self.bulk.add_action(self._direction, b)

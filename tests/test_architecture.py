@@ -98,6 +98,16 @@ def test_a_room_imports_nothing_that_it_must_do_without(room):
         assert not banned, file
 
 
+def test_rooms_that_use_dolfinx_import_what_must_come_before_it():
+    """PyPI's dolfinx finds no MPI unless the package that `archord.kernels.compat` imports came first."""
+    for room in ROOMS[:-1]:
+        names = {node.module for file in files_of(room) for node in ast.parse(file.read_text(encoding="utf-8")).body
+                 if isinstance(node, ast.ImportFrom) and node.module}  # fmt: skip
+        if room != "kernels" and {name.partition(".")[0] for name in names} & {"dolfinx", "petsc4py"}:
+            parents = [ROOT / room.replace(".", "/"), ROOT / room.partition(".")[0]]
+            assert any("import archord.kernels.compat" in (path / "__init__.py").read_text() for path in parents), room
+
+
 def test_no_imports_at_the_top_of_files_make_a_circle():
     known = {
         f"archord.{file.relative_to(ROOT).with_suffix('').as_posix().replace('/', '.')}"

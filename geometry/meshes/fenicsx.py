@@ -1,9 +1,7 @@
-"""From a gmsh model to a dolfinx mesh: the one place that knows what dolfinx renamed between releases, and what it does
-to the process."""
+"""From a gmsh model to a dolfinx mesh, cut in sectors for the ranks."""
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -15,6 +13,7 @@ import basix
 import basix.ufl
 import numpy as np
 from dolfinx.cpp.graph import AdjacencyList_int32
+from dolfinx.graph import adjacencylist
 from dolfinx.io import distribute_entity_data
 from dolfinx.mesh import create_mesh, entities_to_geometry, meshtags, meshtags_from_entities
 from mpi4py import MPI
@@ -25,20 +24,9 @@ from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_o
 from archord.geometry.meshes.refine import Circle, on_circles
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 
-try:
-    from dolfinx.la.petsc import create_vector  # dolfinx >= 0.10
-except ImportError:
-    from dolfinx.la import create_petsc_vector as create_vector
-
-__all__ = ["create_vector", "distribute", "gathered", "gmsh_to_mesh", "strips"]
-
 Cut = Callable[[Array, np.ndarray, int], np.ndarray]
 
 _ALL_QUADS = 3  # gmsh's number of the recombination that leaves no triangles; it halves the edges of all lines
-
-with suppress(TypeError, ValueError):  # a handler of another language, or not the main thread
-    # Python's own again, which raises BrokenPipeError: dolfinx starts PETSc, whose handler ends the process with a page
-    signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
 
 
 def gmsh_to_mesh(
@@ -137,7 +125,7 @@ def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None, cut: Cu
     cells = meshtags(mesh, 2, np.arange(len(number), dtype=np.int32), comm.bcast(made.bodies)[number])
     edges, tags = distribute_entity_data(mesh, 1, made.edges, made.tags)
     mesh.topology.create_connectivity(1, 2)
-    facets = meshtags_from_entities(mesh, 1, AdjacencyList_int32(edges), tags)
+    facets = meshtags_from_entities(mesh, 1, adjacencylist(edges), tags)
     points = comm.bcast({name: made.x[nodes] for name, nodes in made.point_sets.items()} if comm.rank == 0 else None)
     return TaggedMesh(mesh, cells, facets, made.cell_sets, made.facet_sets, points)
 

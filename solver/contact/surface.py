@@ -183,7 +183,7 @@ def _owned_facets(mesh, facets) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     cells = np.array([to_cell.links(f)[0] for f in facets], dtype=np.int32).reshape(-1)
     keep = cells < mesh.topology.index_map(2).size_local
     cells, facets = cells[keep], np.asarray(facets)[keep]
-    n, within = mesh.ufl_cell().num_facets(), np.diff(to_cell.offsets)[facets] > 1
+    n, within = len(basix.topology(mesh.basix_cell())[1]), np.diff(to_cell.offsets)[facets] > 1
     return cells, np.nonzero(to_facet.array.reshape(-1, n)[cells] == facets[:, None])[1], within
 
 

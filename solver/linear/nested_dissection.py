@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 from typing import Any
 
@@ -11,12 +10,12 @@ import numpy as np
 from dolfinx import fem
 
 from archord.geometry.basis import lagrange_element
+from archord.kernels.compat import METIS
 
 _PROTOTYPES = """
 int METIS_NodeND(int32_t *n, int32_t *offsets, int32_t *neighbours, int32_t *weights, int32_t *options, int32_t *order,
                  int32_t *place);
 """
-_LIBRARIES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")  # Debian's (gmsh needs it), conda's on Linux and macOS
 
 
 @cache
@@ -24,7 +23,7 @@ def metis() -> tuple[cffi.FFI, Any]:
     """METIS's library, and what makes its arguments. Raises OSError if it is not installed."""
     ffi = cffi.FFI()
     ffi.cdef(_PROTOTYPES)
-    for path in (folder + name for folder in ("", f"{sys.prefix}/lib/") for name in _LIBRARIES):
+    for path in METIS:
         try:
             return ffi, ffi.dlopen(path)
         except OSError:

@@ -9,8 +9,8 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.basis import QUADRILATERAL, Array, bulk_quadrature, lagrange_element, strain_matrix
-from archord.geometry.interpolation import Interpolation
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
+from archord.geometry.meshes.interpolation import Interpolation
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
 from archord.output.fields import FieldWriter, SecondOrder, collect_fields, collect_mesh

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.geometry.interpolation import Interpolation
+from archord.geometry.meshes.interpolation import Interpolation
 from archord.geometry.shapes.pin_in_block import quarter_joint
 from tests.geometry.shapes.measures import Cells
 

@@ -1,0 +1,46 @@
+"""What differs where archord runs: dolfinx 0.9 to 0.11 and PETSc 3.22 to 3.25, of Debian, conda or PyPI. What uses
+dolfinx imports this first."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+
+if find_spec("dolfinx_solver"):
+    import dolfinx_solver  # noqa: F401  (PyPI's dolfinx finds its MPI through it)
+
+import dolfinx
+from dolfinx.common import IndexMap
+from mpi4py import MPI
+from petsc4py import PETSc
+
+with suppress(TypeError, ValueError):  # a handler of another language, or not the main thread
+    # Python's own again, which raises BrokenPipeError: dolfinx starts PETSc, whose handler ends the process with a page
+    signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
+
+_REASONS = vars(PETSc.SNES.ConvergedReason)
+RESIDUAL_NOT_FINITE = _REASONS.get("DIVERGED_FNORM_NAN", _REASONS.get("DIVERGED_FUNCTION_NANORINF"))  # until PETSc 3.24
+
+# of Debian (gmsh needs it), of conda on Linux and macOS, and beside PyPI's dolfinx
+_FOLDERS = ("", f"{sys.prefix}/lib/", f"{Path(dolfinx.__file__).parents[1]}/dolfinx_solver/lib/")
+METIS = tuple(folder + name for folder in _FOLDERS for name in ("libmetis.so.5", "libmetis.so", "libmetis.dylib"))
+
+
+def ghosted_vector(index_map: IndexMap, components: int) -> PETSc.Vec:
+    """A vector with so many ``components`` at every index. Collective."""
+    sizes = components * index_map.size_local, components * index_map.size_global
+    ghosts = index_map.ghosts.astype(PETSc.IntType)
+    return PETSc.Vec().createGhost(ghosts, sizes, bsize=components, comm=index_map.comm)
+
+
+def versions() -> dict[str, str]:
+    """The releases of dolfinx, PETSc and MPI."""
+    mpi = MPI.Get_library_version().partition("\n")[0].partition(",")[0]
+    return {
+        "dolfinx": dolfinx.__version__,
+        "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
+        "mpi": " ".join(mpi.split()),
+    }
