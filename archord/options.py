@@ -17,6 +17,7 @@ class Group(click.Group):
     """Commands; of a name that is none of them the message says which may be meant."""
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """The command of ``args``. Raises `click.UsageError`."""
         if self.get_command(ctx, args[0]) is None and args[0][:1] != "-":
             near = difflib.get_close_matches(args[0], self.list_commands(ctx), 1)
             ctx.fail(" ".join([f"No such command {args[0]!r}.", *(f"Did you mean {name}?" for name in near)]))

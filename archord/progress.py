@@ -42,6 +42,7 @@ def _shown(scene: AnyScene) -> tuple[str, list[Column], str, float]:
                 ("eps/deg", "8.3f", lambda m: math.degrees(m.eps)),
                 ("p0/E*", "9.6f", lambda m: m.p0 / E_star),
                 ("PEEQ max", "9.2e", lambda m: m.peeq_max),
+                ("at contact", "10.2e", lambda m: m.peeq.get("contact", [m.peeq_max])[0]),
             ],
             *last,
         )

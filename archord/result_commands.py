@@ -41,7 +41,8 @@ def show(folder: Path, output: Path | None, pictures: bool) -> int:
 @output("picture to draw", "comparison.png", "FILE")
 @pictures("the picture")
 def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
-    """Compare runs with the first: P, p0 and eps at common displacements, scenes, cost; and draw them.
+    """Compare runs with the first: P, p0 and eps at common displacements (delta at common forces, where forces
+    load all of them), scenes, cost; and draw them.
 
     Where units, R, dR or E* differ, they are compared in dimensionless form.
     """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -59,8 +60,20 @@ def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = 
     if extend and step == total:
         raise InputError(f"{folder}: ends at {scene.targets[-1]:g} already; {scene.loading} goes no further.")
     if step == total and start.report["status"] == "done":
+        if lost := _lost_tables(folder, scene):
+            return Plan(scene, start, f"the run in {folder} is finished: writing {' and '.join(lost)} again")
         return Plan(scene, None, f"the run in {folder} is finished: nothing to do", finished=True)
     return Plan(scene, start, f"{'extending' if extend else 'continuing'} {folder} after step {step} of {total}")
+
+
+def _lost_tables(folder: Path, scene: AnyScene) -> list[str]:
+    """Those of the files that a run makes from the others which are missing, or lack the last step."""
+    parts = {"history.csv": f"\n{len(scene.targets)},"} | ({"fields.xdmf": "</Xdmf>"} if scene.output.fields else {})
+    texts = dict.fromkeys(parts, "")
+    for name in parts:
+        with suppress(OSError, ValueError):
+            texts[name] = (folder / name).read_text(encoding="utf-8")
+    return [name for name, part in parts.items() if part not in texts[name] or not texts[name].endswith("\n")]
 
 
 def _start(folder: Path, scene: AnyScene) -> Start:
@@ -79,7 +92,7 @@ def _start(folder: Path, scene: AnyScene) -> Start:
         report = json.loads(path.read_text(encoding="utf-8"))
         record = record_type(scene)
         names = [field.name for field in fields(record)]
-        done = [record(**{name: step[name] for name in names}) for step in report["steps"][: n - 1]]
+        done = [record(**{name: step[name] for name in names if name in step}) for step in report["steps"][: n - 1]]
         if len(done) < n - 1 or not {"status", "started", "command", "warnings"} <= report.keys():
             raise KeyError("steps")
     except (OSError, ValueError, KeyError, TypeError):

@@ -1,9 +1,10 @@
 """Runs against the first of them: their curves at common loads, and what differs in their scenes.
 
-Of joints P, p0 and eps over the displacement, of general runs the quantities that all of them have over the load
-factor. Runs that were led through the same loads are compared step by step, unloading included. Of others the first
-loading counts, the steps before the pin first goes back, at those loads of the first run that all reach; between their
-steps the others are interpolated by monotone cubics (Fritsch and Carlson 1980).
+Of joints P, p0 and eps over the displacement, or where forces load all of them delta, p0 and eps over the force; of
+general runs the quantities that all of them have over the load factor. Runs that were led through the same loads are
+compared step by step, unloading included. Of others the first loading counts, the steps before the pin first goes back,
+at those loads of the first run that all reach; between their steps the others are interpolated by monotone cubics
+(Fritsch and Carlson 1980).
 """
 
 from __future__ import annotations
@@ -74,8 +75,9 @@ def compare_runs(runs: list[Run]) -> Comparison:
 def curves_of(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, str], Array]:
     """What is compared of each run over its "load", ``(n,)`` by name; their labels; and what pressures are divided by.
 
-    Of joints P, p0 and eps, as they are where the units, R, dR and E* of all are the same, else over powers of E*, R
-    and the clearance. Raises `InputError` for general runs without a common quantity or unit.
+    Of joints P (delta, where forces load all of them), p0 and eps, as they are where the units, R, dR and E* of all are
+    the same, else over powers of E*, R and the clearance. Raises `InputError` for general runs without a common
+    quantity or unit.
     """
     units = [run.scene.units for run in runs]
     if not any(run.is_joint for run in runs):
@@ -94,17 +96,19 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, st
     sizes = np.array([[curve.R, curve.dR, curve.E_star] for curve in curves])
     if all(unit == units[0] for unit in units) and np.allclose(sizes, sizes[0], rtol=_SAME, atol=0):
         one, per = units[0], np.ones((len(runs), 3))
-        labels = {"load": f"delta [{one.length}]", "P": f"P [{one.force_of(None)}]", "p0": f"p0 [{one.stress}]"}
+        labels = {"delta": f"delta [{one.length}]", "P": f"P [{one.force_of(None)}]", "p0": f"p0 [{one.stress}]"}
     else:
         gap = gap_name(min(curve.dR for curve in curves))
-        labels = {"load": f"delta/{gap}", "P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})"}
+        labels = {"delta": f"delta/{gap}", "P": f"P/(E* {gap})", "p0": f"p0 R/(E* {gap})"}
         R, dR, E_star = np.abs(sizes).T
         per = np.stack([dR, E_star * dR, E_star * dR / R], axis=1)
-    tables = [
-        {"load": c.delta / load, "P": c.P / force, "p0": c.p0 / pressure, "eps": c.eps}
-        for c, (load, force, pressure) in zip(curves, per, strict=True)
-    ]
-    return tables, labels | {"eps": "eps [rad]"}, per[:, 2]
+    load = "P" if all(run.scene.force_controlled for run in runs) else "delta"
+    labels = {"load": labels.pop(load)} | labels | {"eps": "eps [rad]"}
+    tables = []
+    for c, row in zip(curves, per, strict=True):
+        scaled = {"delta": c.delta / row[0], "P": c.P / row[1], "p0": c.p0 / row[2], "eps": c.eps}
+        tables.append({"load" if name == load else name: values for name, values in scaled.items()})
+    return tables, labels, per[:, 2]
 
 
 def _at(load: Array, own: Array, values: Array, between: np.ndarray) -> Array:

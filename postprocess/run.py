@@ -10,9 +10,10 @@ import json
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from pydantic import BaseModel, Field, ValidationError
 
 from archord.output.folder import is_sweep
 from archord.output.history import read_history
@@ -27,10 +28,26 @@ from archord.scene.scene import Scene
 if TYPE_CHECKING:
     import pandas as pd
 
-_KNOWN = {"status", "message", "warnings", "versions", "seconds", "totals", "steps"}  # keys of a run.json
 _WHOLE = ("step", "iterations", "cutbacks")  # columns of whole numbers
 _NEEDED = (*_WHOLE, "seconds")
 _OF_A_JOINT = (*_NEEDED, *CURVES, "delta/dR", "P/(E* R)", "p0/E*")
+
+
+class _Report(BaseModel):
+    """What is read of a run.json; other keys may hold anything."""
+
+    status: str
+    message: str
+    warnings: list[str]
+    versions: dict[str, str]
+    seconds: dict[str, float]
+    totals: dict[str, float]
+    steps: list[dict[str, Any]]
+    mesh: dict[str, Any] = {}
+    bodies: dict[str, Annotated[list[int], Field(min_length=1)]] = {}
+    error_estimates: dict[str, float | None] = {}
+    peak_memory: list[float] = []
+    accuracy: dict[str, Any] | None = None
 
 
 class Run:
@@ -54,8 +71,8 @@ class Run:
                 raise InputError(f"{self.folder}: is not a run folder: {name} is missing.")
         self.scene: Any = load_scene(self.folder / "scene.toml")
         self.is_joint = isinstance(self.scene, Scene)
+        self.summary: dict[str, Any] = self._read_report()  # before the history, which a run writes first
         self.columns, self.units = self._read_history()
-        self.summary: dict[str, Any] = self._read_report()
         self.status, self.message, self.warnings = (self.summary[key] for key in ("status", "message", "warnings"))
         self.steps = len(self.columns["step"])
 
@@ -149,6 +166,10 @@ class Run:
                 raise ValueError("numbers that are not finite")
         except (ValueError, IndexError, KeyError, OSError):
             raise InputError(f"{path}: cannot be read as the history of a run.") from None
+        rows, steps = len(columns["step"]), len(self.summary["steps"])
+        if rows < steps:
+            cure = f"archord solve {self.folder} --restart writes it again"
+            raise InputError(f"{path}: has {rows} of the {steps} steps of run.json: it was cut short; {cure}.")
         named = (heading.partition(" [") for heading in headings)
         return columns, {name: unit.removesuffix("]") for name, _, unit in named if unit}
 
@@ -156,8 +177,11 @@ class Run:
         path = self.folder / "run.json"
         try:
             report = json.loads(path.read_text(encoding="utf-8"))
-            if not report.keys() >= _KNOWN:
-                raise ValueError("keys")
-        except (OSError, ValueError, AttributeError):
+            _Report.model_validate(report, strict=True)
+        except ValidationError as error:
+            place = ".".join(map(str, error.errors()[0]["loc"]))
+            fault = f": {place}: {error.errors()[0]['msg'].lower()}" if place else ""
+            raise InputError(f"{path}: cannot be read as the report of a run{fault}.") from None
+        except (OSError, ValueError):
             raise InputError(f"{path}: cannot be read as the report of a run.") from None
         return report

@@ -17,7 +17,7 @@ from archord.report.table import Table
 from archord.scene.faults import shortened
 
 _MOST = 40  # rows of a table
-_OF_A_JOINT = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max")
+_OF_A_JOINT = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "contact peeq_max")
 _SHOWN = ("step", "load_factor", "delta", *_OF_A_JOINT, "steps", "iterations", "cutbacks", "seconds")
 _OF_A_RUN = {  # what a comparison tells of each run
     "status": lambda run: run.status,
@@ -124,7 +124,8 @@ def _facts(run: Run) -> Iterable[tuple[str, str]]:
 def _history(run: Run) -> Table:
     """The steps: loads and forces, pressures, angle, plastic strain, cost."""
     names = [name for name in _SHOWN if name in run.columns]
-    names[-3:-3] = [name for name in run.columns if name.endswith((" displacement", *COMMON))]
+    if not run.is_joint:
+        names[-3:-3] = [name for name in run.columns if name.endswith((" displacement", *COMMON))]
     columns = ([f"{value:.6g}" for value in run.columns[name]] for name in names)
     return Table(*map(run.heading, names), rows=zip(*columns, strict=True))
 
@@ -134,9 +135,13 @@ def _peaks(run: Run) -> str:
     h, said = run.columns, []
     names = [name for name in h if name in (*COMPARED, "peeq_max") or name.endswith(COMMON)]
     for name in names:
-        k = int(np.argmax(np.abs(h[name])))
-        said.append(f"{name} = {h[name][k]:.6g} {run.units.get(name, '')}".rstrip() + f" at step {h['step'][k]:g}")
-    yielded = np.flatnonzero(sum(np.array(h[name]) for name in names if name.endswith("peeq_max")))
+        k = int(np.argmax(np.abs(np.nan_to_num(h[name]))))
+        place = [h[name.replace("peeq_max", f"at {axis}")][k] for axis in "xy" if name.endswith(" peeq_max")]
+        where = f", x = {place[0]:.4g}, y = {place[1]:.4g}" if any(place) else ""
+        said.append(
+            f"{name} = {h[name][k]:.6g} {run.units.get(name, '')}".rstrip() + f" at step {h['step'][k]:g}{where}"
+        )
+    yielded = np.flatnonzero(sum(np.nan_to_num(h[name]) for name in names if name.endswith("peeq_max")))
     said += [f"plastic strain first at step {h['step'][yielded[0]]:g}"] if len(yielded) else []
     return f"largest: {', '.join(said)}"
 

@@ -9,9 +9,8 @@ from operator import attrgetter
 from typing import Any, ClassVar
 
 import numpy as np
-from mpi4py import MPI
 
-from archord.geometry.basis import bulk_quadrature, cell_basis
+from archord.materials.material import Array
 from archord.presets.arc import SYMMETRY, ArcProfile, arc_profiles, peak_pressure, semi_angle
 from archord.presets.edge import PER_STEP
 from archord.presets.joint import Joint
@@ -41,6 +40,7 @@ class JointAccount:
 
     def __init__(self, system: Joint) -> None:
         self.system, self.scene = system, system.scene
+        self._yielding = [body for body in system.problem.bodies if body.material.yields]
 
     def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
         """Headings of history.csv and their values: every measure in the scene's units, and dimensionless beside it."""
@@ -58,11 +58,15 @@ class JointAccount:
             "seconds": ("", 1.0, "s"),
         }
         columns: list[tuple[str, Callable[[Any], float | int]]] = []
-        for name in [field.name for field in fields(Measures)]:
+        for name in [field.name for field in fields(Measures) if field.name != "peeq"]:
             scale, divisor, unit = scales.get(name, ("", 1.0, ""))
             columns.append((headed(name, unit), attrgetter(name)))
             if scale:
                 columns.append((f"{name}/{scale}", partial(_over, name, divisor)))
+            if name == "peeq_max" and self._yielding:
+                for place in (*(body.name for body in self._yielding), "contact"):
+                    headings = f"{place} peeq_max", headed(f"{place} at x", length), headed(f"{place} at y", length)
+                    columns += [(heading, partial(_largest, place, k)) for k, heading in enumerate(headings)]
         return columns
 
     def driven(self) -> tuple[float, float]:
@@ -94,8 +98,20 @@ class JointAccount:
             peeq_max=peeq,
             peeq_integral=peeq_integral,
             force_balance=max(abs(f - P) for f in forces.values()) / scale if scale else 0.0,
+            peeq=self._peeq(max([eps, *(m.eps for m in before)])),
             **costs(before, step, joint.energies(), work, seconds),
         )
+
+    def _peeq(self, eps: float) -> dict[str, Sequence[float]]:
+        """Largest PEEQ, x and y of every body that can yield, and near the "contact": within the angle ``eps`` from its
+        axis, no farther than R/2 from the arc. That leaves out the pressed diameter and the held corner. Collective."""
+        R, found = self.scene.joint.radius, {body.name: self.system.largest_peeq(body) for body in self._yielding}
+
+        def near(x: Array) -> np.ndarray:
+            return (np.arctan2(np.abs(x[:, 0]), -x[:, 1]) <= eps) & (np.abs(np.hypot(*x.T) - R) <= R / 2)
+
+        near_contact = self.system.largest_peeq(*self._yielding, within=near)
+        return {**found, "contact": near_contact} if found else {}
 
     def facts(self) -> dict[str, dict[str, Any]]:
         """Sizes of the mesh and what was made of the scene, for run.json."""
@@ -151,6 +167,10 @@ class JointAccount:
         return energy_balance(steps, fit=int(self.scene.joint.dR < 0))
 
 
+def _largest(place: str, k: int, m: Measures) -> float:
+    return m.peeq.get(place, 3 * [np.nan])[k]
+
+
 def _over(name: str, divisor: float, m: Measures) -> float:
     return getattr(m, name) / divisor
 
@@ -169,10 +189,6 @@ def sizes(system: System) -> dict[str, Any]:
 
 def core_peeq(joint: Joint) -> float:
     """Largest PEEQ within the core of a ring's pin, whose mean displacement is delta; 0 for a block. Collective."""
-    if not joint.problem.loads or joint.scene.pin.yield_stress is None:
-        return 0.0
-    cells, points = joint.bulk.histories()[min(joint.problem.mesh.cell_tags("pin"))]
-    X, _ = bulk_quadrature(joint.V.mesh.basix_cell(), joint.bulk.degree)
-    x = cell_basis(joint.V.mesh, joint.bulk.degree, cells, X).point
-    core = np.linalg.norm(x, axis=-1).ravel() < joint.scene.load.core_radius * joint.scene.joint.radius
-    return joint.comm.allreduce(float(np.asarray(points.peeq)[core].max(initial=0.0)), op=MPI.MAX)
+    radius = joint.scene.load.core_radius * joint.scene.joint.radius
+    pin = [body for body in joint.problem.bodies if joint.problem.loads and body.name == "pin" and body.material.yields]
+    return joint.largest_peeq(*pin, within=lambda x: np.linalg.norm(x, axis=1) < radius)[0]

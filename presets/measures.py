@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,9 @@ class Measures:
     """One accepted output step of the whole joint (both symmetric halves), in the scene's units.
 
     ``contact_area`` is the arc length in contact, the mean of both sides; ``peeq_max`` the largest value at a
-    quadrature point, which grows without bound under mesh refinement where perfect plasticity localises.
+    quadrature point, which grows without bound under mesh refinement where perfect plasticity localises, as beside the
+    held corner of the block. ``peeq`` has the largest value, x and y of each body that can yield, and near the
+    "contact"; runs of version 0.1 lack it.
     ``force_balance`` is the largest difference between the forces at pin, contact and block, over the largest ``P`` so
     far, or where nothing touches over ``E* delta``, about what it would be in contact.
     """
@@ -36,6 +38,7 @@ class Measures:
     iterations: int
     cutbacks: int
     seconds: float
+    peeq: dict[str, Sequence[float]] = field(default_factory=dict)
 
     @property
     def at(self) -> float:

@@ -218,6 +218,11 @@ class Bulk:
             integral += float(data.weight.ravel() @ peeq)
         return largest, integral
 
+    def peeq_of(self, tag: int) -> tuple[Array, Array]:
+        """PEEQ ``(n q,)`` and places ``(n q, 2)`` of this rank's points of a plastic body."""
+        body = self._plastic[tag]
+        return np.asarray(body.points.peeq), body.point.reshape(-1, 2)
+
     def at_points(self, u: Array) -> Iterator[PointFields]:
         """The state at this rank's integration points, body by body, at ``u`` ``(n_nodes, 2)`` of the last update."""
         for tag, cells in self.cells.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import basix.ufl
@@ -10,7 +10,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from archord.geometry.basis import Array, bulk_quadrature, cell_basis
+from archord.geometry.basis import Array
 from archord.report.timer import Timer
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
@@ -135,16 +135,18 @@ class System:
         largest, integral = self.bulk.peeq()
         return self.comm.allreduce(largest, op=MPI.MAX), self.problem.symmetry * self.comm.allreduce(integral)
 
-    def largest_peeq(self, body: Body) -> tuple[float, float, float]:
-        """Largest PEEQ at a quadrature point of the ``body``, and its place x, y."""
-        cells, points = self.bulk.histories()[self.problem.tag(body)]
-        peeq, found = np.asarray(points.peeq), (0.0, 0.0, 0.0)
-        if peeq.any():
-            X, _ = bulk_quadrature(self.V.mesh.basix_cell(), self.bulk.degree)
-            at = int(np.argmax(peeq))
-            place = cell_basis(self.V.mesh, self.bulk.degree, cells[[at // len(X)]], X).point[0, at % len(X)]
-            found = (float(peeq[at]), float(place[0]), float(place[1]))
-        return max(self.comm.allgather(found))
+    def largest_peeq(
+        self, *bodies: Body, within: Callable[[Array], np.ndarray] | None = None
+    ) -> tuple[float, float, float]:
+        """Largest PEEQ at a quadrature point of the ``bodies``, of those at ``x`` ``(n, 2)`` for which ``within(x)``
+        is true; and its place x, y. Zeros without any."""
+        found = [(0.0, 0.0, 0.0)]
+        for peeq, x in (self.bulk.peeq_of(self.problem.tag(body)) for body in bodies):
+            peeq = peeq if within is None else np.where(within(x), peeq, 0.0)
+            if peeq.any():
+                at = int(np.argmax(peeq))
+                found.append((float(peeq[at]), float(x[at, 0]), float(x[at, 1])))
+        return max(self.comm.allgather(max(found)))
 
     def force_balance(self) -> float:
         """Largest resultant on a body over the largest force of an interaction or a support; 0 if all are round-off."""

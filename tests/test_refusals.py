@@ -1,11 +1,13 @@
 """What commands refuse: one sentence, exit code 2, nothing written, and runs that stay as they are."""
 
+import json
 import shutil
 from pathlib import Path
 
 import pytest
 
-from archord.postprocess.run import _NEEDED
+from archord.postprocess.run import _NEEDED, Run
+from archord.scene.errors import InputError
 from tests.test_cli import SCENE, archord
 
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
@@ -125,3 +127,26 @@ def test_a_broken_run_is_one_sentence(runs, tmp_path, monkeypatch, refused, comm
         file.write_bytes(content.encode() if isinstance(content, str) else whole[:content])
     assert refused([command, "run"]).startswith(said)
     assert not list((tmp_path / "run").glob("*.png"))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("status", 1),
+        ("warnings", "none"),
+        ("warnings", [1]),
+        ("totals", {"cutbacks": "none"}),
+        ("seconds", [1.0]),
+        ("versions", {"archord": None}),
+        ("steps", {}),
+        ("mesh", []),
+        ("peak_memory", ["much"]),
+        ("error_estimates", {"force_balance": []}),
+    ],
+)
+def test_a_report_of_other_types_is_one_sentence(runs, tmp_path, key, value):
+    """It names the key, wherever in it the fault is."""
+    path = shutil.copytree(runs["coarse"], tmp_path / "run") / "run.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    with pytest.raises(InputError, match=rf"run\.json: cannot be read as the report of a run: {key}.*\.$"):
+        Run(path.parent)

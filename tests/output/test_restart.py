@@ -14,6 +14,7 @@ from archord.output.folder import CHECKPOINT, claim_folder, occupied
 from archord.output.history import read_history
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
+from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, parse_scene, resolved
 from tests.output.run_files import accepted_steps, same_run
@@ -210,6 +211,21 @@ def test_a_finished_run_is_left_alone(finished):
     assert plan.finished
     assert "finished" in plan.said
     assert {path: path.read_bytes() for path in finished.rglob("*.*")} == before
+
+
+def test_tables_of_a_finished_run_are_written_again(finished, tmp_path):
+    """A history that lacks steps is no history of the run; --restart makes it and fields.xdmf from the other files."""
+    copy = shutil.copytree(finished, tmp_path / "run")
+    history = (copy / "history.csv").read_bytes()
+    (copy / "history.csv").write_bytes(b"\n".join(history.split(b"\n")[:3]) + b"\n")
+    (copy / "fields.xdmf").write_text("")
+    with pytest.raises(InputError, match=r"history\.csv: has 2 of the 4 steps of run\.json: it was cut short; "):
+        Run(copy)
+    assert plan_restart(copy).said.endswith("is finished: writing history.csv and fields.xdmf again")
+    go_on(None, copy)
+    same_run(finished, copy, 1e-12)
+    assert (copy / "fields.xdmf").read_text() == (finished / "fields.xdmf").read_text()
+    assert plan_restart(copy).finished
 
 
 @pytest.fixture(scope="module")

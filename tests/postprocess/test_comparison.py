@@ -109,3 +109,20 @@ def test_runs_under_a_force_are_compared_by_the_displacement(tmp_path):
     assert "pull force" not in found.values
     np.testing.assert_allclose(found.relative("pull displacement")[1], 0.0, atol=1e-6)
     np.testing.assert_allclose(found.relative("pin in lug largest pressure")[1], 2.0, rtol=1e-6)
+
+
+def test_joints_under_the_same_forces_are_compared_by_the_displacement(tmp_path):
+    """At the forces, step by step, unloading included: twice as stiff a joint goes as deep under twice the force. With
+    one that a displacement loads it is P over delta as ever."""
+    load = {"displacement": None, "relative_force": [0.004, 0.002], "steps": 2}
+    stiff = {"E": 2 * E, "nu": 0.3}
+    scenes = {"soft": paper_joint(0.2, load=load), "pressed": paper_joint(0.2, 8)}
+    scenes["same"] = paper_joint(0.2, load=load, pin=stiff, block=stiff)
+    soft, pressed, same = (Run(folder) for folder in solved(scenes, tmp_path).values())
+    found = compare_runs([soft, same])
+    assert found.step_by_step
+    assert list(found.labels) == ["load", "delta", "p0", "eps"]
+    assert found.labels["load"] == "P/(E* dR)"
+    assert np.abs(found.relative("delta")).max() < 1e-6
+    assert list(compare_runs([soft, pressed]).values) == ["P", "p0", "eps"]
+    assert command(["compare", str(soft.folder), str(same.folder), "-o", str(tmp_path / "x.png")]) == 0

@@ -19,12 +19,13 @@ def test_show_prints_the_run_and_draws_it(runs, tmp_path, capsys):
     target = tmp_path / "new.png"
     assert command(["show", str(runs["plastic"]), "-o", str(target)]) == 0
     printed, run = capsys.readouterr().out, Run(runs["plastic"])
-    rows = {row[0]: row for line in printed.splitlines() if len(row := line.split()) == 12}
+    rows = {row[0]: row for line in printed.splitlines() if len(row := line.split()) == 13}
     for k in range(run.steps):
-        for place, name in ((1, "delta"), (3, "P"), (5, "p0"), (9, "iterations")):
+        for place, name in ((1, "delta"), (3, "P"), (5, "p0"), (9, "contact peeq_max"), (10, "iterations")):
             assert float(rows[str(k + 1)][place]) == pytest.approx(run.columns[name][k], rel=1e-5)
     assert f"P = {max(run.columns['P']):.6g} " in printed
     first = next(k for k, peeq in enumerate(run.columns["peeq_max"]) if peeq > 0)
+    assert f"contact peeq_max = {run.columns['contact peeq_max'][-1]:.6g} at step {run.steps}, x = " in printed
     assert f"plastic strain first at step {first + 1}\n" in printed
     assert printed.endswith(f"\n{target}\n")
     assert matplotlib.image.imread(target).std() > 0.05

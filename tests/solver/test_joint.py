@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.postprocess.run import Run
+from tests.output.run_files import solved as solved_runs
 from tests.solver.parts import partition
 from tests.solver.solving import SEVERAL, E, scene, solve
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "quarter_joint.json").read_text())
+AWAY = {"displacement": [2.0, 0.0], "steps": [2, 1]}
 FRACTIONS = ("0.5", "1.0", "1.5", "2.0")
 
 
@@ -216,3 +219,22 @@ def test_results_do_not_depend_on_the_ranks(cut, variant):
         assert (a.iterations, a.cutbacks) == (b.iterations, b.cutbacks)
         for name in set(vars(a)) - {"work", "force_balance", "seconds"}:
             assert getattr(a, name) == pytest.approx(getattr(b, name), rel=1e-9), name
+
+
+def test_peeq_is_told_by_body_and_near_the_contact(tmp_path):
+    """The largest at the integration points that the files hold, and where: of each body, and within R/2 of the arc up
+    to the largest contact angle so far, also when the pin is gone. The peak at the held corner is no contact."""
+    [folder] = solved_runs({"run": scene(0.1, 3, 0.002, load=AWAY, output={"points": True})}, tmp_path).values()
+    run = Run(folder)
+    for step in (1, 2, 3):
+        points, fields, row = run.points(step), run.fields(step), {k: v[step - 1] for k, v in run.columns.items()}
+        x, peeq = points["coordinates"], points["peeq"]
+        angle, depth = np.arctan2(x[..., 0], -x[..., 1]), np.abs(np.hypot(*np.moveaxis(x, -1, 0)) - 1)
+        places = {name: np.broadcast_to((fields.body == tag)[:, None], peeq.shape) for name, tag in run.bodies.items()}
+        places["contact"] = (angle <= max(run.columns["eps"][:step])) & (depth <= 0.5)
+        for name, inside in places.items():
+            at = np.argmax(np.where(inside, peeq, -1))
+            assert row[f"{name} peeq_max"] == pytest.approx(peeq.flat[at], rel=1e-9)
+            assert (row[f"{name} at x"], row[f"{name} at y"]) == pytest.approx(tuple(x.reshape(-1, 2)[at]), abs=1e-9)
+        assert row["peeq_max"] == max(row["pin peeq_max"], row["block peeq_max"]) > row["contact peeq_max"] > 0
+    assert run.columns["eps"][2] == 0
