@@ -15,6 +15,7 @@ from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
 
 _LOADS_SHOWN = 3
+_LARGE = 50_000  # cells from which every phase before the first step is told
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -67,9 +68,12 @@ class Progress:
         self.silent, self.by_mesh, self.iterations = silent, scene.analysis.accuracy is not None, 0
         self.moving: Any = None
         if not silent and on_terminal():
-            from rich.console import Console
+            from rich.progress import Progress as Moving
+            from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
-            self.moving = Console().status("meshing")
+            self.moving = Moving(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), transient=True)
+            self.moving.add_task("meshing", total=None)
+        self.cells = scene.joint.expected_cells if isinstance(scene, Scene) and not self.by_mesh else 0.0
         self.title, self.columns, last, self.unit = _shown(scene)
         if self.by_mesh:
             self.print(f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value")
@@ -80,8 +84,22 @@ class Progress:
     def show(self, load: float, iterations: int) -> None:
         """Show on a terminal the load that was tried last, and the Newton iterations so far."""
         self.iterations += iterations
+        self.move(f"load {load:.6g}, {self.iterations} Newton iterations")
+
+    def move(self, said: str) -> None:
+        """Show on a terminal what is being done."""
         if self.moving is not None:
-            self.moving.update(f"load {load:.6g}, {self.iterations} Newton iterations")
+            self.moving.update(self.moving.task_ids[0], description=said)
+
+    def phase(self, name: str) -> None:
+        """Show a phase before the first load is tried: on a terminal, or of a large mesh by a line."""
+        about = f" about {float(f'{self.cells:.2g}'):.0f} triangles" if self.cells else ""
+        said = {"mesh": f"meshing{about}", "setup": "setting up"}.get(name)
+        if said is None:
+            return
+        self.move(said)
+        if self.moving is None and self.cells > _LARGE:
+            self.print(f"{said} ...")
 
     def print(self, text: str) -> None:
         """Print a line."""
@@ -147,7 +165,8 @@ def solve_and_report(
         options["on_level"] = report.level
     else:
         options |= {"on_start": report.start, "on_step": report.step}
-        options["timer"] = Timer({"start-up": perf_counter() - begun} if begun is not None else {})
+        seconds = {"start-up": perf_counter() - begun} if begun is not None else {}
+        options["timer"] = Timer(seconds, entered=report.phase)
     try:
         with report.moving or nullcontext():
             outcome = solve_to_accuracy(scene, folder, comm, start=start, **options)

@@ -70,12 +70,20 @@ def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, quiet: bool
 
     from archord.progress import solve_and_report
 
-    comm = MPI.COMM_WORLD
-    scene, outcome = solve_and_report(load, folder, comm, silent=quiet, begun=begun, **options)
+    def doubted() -> AnyScene:
+        """The scene; what is to be doubted of it is told before it is solved."""
+        scene = load()
+        told.extend(scene.doubts)
+        for warning in told:
+            print(f"archord: warning: {warning}.", file=sys.stderr, flush=True)
+        return scene
+
+    comm, told = MPI.COMM_WORLD, list[str]()
+    scene, outcome = solve_and_report(doubted, folder, comm, silent=quiet, begun=begun, **options)
     if outcome.warnings:
         from archord.postprocess.tables import first_of_each_kind
 
-        for warning in first_of_each_kind(outcome.warnings):
+        for warning in first_of_each_kind([warning for warning in outcome.warnings if warning not in told]):
             print(f"archord: warning: {warning}.", file=sys.stderr)
     if comm.rank == 0 and outcome.status != "done":
         print(f"archord: {outcome.message}.", file=sys.stderr)

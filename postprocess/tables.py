@@ -82,7 +82,7 @@ def first_of_each_kind(warnings: list[str]) -> list[str]:
     """Each kind of warning once, at the first step that gave it; kinds differ in more than their numbers."""
     first: dict[str, str] = {}
     for warning in warnings:
-        first.setdefault(re.sub(r"[0-9.e+-]+", "#", warning.partition(": ")[2]), warning)
+        first.setdefault(re.sub(r"[0-9.e+-]+", "#", re.sub(r"^step \d+: ", "", warning)), warning)
     return list(first.values())
 
 

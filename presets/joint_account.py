@@ -119,18 +119,19 @@ class JointAccount:
         return {"mesh": sizes(self.system), "model": {"E_star": self.scene.E_star, "contact_shares": shares}}
 
     def warnings(self) -> list[str]:
-        """A warning if the parabolic facets depart too much from their circles for the clearance.
+        """The scene's doubts, and a warning if the parabolic facets depart too much from their circles for the
+        clearance.
 
         A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``. Equal facets
         that face each other are off alike, which leaves the gap as it is.
         """
         g = self.scene.joint
         if g.size_ratio == 1 and not self.scene.pin.rigid:
-            return []
+            return self.scene.doubts
         longest = max(side.facet_lengths().max() for side in self.system.sides.values())
         off = (1 - np.cos(longest / g.radius / 2)) ** 2 / 8 * g.radius / abs(g.dR)
         said = f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"
-        return [said] if off > _ROUGH else []
+        return [*self.scene.doubts, *([said] if off > _ROUGH else [])]
 
     def step_warnings(self, m: Measures, profiles: Mapping[str, Any], residual: float) -> list[str]:
         """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
@@ -147,7 +148,7 @@ class JointAccount:
                 "the mean displacement of the core, contains by how much it is squashed there; a larger "
                 "load.core_radius would spread the force"
             )
-        if abs(m.delta) > 0.1 * self.scene.joint.radius:
+        if abs(m.delta) > 0.1 * self.scene.joint.radius and not self.scene.doubts:
             said.append("delta exceeds 0.1 R, too much for small-strain theory")
         if residual > 1e-8 and m.contact_area:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from archord.scene.keys import Positive, Section, given, key, require
 
 _WIDEST = 1e6  # block_size over R
+_THINNEST = 0.02  # wall of a ring over R
 _MOST_CELLS = 1e6  # triangles: some 10 GB, and minutes for a mesh generator that is not parallel
 Angle = Annotated[float, Field(gt=0, lt=math.pi / 2)]
 
@@ -23,7 +24,7 @@ class JointGeometry(Section):
     radius: float = key("radius R of the pin", "length", gt=0, example=10.0)
     clearance: float | None = key("dR = hole radius - pin radius; in a ring also negative", "length", other=0.05)
     relative_clearance: float | None = key("dR/R, instead of clearance: 1e-6 to 0.5", default=None, example=0.005)
-    block_size: Positive | None = key("side of the block, radius of the ring; 100 R if absent", "length", other=1000.0)
+    block_size: Positive | None = key("side of the block, outer radius of ring; 100 R if absent", "length", other=1e3)
     element_size: Positive | None = key("edge length of the elements on the arcs, up to 0.5 R", "length", other=0.4)
     relative_element_size: Positive | None = key("element_size/R; 0.04 if both are absent", default=None, example=0.04)
     size_ratio: float = key("element size on the pin's arc over that on the hole's", default=1.0, ge=0.01, le=100)
@@ -43,7 +44,11 @@ class JointGeometry(Section):
         require(1e-4 <= h <= 0.5, name, "must be between 1e-4 and 0.5 times the radius")
         require(1e-4 <= self.size_ratio * h <= 0.5, "size_ratio", "must leave elements of 1e-4 to 0.5 R on the pin")
         require(self.edge_angle is None or not self.is_ring, "edge_angle", "is only for the model block")
-        require(2 * (self.radius + self.dR) <= self.W, "block_size", "must be at least twice the radius of the hole")
+        hole, said = self.radius + self.dR, "must be at least twice the radius of the hole"
+        least = 2 * hole
+        if self.is_ring:
+            least, said = hole + _THINNEST * self.radius, f"must leave a wall of at least {_THINNEST:g} times R"
+        require(least <= self.W * (1 + 1e-9), "block_size", said)
         require(self.W / self.radius <= _WIDEST, "block_size", f"must not exceed {_WIDEST:g} times the radius")
         cells = self.expected_cells
         said = f"with growth = {self.growth:g} makes {cells:.0e} of at most {_MOST_CELLS:.0e} triangles"

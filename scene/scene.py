@@ -18,6 +18,7 @@ from archord.scene.sections import Analysis, Load, Output, Pin, Solid, Stepping,
 FORMAT = 1  # version of the scene format: rises when a scene gets a meaning that an older archord would get wrong
 STEPS = ("stepping.initial", "stepping.maximum")  # what an accuracy chooses of any scene, and of a joint
 CHOSEN = ("joint.element_size", "joint.relative_element_size", "joint.growth", *STEPS)
+_SMALL = 0.1  # displacement over R up to which strains are small
 _SOFTEST = 1e-8  # ratio of the moduli
 _WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
 
@@ -54,6 +55,11 @@ class Checked(Section):
     def thickness(self: Any) -> float:
         """Thickness, 1 if forces are per unit thickness."""
         return self.analysis.thickness or 1.0
+
+    @property
+    def doubts(self) -> list[str]:
+        """What to warn of before anything is solved."""
+        return []
 
     @property
     def plastic(self: Any) -> bool:
@@ -105,6 +111,15 @@ class Scene(Checked):
     def force_controlled(self) -> bool:
         """Whether the load is a force."""
         return self.load.kind in ("force", "relative_force")
+
+    @property
+    def doubts(self) -> list[str]:
+        """What to warn of before anything is solved."""
+        farthest = 0.0 if self.force_controlled else max(map(abs, self.targets)) / self.joint.radius
+        if farthest <= _SMALL:
+            return []
+        said = f"load.{self.load.kind} moves the pin by {farthest:.2g} R: beyond {_SMALL:g} R small-strain theory"
+        return [f"{said} does not hold, and P may fall where it should rise"]
 
     @property
     def load_unit(self) -> float:

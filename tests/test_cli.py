@@ -77,6 +77,7 @@ def test_a_terminal_shows_how_far_a_solve_is(tmp_path, quiet):
             said += read
     assert process.wait() == 0
     assert (b" Newton iterations" in said, b"    4          2  " in said) == (not quiet, not quiet)
+    assert (b"meshing about 2" in said) == (not quiet)
     assert bool(said) == (not quiet)
 
 
@@ -115,6 +116,17 @@ def test_a_run_that_cannot_go_on_exits_with_3(tmp_path):
     assert "no equilibrium at delta" in result.stderr
     assert "4 accepted steps are in runs/steel_pin" in result.stderr
     assert len(read_history(tmp_path / "runs" / "steel_pin" / "history.csv")["P"]) == 4
+
+
+def test_a_load_beyond_small_strains_is_doubted_before_it_is_solved(tmp_path):
+    """Once, and in run.json; other warnings of the kind follow with the steps."""
+    elastic = ["--set", "pin.yield_stress=none", "--set", "block.yield_stress=none", "--set", "joint.growth=1.0"]
+    far = ["--set", "load.displacement=30", "--set", "load.steps=1", "--set", "joint.relative_element_size=0.2"]
+    result = archord("solve", SCENE, *elastic, *far, "-o", "run", cwd=tmp_path)
+    said = "load.displacement moves the pin by 0.15 R: beyond 0.1 R small-strain theory does not hold"
+    assert result.stderr.startswith(f"archord: warning: {said}")
+    assert result.stderr.count("small-strain") == 1
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["warnings"][0].startswith(said)
 
 
 def kill_after(steps: int, command: list[str], kill: int, folder: Path) -> tuple[int, bytes]:

@@ -38,6 +38,7 @@ def basic() -> dict:
         ("joint", "edge_angle", 0.0, "must be greater than 0."),
         ("joint", "element_size", 20.0, "must be between 1e-4 and 0.5 times the radius."),
         ("joint", "block_size", 15.0, "must be at least twice the radius of the hole."),
+        ("joint", "block_size", 10.1, "must be at least twice the radius of the hole."),
         ("joint", "raduis", 1.0, "did you mean radius?"),
         ("block", "nu", 0.5, "scene: block.nu = 0.5 must be at most 0.499999."),
         ("block", "rigid", True, "is not a known key"),
@@ -147,6 +148,24 @@ def test_what_never_ends_or_takes_forever_is_refused(tmp_path):
     (tmp_path / "scene.toml").write_text(resolved(parse_scene(basic())))
     with pytest.raises(InputError, match=r"joint\.radius must be a number"):
         load_scene(tmp_path / "scene.toml", ["joint.radius={" + "a." * 60000 + "b = 1}"])
+
+
+def test_a_ring_may_have_a_thin_wall():
+    """Of 0.02 R and more, where a block needs as much again as its hole."""
+    data = basic() | {"load": {"relative_force": 0.001}}
+    ring = {"model": "ring", "radius": 10.0, "clearance": 0.05}
+    assert parse_scene(data | {"joint": ring | {"block_size": 10.25}}).joint.W == 10.25
+    with pytest.raises(InputError, match=r"joint\.block_size = 10\.2 must leave a wall of at least 0\.02 times R\.$"):
+        parse_scene(data | {"joint": ring | {"block_size": 10.2}})
+
+
+def test_a_displacement_beyond_small_strains_is_doubted():
+    """Above a tenth of the radius; a force tells nothing of how far it moves the pin."""
+    data = basic()
+    assert parse_scene(data | {"load": {"displacement": 20.0}}).doubts == []
+    assert parse_scene(data | {"load": {"relative_force": 0.1}}).doubts == []
+    (said,) = parse_scene(data | {"load": {"displacement": [100.0, 0.0], "steps": 2}}).doubts
+    assert said.startswith("load.displacement moves the pin by 0.5 R: beyond 0.1 R small-strain theory does not hold")
 
 
 def test_overrides_replace_values_and_alternatives(tmp_path):

@@ -68,6 +68,19 @@ def test_an_interference_fit_opens_as_persson_s(load):
     solved(load, steps=4)
 
 
+@pytest.mark.parametrize("wall", [0.3, 0.02])
+def test_a_thin_bushing_is_pressed_as_lame_s(wall):
+    """A ring held at its outer edge, b = 1 + wall, and an oversized pin: their pressure is that of Lame's equations in
+    plane strain, with u = A (r - b^2/r) in the ring and u = -p r/(2 (lambda + mu)) in the pin."""
+    m = solve(persson_joint(-1e4, joint={"block_size": 1 + wall}))
+    solid, b = m.joint.scene.block, 1 + wall
+    mu = solid.E / (2 + 2 * solid.nu)
+    both = 2 * mu / (1 - 2 * solid.nu)  # 2 (lambda + mu)
+    ring, pin = (b**2 - 1) / (both + 2 * mu * b**2), 1 / both
+    for arc in m.profiles[-1].values():
+        np.testing.assert_allclose(arc.facet_force / arc.weight.sum(axis=1), DR / (ring + pin), rtol=5e-3)
+
+
 @pytest.mark.parametrize("bodies", [UNLIKE, UNLIKE[::-1]])
 def test_unlike_bodies_follow_ciavarella_and_decuzzi(bodies):
     """Shear moduli 3 and 1 with Dundurs' beta = 0: the stiffer pin has the smaller angle."""
