@@ -9,7 +9,7 @@ from pathlib import Path
 import archord
 
 project, author, version = "archord", "the authors of archord", archord.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
 exclude_patterns = ["cluster", "figures"]
 html_theme, html_title, html_show_copyright = "furo", f"archord {version}", False
 myst_heading_anchors = 4  # as on GitHub

@@ -28,7 +28,7 @@ from archord.report.files import write_rows
 Part = dict[str, Any]  # columns by heading; a number or a text holds for all rows
 X, Y = "delta/dR", "P/(E* dR)"
 STAGES = (1.25, 1.6, 2.0)  # A, B and C in clearances: just after the paper's first yield, and on to its end
-MARKS = {"strain": "o", "stress": "x"}
+MARKS: dict[str, Part] = {"strain": {"marker": "o", "ms": 6, "mfc": "none"}, "stress": {"marker": "x", "ms": 4}}
 LINES = ("-", ":", "--", "-.")
 LAYOUTS: dict[str, dict] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
@@ -55,23 +55,31 @@ def write(parts: list[Part], folder: Path, name: str) -> list[Path]:
 
     canvas = new_figure(9, 4.5)
     axes = canvas.subplots()
-    colours: dict[tuple, int] = {}
     drawn = [part for part in parts if layout.get("where", {}).items() <= scalars(part).items()]
+    kinds = list(dict.fromkeys(kind_of(part) for part in drawn))
     for part in drawn:
-        named = scalars(part)
-        kind = tuple(value for key, value in named.items() if key != "plane")
-        colour = f"C{colours.setdefault(kind, len(colours))}"
-        label = ", ".join(f"{key} {value}" for key, value in named.items() if key not in layout.get("where", {}))
-        mark = MARKS[part["plane"]]
-        axes.plot(part[layout["x"]], part[layout["y"]], mark, ms=4, color=colour, label=f"ours, {label}")
+        colour = f"C{kinds.index(kind_of(part))}"
+        axes.plot(part[layout["x"]], part[layout["y"]], ls="", color=colour, **MARKS[part["plane"]])
         for line in layout.get("lines", []):
             axes.plot(part[layout["x"]], part[line], "-", lw=1, color=colour)
+    for plane in dict.fromkeys(part["plane"] for part in drawn):
+        axes.plot([], [], ls="", color="black", label=f"ours, plane {plane}", **MARKS[plane])
+    for line in layout.get("lines", []):
+        axes.plot([], [], "-", lw=1, color="C0" if len(kinds) == 1 else "0.5", label=line)
     for law, style in zip(layout.get("laws", []), LINES, strict=False):
         axes.plot(drawn[0][layout["x"]], drawn[0][law], style, lw=1, color="black", label=law)
+    for k, kind in enumerate(kinds if len(kinds) > 1 else []):
+        axes.plot([], [], "s", ms=6, color=f"C{k}", label=kind)
     axes.set(xlabel=layout["x"], ylabel=layout["y"], title=layout["title"])
-    canvas.legend(loc="outside right upper", frameon=False, fontsize=8)
+    canvas.legend(loc="outside right upper", frameon=False)
     axes.grid(alpha=0.3)
     return [table, save(canvas, folder / f"{name}.png")]
+
+
+def kind_of(part: Part) -> str:
+    """What tells a part from others beside its plane, as the legend says it."""
+    named = ((key.split(" [%]"), value) for key, value in scalars(part).items() if key != "plane")
+    return ", ".join(f"{key[0]} = {value}{' %' if key[1:] else ''}" for key, value in named)
 
 
 def law_force(name: str, run: RunCurve, delta: Array | None = None) -> Array:
@@ -196,4 +204,5 @@ def draw_zones(runs: Runs, file: Path) -> Path:
         run = runs.run(MILD_YIELD, plane)
         for stage, axes in zip(STAGES, row, strict=True):
             field_panel(axes, run, int(np.argmin(np.abs(run.curve.delta / run.curve.dR - stage))) + 1)
+            axes.set_title(f"plane {plane}, {axes.get_title()}", fontsize="medium")
     return save(figure, file)

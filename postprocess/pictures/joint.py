@@ -13,7 +13,7 @@ from archord.postprocess.run import Run
 from archord.scene.scene import Scene
 
 _STEPS = 4  # whose pressure is drawn
-_BEFORE: dict[str, Any] = {"color": "0.35", "lw": 0.9, "ls": (0, (4, 3))}
+_BEFORE: dict[str, Any] = {"color": "0.55", "lw": 0.9}
 
 
 def _load(scene: Scene, delta: float) -> str:
@@ -61,7 +61,7 @@ def arc_panel(axes: Any, run: Run) -> None:
 
 
 def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
-    """`draw_cells` at ``step`` (the last) on the deformed joint near the contact, with its outline before (dashed) and
+    """`draw_cells` at ``step`` (the last) on the deformed joint near the contact, with its outline before (grey) and
     after; displacement and clearance are magnified by the factor in the title."""
     scene, fields = run.scene, run.fields(step)
     factor = magnification(scene, fields)

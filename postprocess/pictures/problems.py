@@ -12,6 +12,7 @@ from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
 
 _MAGNIFIED = 0.05  # largest displacement over the size of the bodies, as drawn, where nothing touches
+_ELASTIC = "0.93"  # grey of what has no plastic strain
 _EDGE = np.array([[1.0, 0.0, 0.0], [0.375, 0.75, -0.125], [0.0, 1.0, 0.0], [-0.125, 0.75, 0.375], [0.0, 0.0, 1.0]])
 
 
@@ -31,13 +32,16 @@ def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
 
 
 def draw_cells(axes: Any, run: Run, fields: Fields, x: Array, shown: np.ndarray, ranged: np.ndarray) -> None:
-    """PEEQ, or von Mises stress where nothing has yielded, in the ``shown`` cells ``(m,)`` with the nodes at ``x``; the
-    colours end at the largest of the ``ranged`` ones."""
+    """PEEQ, grey where there is none, or von Mises stress where nothing has yielded, in the ``shown`` cells ``(m,)``
+    with the nodes at ``x``; the colours end at the largest of the ``ranged`` ones."""
+    from matplotlib import colormaps
+
     values, label, cmap = fields.von_mises, f"von Mises stress [{run.scene.units.stress}]", "viridis"
     if fields.peeq is not None and fields.peeq.any():
         values, label, cmap = 100 * fields.peeq, "equivalent plastic strain [%]", "inferno_r"
     triangles, most = fields.triangles[shown], values[ranged].max() or None
-    colours = {"facecolors": np.repeat(values[shown], triangles.shape[1]), "cmap": cmap}
+    coloured = np.repeat(np.where(values > 0, values, np.nan)[shown], triangles.shape[1])
+    colours = {"facecolors": coloured, "cmap": colormaps[cmap].with_extremes(bad=_ELASTIC)}
     drawn = axes.tripcolor(*x.T, triangles.reshape(-1, 3), vmin=0, vmax=most, **colours)
     cut = "max" if values[shown].max() > drawn.norm.vmax else "neither"
     axes.figure.colorbar(drawn, ax=axes, label=label, shrink=0.85, extend=cut)
