@@ -26,6 +26,7 @@ FILES = {
     "law_commands": ("laws", "law", "fit"),
     "benchmark_commands": ("reproduce", "benchmark"),
 }
+SOLVERS = ("mpi4py", "dolfinx", "petsc4py", "basix", "ufl", "gmsh")  # what only solving and meshing need
 COMMANDS = {command: file for file, commands in FILES.items() for command in commands}
 
 
@@ -77,6 +78,14 @@ def _run(arguments: list[str], begun: float) -> int:
         if launcher_rank() == 0:
             print(error if bad else "archord: interrupted.", file=sys.stderr, flush=True)
         return 2 if bad else 130
+    except ModuleNotFoundError as error:
+        name = (error.name or "").partition(".")[0]
+        if name not in SOLVERS:
+            return _fail(error)
+        if launcher_rank() == 0:
+            said = f"needs {name}, which pip install 'archord[solve]' brings"
+            print(f"archord {_command(arguments)}: {said}.", file=sys.stderr, flush=True)
+        return 2
     except Exception as error:
         return _fail(error)
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from archord.geometry.basis import Array
 from archord.kernels.compiled import library, pointer
+from archord.materials.material import Array
 
 Index = npt.NDArray[np.integer]
 

@@ -16,7 +16,6 @@ import numpy as np
 import tomli_w
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.scene.faults import shortened
 from archord.scene.file import (
@@ -37,6 +36,7 @@ Overrides = dict[str, Any]  # values by dotted key, "joint.clearance"
 MOST_CASES = 100_000
 _MOST_SENTENCES = 20
 _DIGITS = 9  # of samples: short numbers that do not depend on the last bit of a machine's logarithm
+_SOLVED_ALIKE_SINCE = "0.1.0"  # the version from which on scenes have the same solution, and sweeps go on
 Factor = tuple[str, list[Overrides]]  # of the product: its source in the sweep file, and its choices
 
 
@@ -277,8 +277,8 @@ def _checked_keys(found: list[Factor]) -> list[str]:
 
 
 def run_name(scene: Scene) -> str:
-    """Twelve hexadecimal digits that stand for the resolved scene and the version of archord."""
-    return hashlib.sha256(f"archord {VERSION}\n{resolved(scene)}".encode()).hexdigest()[:12]
+    """Twelve hexadecimal digits that stand for the resolved scene and how archord solves it."""
+    return hashlib.sha256(f"archord {_SOLVED_ALIKE_SINCE}\n{resolved(scene)}".encode()).hexdigest()[:12]
 
 
 def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:
