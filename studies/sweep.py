@@ -129,12 +129,15 @@ def write_tables(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> 
 def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Row], list[Row]]:
     """Headings and rows of both tables."""
     histories = {run: _history(folder / CASES / run) for run in found}
-    history = next((rows[0] for rows in histories.values() if rows), [])
+    headings = sorted((rows[0] for rows in histories.values() if rows), key=len, reverse=True)
+    history = list(dict.fromkeys(name for names in headings for name in names))  # of all: some bodies cannot yield
     last = [i for i, name in enumerate(history) if name not in _PER_STEP]
     head = ["case", "run", "status", *(heading(key, sweep.cases[0].scene) for key in sweep.keys)]
     steps, cases = [[*head, *history]], [[*head, *_COST, *(history[i] for i in last)]]
     for case in sweep.cases:
-        result, rows = found[case.run], histories[case.run][1:]
+        result, (own, *rows) = found[case.run], histories[case.run] or [[]]
+        named = (dict(zip(own, row, strict=False)) for row in rows)
+        rows = [[values.get(name, "") for name in history] for values in named]
         first = [str(case.number), case.run, result.status, *(shown(case.value(key)) for key in sweep.keys)]
         steps += [[*first, *row] for row in rows]
         report = report_of(of_case(case, folder))

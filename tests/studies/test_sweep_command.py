@@ -48,6 +48,19 @@ def test_tables_are_tidy(solved):
         assert (end["status"], end["message"], end["steps"]) == ("done", "", str(len(own)))
 
 
+def test_cases_with_other_columns_share_a_table(tmp_path):
+    """An elastic joint has none of PEEQ by body: its cells are empty, and every number stands under its heading."""
+    text = '[grid]\nblock.yield_stress = ["none", 0.002]\npin.yield_stress = ["none", 0.002]\n'
+    assert sweep(written(tmp_path, text), "-o", tmp_path / "out", "-q") == 0
+    rows, ends = table(tmp_path / "out" / "sweep.csv"), table(tmp_path / "out" / "cases.csv")
+    for k, (row, end) in enumerate(zip(rows[1::2], ends, strict=True)):
+        own = read_history(tmp_path / "out" / "cases" / row["run"] / "history.csv")
+        values = {heading.split(" [")[0]: value for heading, value in row.items() if heading not in list(row)[:5]}
+        assert {name: float(value) for name, value in values.items() if value} == {n: v[-1] for n, v in own.items()}
+        assert [bool(row[f"{place} peeq_max"]) for place in ("pin", "block", "contact")] == [k % 2 == 1, k > 1, k > 0]
+        assert end["contact peeq_max"] == row["contact peeq_max"]
+
+
 def test_what_is_solved_is_not_solved_again(solved, tmp_path, capsys):
     """By the same file, by one with another design, and by the folder itself."""
     before = times(solved / "out")
