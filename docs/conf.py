@@ -15,7 +15,8 @@ html_theme, html_title, html_show_copyright = "furo", f"archord {version}", Fals
 myst_heading_anchors = 4  # as on GitHub
 default_role = "code"
 autodoc_default_options = {"members": True, "member-order": "bysource", "exclude-members": "model_config"}
-autodoc_typehints = "signature"
+autodoc_typehints = "none"  # docstrings tell shapes and units; types are in the source
+maximum_signature_line_length, smartquotes = 100, False
 # What solves is documented without being installed, too.
 autodoc_mock_imports = [
     name for name in ("dolfinx", "petsc4py", "mpi4py", "gmsh", "basix", "ufl") if importlib.util.find_spec(name) is None

@@ -45,14 +45,14 @@ def reference() -> str:
         "Printed by `archord scene --reference`. Units are the scene's own: any consistent set. A scene may begin with "
         f"the version of its format, `format = {JOINT_FORMAT}`, of a general scene `format = {FORMAT}`, and what is "
         "written by archord does so. A scene of a newer version is refused.\n",
-        "# Joints\n",
+        "## Joints\n",
         "A scene with the section `[joint]` is one of a pin in a hole.\n",
         *_tables(_JOINT, {}),
-        "# General scenes\n",
+        "## General scenes\n",
         "A scene with the section `[mesh]` is a general one, of any bodies on any mesh. The sections units, stepping "
         "and output are those of joints. Headings in double brackets may stand any number of times.\n",
         *_tables(_GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}),
-        "# Presets\n",
+        "## Presets\n",
         "A scene with `[lug]` (and `[plate]`) or `[bushing]` (and `[[sleeve]]`, `[housing]`) stands for a general one, "
         "which `archord scene --expand` prints. The section pin is that of joints, plate, sleeves and housing have "
         "materials like it, and the other sections are those of general scenes.\n",
@@ -73,7 +73,7 @@ def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
                 table.add(f"`{name}`", schema["unit"], default, _allowed(schema), key.description)
         if table.rows:
             said = f"{info.description[0].upper()}{info.description[1:]}{', also' if known else ''}.\n"
-            yield from (f"## {_heading(section, info)}\n", said, table.markdown())
+            yield from (f"### {_heading(section, info)}\n", said, table.markdown())
 
 
 def _heading(section: str, info: Any) -> str:
