@@ -84,4 +84,5 @@ def load_panel(axes: Any, run: Run) -> None:
         axes.plot([0, *run.columns[q]], [0, *run.columns[force]], ".-", ms=5, label=label)
     axes.set(xlabel="displacement", ylabel="force", title="loads")
     axes.legend(frameon=False)
+    axes.locator_params("x", nbins=6)
     axes.grid(alpha=0.3)
