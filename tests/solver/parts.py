@@ -14,10 +14,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.curve import RigidCircle
-from archord.geometry.meshes.fenicsx import create_vector, gmsh_to_mesh
+from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.pin_in_block import quarter_joint
+from archord.kernels.compat import ghosted_vector
 from archord.materials.elasticity import Elastic
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
@@ -81,7 +82,7 @@ def internal_force(bulk: Bulk, u: np.ndarray) -> np.ndarray:
     """Internal force ``(n_owned, 2)`` of the bulk at the nodal displacements ``u`` ``(n, 2)``."""
     function = fem.Function(bulk.V)
     function.x.array[:] = u.ravel()
-    force = create_vector(bulk.V.dofmap.index_map, 2)
+    force = ghosted_vector(bulk.V.dofmap.index_map, 2)
     with force.localForm() as local:
         local.set(0.0)
     bulk.update(u)
