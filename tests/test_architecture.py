@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+import tomllib
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -139,6 +140,33 @@ def test_every_folder_with_code_is_a_room():
     assert {link.name for link in (ROOT / "archord").iterdir() if link.is_symlink()} == {
         r for r in rooms if "." not in r
     }
+
+
+def test_every_file_that_names_the_version_names_the_same():
+    said = {
+        "report/version.py": r'VERSION = "(.*)"',
+        "pyproject.toml": r'^version = "(.*)"',
+        "CITATION.cff": r"^version: (.*)",
+        "conda/recipe.yaml": r'^  version: "(.*)"',
+        "CHANGELOG.md": r"^## (.*)",
+    }
+    found = {file: re.search(regex, (ROOT / file).read_text(encoding="utf-8"), re.M) for file, regex in said.items()}
+    assert len({match and match[1] for match in found.values()}) == 1, found
+
+
+def test_the_requirements_name_all_that_is_imported():
+    """petsc4py comes with dolfinx, which PyPI, conda and Debian call differently."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    named = {re.split(r"[^\w-]", word)[0].removeprefix("fenics-").replace("-", "_")
+             for word in [*project["dependencies"], *extras["solve"]]}  # fmt: skip
+    rooms = [room for room in ROOMS if not room.startswith("benchmarks")]  # peers have environments of their own
+    trees = [ast.parse(file.read_text(encoding="utf-8")) for room in rooms for file in files_of(room)]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    names = [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
+    names += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    used = {name.partition(".")[0] for name in names} - sys.stdlib_module_names - {"archord"}
+    assert used - named == {"dolfinx", "dolfinx_solver", "petsc4py"}
 
 
 def test_an_installation_has_all_data_and_tells_type_checkers_that_archord_is_typed(tmp_path):

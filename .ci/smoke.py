@@ -1,0 +1,19 @@
+"""Two scenes, solved by the archord that is installed: forces at their last step, to the digits of every other place.
+
+``[mpirun -n 2] python3 .ci/smoke.py FOLDER`` solves into a new folder.
+"""
+
+import sys
+from pathlib import Path
+
+import archord
+
+EXPECTED = {"steel_pin": ("P", 7721.90159721), "lug": ("pull force", 5569.73977299)}
+SCENES = Path(__file__).parents[1] / "scenes"
+
+for name, (column, value) in EXPECTED.items():
+    run = archord.solve(archord.load_scene(SCENES / f"{name}.toml"), Path(sys.argv[1]) / name)
+    found, versions = float(run.columns[column][-1]), run.summary["versions"]
+    if abs(found / value - 1) > 1e-9:
+        sys.exit(f"{name}: {column} is {found}, and {value} elsewhere ({versions})")
+    print(f"{name}: {column} = {found}, with dolfinx {versions['dolfinx']} and PETSc {versions['petsc']}")
