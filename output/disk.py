@@ -8,6 +8,8 @@ composed in memory, and what goes wrong on disk is an `OSError` that names the f
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -20,17 +22,27 @@ def new_name(path: Path) -> Path:
     return path.with_name(path.name + ".new")
 
 
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """An `OSError` of what is done to ``path`` names it."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+
+
 def replace_file(path: Path, content: bytes | str, *, durable: bool = False) -> None:
     """Put a file with ``content`` in the place of ``path``, in one move; if ``durable``, also a power cut then leaves
     it. Raises `OSError` naming ``path``, which then is what it was."""
     new = new_name(path)
     try:
-        with new.open("wb") as file:
-            file.write(content.encode() if isinstance(content, str) else content)
-            if durable:
-                file.flush()
-                os.fsync(file.fileno())
-        new.replace(path)
-    except OSError as error:
+        with naming(path):
+            with new.open("wb") as file:
+                file.write(content.encode() if isinstance(content, str) else content)
+                if durable:
+                    file.flush()
+                    os.fsync(file.fileno())
+            new.replace(path)
+    except OSError:
         new.unlink(missing_ok=True)
-        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+        raise

@@ -1,36 +1,38 @@
-"""fields.xdmf and fields.h5: the fields of all bodies over the steps, for ParaView and pyvista.
+"""fields.vtkhdf, fields.xdmf and fields.h5: the fields of all bodies over the steps, for ParaView and pyvista.
 
-Displacements are nodal on curved second-order cells, whatever the degree of the elements; so are the components of
-stress and plastic strain, and "peeq_nodal", by superconvergent patch recovery. Stress measures, PEEQ and the contact
-are means over cells. The arrays are in the order of the mesh generator, whatever the number of ranks.
+Displacements are nodal; so are the components of stress and plastic strain, and PEEQ, by superconvergent patch
+recovery. Stress measures, PEEQ and the contact are means over cells. XDMF and fields.h5 have curved second-order cells,
+whatever the degree of the elements. The arrays are in the order of the mesh generator, whatever the number of ranks.
 """
 
 from __future__ import annotations
 
+from operator import add
 from pathlib import Path
 
-import basix
 import numpy as np
 
-from archord.geometry.basis import TRIANGLE, Array, cell_kind, tabulate
-from archord.geometry.curve import lagrange
-from archord.geometry.meshes.plane_mesh import distinct_edges
+from archord.geometry.basis import Array
+from archord.geometry.meshes.second_order import SecondOrder
 from archord.geometry.patch_recovery import PatchRecovery
 from archord.materials.material import COMPONENTS
 from archord.output.disk import replace_file
 from archord.output.step_file import StepFile, step_name
+from archord.output.vtk_grid import BodyGrid
+from archord.output.vtkhdf import VtkHdf, times
+from archord.solver.contact.pair import Pair
 from archord.solver.mesh_order import Arrays, MeshOrder
 
 # By nodes: XDMF's name of second-order cells, and VTK's order of nodes, which counts both corners and edges all around
 _IN_FILES = {6: ("Triangle_6", [0, 1, 2, 5, 3, 4]), 9: ("Quadrilateral_9", [0, 1, 3, 2, 4, 6, 7, 5, 8])}
-_NODAL = (*(f"{name}_{c}" for name in ("stress", "plastic_strain") for c in COMPONENTS), "peeq_nodal")
 
 
 def collect_mesh(order: MeshOrder, at_points: bool = True) -> Arrays:
     """What does not change: "mesh/body" ``(m,)`` of the cells; "edges/NAME" ``(k, 2)`` of every named set of facets,
-    their vertices as nodes of the mesh; and "points/coordinates" ``(m, q, 2)`` of the integration points. On rank 0,
-    nothing elsewhere. Collective."""
-    found = {"mesh/body": order.bodies()} | {f"edges/{name}": ends for name, ends in order.facet_sets().items()}
+    their vertices as nodes of the mesh; "facets/nodes", the `MeshOrder.contact_facets`; and "points/coordinates"
+    ``(m, q, 2)`` of the integration points. On rank 0, nothing elsewhere. Collective."""
+    found = {"mesh/body": order.bodies(), "facets/nodes": order.contact_facets()}
+    found |= {f"edges/{name}": ends for name, ends in order.facet_sets().items()}
     if at_points:
         parts = order.system.bulk.at_points(order.system.equilibrium.displacement())
         found["points/coordinates"] = order.at_points("coordinates", parts)
@@ -38,9 +40,10 @@ def collect_mesh(order: MeshOrder, at_points: bool = True) -> Arrays:
 
 
 def collect_fields(order: MeshOrder, at_points: bool = True) -> Arrays:
-    """Displacements of the nodes ``(n, 2)`` and values ``(m,)`` of the cells at the last accepted state, by name: of
-    the whole mesh on rank 0, nothing elsewhere. With ``at_points`` also "points/stress" ``(m, q, 4)`` of integration
-    points and, where a body can yield, "points/plastic_strain" and "points/peeq" ``(m, q)``. Collective."""
+    """Displacements of the nodes ``(n, 2)`` and means of the cells ``(m,)`` at the last accepted state, by name: of the
+    whole mesh on rank 0, nothing elsewhere. Of tensors they are "cells/NAME" ``(m, 4)``; "facets/pressure" ``(k, a,
+    2)`` are force and length of the nodes of contact facets. With ``at_points`` also "points/stress" ``(m, q, 4)`` of
+    integration points and, where a body can yield, "points/plastic_strain" and "points/peeq" ``(m, q)``. Collective."""
     system = order.system
     u = system.equilibrium.displacement()
     parts = list(system.bulk.at_points(u))
@@ -52,29 +55,41 @@ def collect_fields(order: MeshOrder, at_points: bool = True) -> Arrays:
             np.add.at(whole, cells, of_points.sum(axis=1))
     width[width == 0] = 1.0
     values |= {"contact_state": share / width, "contact_pressure": pressure / width}
-    found = {"displacement": order.collect(u)} | {name: order.cells(value) for name, value in values.items()}
+    found = {"displacement": order.collect(u), "facets/pressure": order.on_facets(_force_and_length)}
+    found |= {name if v.ndim == 1 else f"cells/{name}": order.cells(v) for name, v in values.items()}
     names = ("stress", *(("plastic_strain", "peeq") if system.bulk.plastic else ())) if at_points else ()
     return found | {f"points/{name}": order.at_points(name, parts) for name in names}
 
 
+def _force_and_length(pair: Pair) -> Array:
+    weights = pair.surface.weight * np.stack([pair.pressure, np.ones_like(pair.pressure)])
+    return np.einsum("knq,nqa->nak", weights, pair.surface.trace_shape)
+
+
 class FieldWriter:
-    """Writes ``folder``/fields.xdmf and .h5 (see `StepFile`) on rank 0; goes on ``after`` some steps that are there.
+    """Writes ``folder``/fields.vtkhdf (`VtkHdf`), .h5 (`StepFile`) and .xdmf on rank 0, with room for ``total`` steps;
+    goes on ``after`` some that are there. Runs of older versions have no fields.vtkhdf, and get none.
 
     ``mesh`` is what `collect_mesh` returned; the integration points, if it has them, give nodal fields, and are
-    themselves kept with ``points``. Times are the steps' loads, or with ``numbered`` their numbers. Raises `OSError`,
-    and `InputError` if the files that should go on are not this run's.
+    themselves kept with ``points``. Raises `OSError`, and `InputError` if the files that should go on are not this
+    run's.
     """
 
     def __init__(
-        self, folder: Path, order: MeshOrder, mesh: Arrays, after: int, numbered: bool, points: bool = False
+        self, folder: Path, order: MeshOrder, mesh: Arrays, total: int, after: int = 0, *, points: bool = False
     ) -> None:
-        self.path, self._numbered, self._points = folder / "fields.xdmf", numbered, points
+        self.path, self._points = folder / "fields.xdmf", points
         nodes, self._recovery = SecondOrder(order.nodes_of_cell), None
         self._nodes, x = nodes, nodes(order.coordinates)
         self._topology, vtk = _IN_FILES[nodes.cells.shape[1]]
         cells = nodes.cells[:, vtk]
         self._sizes, self._grids = (len(x), *cells.shape), list[str]()
+        shown, self._vtk = BodyGrid(order, mesh, nodes.cells, points), None
+        if after == 0 or (folder / "fields.vtkhdf").exists():
+            self._vtk = VtkHdf(folder / "fields.vtkhdf", shown.grid, total, after)
+        self._vtk_values = shown.values
         fixed = {name: nodes.along(values) if name.startswith("edges/") else values for name, values in mesh.items()}
+        del fixed["facets/nodes"]
         if "points/coordinates" in mesh:
             places, degree = mesh["points/coordinates"], order.system.problem.degree
             self._recovery = PatchRecovery(x[:, :2], cells[:, : nodes.corners], nodes.between, places, degree)
@@ -85,32 +100,48 @@ class FieldWriter:
 
     def write(self, load: float, fields: Arrays) -> None:
         """Add a step, reached at ``load``, with what `collect_fields` returned. Raises `OSError`."""
-        displacement = np.pad(self._nodes(fields["displacement"]), ((0, 0), (0, 1)))
-        at_points = {name: values for name, values in fields.items() if name.startswith("points/")}
-        cells = {name: values for name, values in fields.items() if name not in at_points and name != "displacement"}
-        nodal = self._recovered(at_points)
-        arrays = cells | nodal | {"displacement": displacement} | (at_points if self._points else {})
-        self._file.write(load, arrays)
-        for step in range(len(self._grids), len(self._file.loads)):
-            there, time = self._file.names[step], step + 1 if self._numbered else self._file.loads[step]
-            shown = ([name for name in names if name in there] for names in (nodal, cells))
-            self._grids.append(self._grid(step + 1, float(time), *shown))
+        nodal = self._recovered({name: values for name, values in fields.items() if name.startswith("points/")})
+        cells = {name: values for name, values in fields.items() if "/" not in name and name != "displacement"}
+        kept = {name: values for name, values in fields.items() if self._points and name.startswith("points/")}
+        of_nodes = {
+            f"{name}_{c}": v[:, k] for name, v in nodal.items() if v.ndim == 2 for k, c in enumerate(COMPONENTS)
+        }
+        of_nodes |= {"peeq_nodal": nodal["peeq"]} if "peeq" in nodal else {}
+        displacement = {"displacement": np.pad(self._nodes(fields["displacement"]), ((0, 0), (0, 1)))}
+        self._file.write(load, cells | of_nodes | displacement | kept)
+        now = times(self._file.loads)
+        if self._vtk:
+            self._vtk.write(now, self._vtk_values(fields, nodal))
+        for step in range(len(self._grids), len(now)):
+            there = self._file.names[step]
+            self._grids.append(self._grid(step + 1, *([n for n in names if n in there] for names in (of_nodes, cells))))
         head = '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
         collection = '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
-        replace_file(self.path, head + collection + "".join(self._grids) + "</Grid>\n</Domain>\n</Xdmf>\n")
+        begun = [
+            f'<Grid Name="step {k}" GridType="Uniform">\n<Time Value="{time!r}"/>\n' for k, time in enumerate(now, 1)
+        ]
+        grids = "".join(map(add, begun, self._grids))
+        replace_file(self.path, f"{head}{collection}{grids}</Grid>\n</Domain>\n</Xdmf>\n")
+
+    def end(self) -> None:
+        """Give up the room of steps that never came."""
+        if self._vtk:
+            self._vtk.end()
 
     def _recovered(self, at_points: Arrays) -> Arrays:
-        """Nodal fields by name from values ``(m, q, ...)`` at the integration points."""
+        """Nodal "stress" and "plastic_strain" ``(n, 4)`` and "peeq" ``(n,)`` from values ``(m, q, ...)`` at the
+        integration points."""
         if self._recovery is None:
             return {}
         values = list(at_points.values())
         whole = self._recovery(np.concatenate([v.reshape(*v.shape[:2], -1) for v in values], axis=2))
-        nodal = dict(zip(_NODAL, whole.T, strict=False))
-        if "peeq_nodal" in nodal:
-            nodal["peeq_nodal"] = np.maximum(nodal["peeq_nodal"], 0.0)  # the polynomials swing below where none yields
+        names = [name.removeprefix("points/") for name in at_points]
+        nodal = dict(zip(names, np.split(whole, [4, 8], axis=1), strict=False))
+        if "peeq" in nodal:
+            nodal["peeq"] = np.maximum(nodal["peeq"][:, 0], 0.0)  # the polynomials swing below where none yields
         return nodal
 
-    def _grid(self, step: int, time: float, of_nodes: list[str], of_cells: list[str]) -> str:
+    def _grid(self, step: int, of_nodes: list[str], of_cells: list[str]) -> str:
         n_nodes, n_cells, of_cell = self._sizes
         nodal, body = _data(f"{n_nodes} 3", step, "displacement"), _data(f"{n_cells}", 0, "mesh/body", "Int", 4)
         cells = _data(f"{n_cells} {of_cell}", 0, "mesh/cells", "Int")
@@ -118,7 +149,6 @@ class FieldWriter:
         shown += [(name, "Scalar", "Node", _data(f"{n_nodes}", step, name)) for name in of_nodes]
         shown += [(name, "Scalar", "Cell", _data(f"{n_cells}", step, name)) for name in of_cells]
         lines = [
-            f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>',
             f'<Topology TopologyType="{self._topology}" NumberOfElements="{n_cells}">{cells}</Topology>',
             f'<Geometry GeometryType="XYZ">{_data(f"{n_nodes} 3", 0, "mesh/coordinates")}</Geometry>',
         ]
@@ -130,45 +160,3 @@ class FieldWriter:
 def _data(shape: str, step: int, name: str, kind: str = "Float", precision: int = 8) -> str:
     attributes = f'Dimensions="{shape}" NumberType="{kind}" Precision="{precision}" Format="HDF"'
     return f"<DataItem {attributes}>fields/{step_name(step)}.h5:/{name}</DataItem>"
-
-
-class SecondOrder:
-    """Second-order cells, the highest that XDMF and its readers know, in the place of cells with nodes
-    ``nodes_of_cell`` ``(n, a)``.
-
-    ``cells`` ``(n, 6)`` or ``(n, 9)`` are their nodes: ``corners`` vertices, then the middles of the edges, and of
-    quadrilaterals, in basix' order. The nodes behind the vertices lie between those of ``between``.
-    """
-
-    def __init__(self, nodes_of_cell: np.ndarray) -> None:
-        kind, degree = cell_kind(nodes_of_cell.shape[1])
-        n, k = len(nodes_of_cell), len(basix.topology(kind)[0])  # as many vertices as edges
-        self._vertices, index = np.unique(nodes_of_cell[:, :k], return_inverse=True)
-        inner = np.split(nodes_of_cell[:, k : k * degree], k, axis=1)  # nodes within the edges
-        ends = [nodes_of_cell[:, edge] for edge in basix.topology(kind)[1]]
-        edges = np.concatenate([np.hstack(pair) for pair in zip(ends, inner, strict=True)])
-        first, of_edge = distinct_edges(edges[:, :2])
-        self._edges, before = edges[first], len(self._vertices)
-        self.cells = np.hstack([index.reshape(-1, k), before + of_edge.reshape(k, -1).T])
-        self._whole = nodes_of_cell[: 0 if kind == TRIANGLE else n]  # of cells with a middle
-        if len(self._whole):
-            self.cells = np.column_stack([self.cells, before + len(first) + np.arange(n)])
-        self._at_middle = tabulate(kind, degree, np.array([[0.5, 0.5]]))[0, 0]
-        self.corners, within = k, np.searchsorted(self._vertices, self._whole[:, :k])
-        self.between = [np.searchsorted(self._vertices, self._edges[:, :2]), within]
-        weights = lagrange(degree) @ 0.5 ** np.arange(degree + 1)  # of equispaced nodes, at the middle
-        self._weights = weights[[0, degree, *range(1, degree)]]
-
-    def __call__(self, values: Array) -> Array:
-        """Values ``(m, k)`` at the nodes of the second-order cells, from those at the nodes of the cells."""
-        middles = np.einsum("a,eak->ek", self._weights, values[self._edges])
-        within = np.einsum("a,nak->nk", self._at_middle, values[self._whole])
-        return np.concatenate([values[self._vertices], middles, within])
-
-    def along(self, ends: np.ndarray) -> np.ndarray:
-        """Nodes ``(k, 3)`` of edges with the vertices ``ends`` ``(k, 2)``: the first one, the middle, the last one."""
-        n, vertices = len(self._vertices), np.searchsorted(self._vertices, ends)
-        numbers, wanted = (np.sort(pair, axis=1) @ [n, 1] for pair in (self.between[0], vertices))
-        order = np.argsort(numbers)
-        middle = n + order[np.searchsorted(numbers, wanted, sorter=order)]
-        return np.column_stack([vertices[:, 0], middle, vertices[:, 1]])

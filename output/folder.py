@@ -13,7 +13,7 @@ from typing import Any
 from archord.output.disk import new_name
 from archord.scene.errors import InputError
 
-FILES = ("scene.toml", "history.csv", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
+FILES = ("scene.toml", "history.csv", "fields.vtkhdf", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
 APART = "fields"  # the folder of the files that fields.h5 has links to
 CHECKPOINT = "checkpoint.h5"
 PICTURE = "picture.png"  # drawn later, from the others

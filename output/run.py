@@ -1,4 +1,4 @@
-"""A scene solved into a run folder: scene.toml, history.csv, fields.xdmf/.h5, contact.h5, checkpoint.h5, run.json."""
+"""A scene solved into a run folder: scene, history, fields for ParaView, contact, checkpoint, run.json."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from archord.kernels.stale_jit import without_stale_forms
 from archord.output.checkpoint import halt, resume
 from archord.output.checkpoint import write as write_checkpoint
 from archord.output.disk import WriteError, replace_file
@@ -20,7 +21,6 @@ from archord.output.history import write_history
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
-from archord.output.stale_jit import without_stale_forms
 from archord.output.step_file import StepFile
 from archord.presets.account import Account, account_of
 from archord.presets.edge import EdgeProfile
@@ -127,7 +127,7 @@ class _Output:
         self._scene, self._last = resolved(account.scene), perf_counter()
         self.steps: list[Any] = comm.bcast(start.done if start else [])
         asked = account.scene.output
-        self._at_points = asked.stress or asked.points
+        self._at_points = asked.fields in ("nodes", "points")
         with self.system.timer("output"):
             self._order = MeshOrder(self.system)
             if asked.fields:
@@ -183,8 +183,9 @@ class _Output:
             def write() -> None:
                 if scene.output.fields:
                     if not self._fields:
-                        how = after, scene.steps_numbered, scene.output.points
-                        self._fields = self._of_fields.FieldWriter(self.folder, self._order, self._mesh, *how)
+                        where, total = (self.folder, self._order, self._mesh), len(scene.targets)
+                        points = scene.output.fields == "points"
+                        self._fields = self._of_fields.FieldWriter(*where, total, after, points=points)
                     self._fields.write(m.at, fields)
                 if not self._contact:
                     self._contact = StepFile(self.folder / "contact.h5", _arrays(profiles, account.fixed), after)
@@ -198,6 +199,8 @@ class _Output:
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
         """Note how the run ended, with ``warnings`` beside those of the steps; returns all on rank 0. Collective."""
         ending["peak_memory"] = self.system.comm.gather(peak_memory())
+        if self._fields:
+            self._fields.end()
         found = self._on_root(lambda: self._report.finish(warnings, **ending))
         return found if self.system.comm.rank == 0 else []
 

@@ -17,6 +17,7 @@ from archord.materials.material import COMPONENTS, Array
 from archord.output.step_file import all_arrays, step_name
 from archord.postprocess.arc import opened
 from archord.scene.errors import InputError
+from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
 
 BODIES = {"pin": 1, "block": 2}
@@ -38,8 +39,8 @@ class Fields:
 
     ``cells`` has VTK's order: corners, then the nodes between the first two, the next two, ..., and the last and the
     first, and that in the middle of four corners. Stress is positive in tension, contact pressure in compression; PEEQ
-    and plastic strain are None where no body can yield, and all that is recovered at nodes where `output.stress` is
-    off. All in the scene's units.
+    and plastic strain are None where no body can yield, and all that is recovered at nodes where `output.fields` is
+    "cells". All in the scene's units.
     """
 
     step: int
@@ -114,7 +115,7 @@ def read_fields(folder: str | Path, scene: Scene, step: int, bodies: Mapping[str
     Raises `InputError` if the run wrote none, or the file is missing, damaged or does not hold the step.
     """
     at = step_name(step)
-    _require(scene.output.fields, folder, "fields", "fields")
+    _require(bool(scene.output.fields), folder, scene, "fields")
     with opened(folder, "fields", step) as file:
         mesh = file["mesh"]
         found: dict[str, Any] = {name: file[f"{name}/{at}"][()] if name in file else None for name in CELL_FIELDS}
@@ -130,18 +131,19 @@ def read_fields(folder: str | Path, scene: Scene, step: int, bodies: Mapping[str
 
 
 def read_points(folder: str | Path, scene: Scene, step: int) -> dict[str, Array]:
-    """What `output.points` writes at ``step``: "coordinates" ``(m, q, 2)`` of the integration points, "stress"
-    ``(m, q, 4)`` and, where a body can yield, "plastic_strain" and "peeq" ``(m, q)``. Raises `InputError`."""
-    _require(scene.output.fields, folder, "fields", "fields")
-    _require(scene.output.points, folder, "integration points", "points")
+    """What ``output.fields = "points"`` writes at ``step``: "coordinates" ``(m, q, 2)`` of the integration points,
+    "stress" ``(m, q, 4)`` and, where a body can yield, "plastic_strain" and "peeq" ``(m, q)``. Raises `InputError`."""
+    _require(scene.output.fields == "points", folder, scene, "integration points")
     with opened(folder, "fields", step) as file:
         points, at = file["points"], step_name(step)
         return {name: points[name if name == "coordinates" else f"{name}/{at}"][()] for name in points}
 
 
-def _require(written: bool, folder: str | Path, what: str, key: str) -> None:
+def _require(written: bool, folder: str | Path, scene: Scene, what: str) -> None:
     if not written:
-        raise InputError(f"{folder}: has no {what}: it was solved with output.{key} = false.")
+        raise InputError(
+            f"{folder}: has no {what}: it was solved with output.fields = {toml_value(scene.output.fields)}."
+        )
 
 
 def magnification(scene: Scene, fields: Fields) -> float:

@@ -151,7 +151,7 @@ def _nodal(run: Run, fields: Fields, quantity: str, nodes: Any = ..., **more: Ar
     known = fields.nodal_fields() | {"ux": fields.displacement[:, 0], "uy": fields.displacement[:, 1]}
     known = {name: values[nodes] for name, values in known.items()} | more
     if quantity not in known:
-        why = "" if run.scene.output.stress else " (the run was solved with output.stress = false)"
+        why = "" if fields.stress is not None else ' (the run was solved with output.fields = "cells")'
         raise InputError(f"{run.folder}: has no {quantity!r} there, but {', '.join(known)}{why}.")
     return known[quantity]
 

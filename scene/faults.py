@@ -75,6 +75,7 @@ def _sentence(error: Any, data: dict[str, Any], model: type[Section], source: st
         context |= _known_keys(model, error["loc"])
         kind = "string_too_short" if context.get("min_length") == 1 else error["type"]
         said = _PHRASES.get(kind, "{msg}").format(**context, msg=error["msg"], name=key)
+        said = said.replace("must be False", "must be false")
     where = next((by for name, by in origin.items() if f"{name}.".startswith(f"{key}.")), source)
     shown = "" if value is None or isinstance(value, dict) or where != source else f" = {shortened(toml_value(value))}"
     entry = f": entry {place[-1] + 1}" if len(place) > 2 and isinstance(place[-1], int) else ""

@@ -108,11 +108,6 @@ class ProblemScene(Checked):
         return [[float(v) for v in row] for row in np.column_stack([self.targets, *table])]
 
     @property
-    def steps_numbered(self) -> bool:
-        """Whether results name steps by number: no, by the load factor."""
-        return False
-
-    @property
     def accurate(self) -> str:
         """Name of what an accuracy is asked of."""
         load = self.load[-1]  # that of its two columns which it does not prescribe

@@ -135,11 +135,6 @@ class Scene(Checked):
         return [b if k == n else a + (b - a) * k / n for (a, b), n in stages for k in range(1, n + 1)]
 
     @property
-    def steps_numbered(self) -> bool:
-        """Whether results name steps by number, as the displacement does not grow or is not known before."""
-        return self.force_controlled or not all(a < b for a, b in pairwise([0.0, *self.targets]))
-
-    @property
     def travelled(self) -> list[list[float]]:
         """The load at every output step: what two scenes share as far as they agree."""
         return [[target] for target in self.targets]

@@ -228,12 +228,28 @@ class Stepping(Section):
 class Output(Section):
     """What a run writes besides its curves."""
 
-    fields: bool = key("write the fields of every step to fields.xdmf and fields.h5", default=True)
-    stress: bool = key("write stress and plastic strain at the nodes with the fields", default=False)
-    points: bool = key("write stress and plastic strain at the integration points with the fields", default=False)
+    fields: Literal[False, "cells", "nodes", "points"] = key(
+        "write the fields of every step to fields.vtkhdf, fields.xdmf and fields.h5: of stress and plastic strain the "
+        "means of cells, or also values at the nodes, or also those at the integration points; true is the default",
+        default="cells",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _level(cls, data: Any) -> Any:
+        """True is the default; scenes of older versions have the keys stress (at the nodes) and points."""
+        if not isinstance(data, dict) or not isinstance(data.get("fields", True), bool):
+            return data
+        default = cls.model_fields["fields"].default
+        old = {name: data[name] for name in ("stress", "points") if isinstance(data.get(name), bool)}
+        level = "nodes" if old.get("stress", default == "nodes") else "cells"
+        found = "points" if old.get("points") else level
+        return {k: v for k, v in data.items() if k not in old} | {"fields": data.get("fields", True) and found}
 
 
 class ProblemOutput(Output):
     """What a run of a general scene writes."""
 
-    stress: bool = key("write stress and plastic strain at the nodes with the fields", default=True)
+    fields: Literal[False, "cells", "nodes", "points"] = key(
+        str(Output.model_fields["fields"].description), default="nodes"
+    )

@@ -236,11 +236,21 @@ class Bulk:
             yield PointFields(cells, body.point, body.weight, body.stress.reshape(shape), plastic_strain, peeq)
 
     def cell_fields(self, parts: Iterable[PointFields]) -> dict[str, Array]:
-        """Cell means ``(n_cells,)`` of `at_points`: "von_mises", "mean_stress" and, where a body can yield, "peeq"."""
-        names = ("von_mises", "mean_stress", *(["peeq"] if self.plastic else []))
-        fields = {name: np.zeros(self.V.mesh.topology.index_map(2).size_local) for name in names}
+        """Cell means of `at_points`: "von_mises" and "mean_stress" ``(n_cells,)``, "stress" ``(n_cells, 4)``; where a
+        body can yield "peeq" and "plastic_strain"."""
+        fields: dict[str, Array] = {}
         for part in parts:
-            values = {"von_mises": von_mises(part.stress), "mean_stress": mean_stress(part.stress), "peeq": part.peeq}
-            for name, whole in fields.items():
-                whole[part.cells] = (part.weight * values[name]).sum(axis=1) / part.weight.sum(axis=1)
+            values = {
+                "von_mises": von_mises(part.stress),
+                "mean_stress": mean_stress(part.stress),
+                "stress": part.stress,
+            }
+            if self.plastic:
+                values |= {"peeq": part.peeq, "plastic_strain": part.plastic_strain}
+            share = part.weight / part.weight.sum(axis=1, keepdims=True)
+            for name, value in values.items():
+                whole = fields.setdefault(
+                    name, np.zeros((self.V.mesh.topology.index_map(2).size_local, *value.shape[2:]))
+                )
+                whole[part.cells] = np.einsum("nq,nq...->n...", share, value)
         return fields

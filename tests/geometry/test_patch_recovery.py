@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.geometry.meshes.second_order import SecondOrder
 from archord.geometry.patch_recovery import PatchRecovery
 from archord.materials.elasticity import Elastic, principal_stresses, von_mises
-from archord.output.fields import FieldWriter, SecondOrder, collect_fields, collect_mesh
+from archord.output.fields import FieldWriter, collect_fields, collect_mesh
 from archord.postprocess.fields import read_fields
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.problem import Body, Problem, Support
@@ -44,7 +45,7 @@ def test_polynomials_of_the_degree_are_reproduced_at_every_node(degree, size, qu
 def recovered(system, folder):
     """Coordinates and stress of the nodes, as a run writes and reads them."""
     order = MeshOrder(system)
-    writer = FieldWriter(folder, order, collect_mesh(order), 0, False)
+    writer = FieldWriter(folder, order, collect_mesh(order), 1)
     writer.write(1.0, collect_fields(order))
     scene = type("Scene", (), {"output": type("Output", (), {"fields": True})})
     return read_fields(folder, scene, 1)
@@ -106,7 +107,7 @@ def test_all_ranks_together_write_what_one_writes(comm, tmp_path_factory):
         folders = [tmp_path_factory.mktemp("run") for _ in found]
         read = []
         for folder, (m, f, o) in zip(folders, found, strict=True):
-            writer = FieldWriter(folder, o, m, 0, False, points=True)
+            writer = FieldWriter(folder, o, m, 1, points=True)
             writer.write(1.0, f)
             read.append(read_fields(folder, type("S", (), {"output": type("O", (), {"fields": True})}), 1))
         np.testing.assert_allclose(read[0].stress, read[1].stress, atol=1e-9)

@@ -12,12 +12,12 @@ import pytest
 from mpi4py import MPI
 
 from archord import cli
+from archord.kernels.stale_jit import without_stale_forms
 from archord.output.folder import APART, CHECKPOINT, FILES, PICTURE, claim_folder
 from archord.output.history import read_history
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene
 from archord.output.run_json import peak_memory
-from archord.output.stale_jit import without_stale_forms
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene, resolved
@@ -58,7 +58,7 @@ def test_a_run_without_fields_is_the_same_but_for_them(tmp_path):
         curve.pop("seconds")
     assert curves[0] == curves[1]
     there, here = ({p.name for p in (tmp_path / name).iterdir()} for name in ("with", "without"))
-    assert there - here == {"fields.xdmf", "fields.h5", "fields"}
+    assert there - here == {"fields.vtkhdf", "fields.xdmf", "fields.h5", "fields"}
     assert not here - there
     with pytest.raises(InputError, match=r"without: has no fields: it was solved with output\.fields = false\."):
         Run(tmp_path / "without").fields()

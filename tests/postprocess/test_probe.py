@@ -201,7 +201,7 @@ def test_a_joint_is_probed_too_but_for_what_it_did_not_write(runs):
     assert pressure.force == joint.columns["P"][-1]
     assert pressure.at(-90) == pytest.approx(joint.columns["p0"][-1], rel=0.02)
     assert np.abs(joint.probe("hole", "ux").values).max() > 0
-    with pytest.raises(archord.InputError, match=r"has no 'hoop' there, but ux, uy .*output.stress = false"):
+    with pytest.raises(archord.InputError, match=r"has no 'hoop' there, but ux, uy .*output.fields = \"cells\""):
         joint.probe("hole")
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from archord.geometry.curve import lagrange
-from archord.output.fields import SecondOrder
+from archord.geometry.meshes.second_order import SecondOrder
 from archord.output.run import solve_scene
 from archord.output.step_file import step_name
 from tests.solver.parts import DR

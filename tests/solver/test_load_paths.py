@@ -151,7 +151,6 @@ def test_paths_from_a_csv_file(tmp_path):
     assert load_scene(write(tmp_path, 'path = "cycle.csv"\n')).targets == pytest.approx([0.005, 0.0025, 0.01])
     twice = load_scene(write(tmp_path, 'path = "cycle.csv"\nsteps = 2\n'))
     assert twice.targets == pytest.approx([0.0025, 0.005, 0.00375, 0.0025, 0.00625, 0.01])
-    assert twice.steps_numbered
 
 
 CYCLE, IN_A_ROW = 'path = "cycle.csv"', "cycle.csv: must have a number in every row, like 0.5: .*"

@@ -11,9 +11,10 @@ from mpi4py import MPI
 from archord.geometry.basis import QUADRILATERAL, Array, bulk_quadrature, lagrange_element, strain_matrix
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.interpolation import Interpolation
+from archord.geometry.meshes.second_order import SecondOrder
 from archord.materials.hardening import LinearHardening
 from archord.materials.j2 import J2Material
-from archord.output.fields import FieldWriter, SecondOrder, collect_fields, collect_mesh
+from archord.output.fields import FieldWriter, collect_fields, collect_mesh
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.problem import Body, Interaction, Problem, Support
 from tests.solver.parts import ELASTIC, NU, PERFECT, E, blocks, coordinates, quarter_annulus, solve
@@ -131,7 +132,7 @@ def test_fields_and_states_do_not_depend_on_the_ranks(order, degree, quads, comm
             np.testing.assert_allclose(
                 (mesh | fields)[name], values, rtol=0, atol=1e-7 * np.abs(values).max(), err_msg=name
             )
-        FieldWriter(tmp_path, whole, mesh, 0, False).write(1.0, fields)
+        FieldWriter(tmp_path, whole, mesh, 1).write(1.0, fields)
         with meshio.xdmf.TimeSeriesReader(tmp_path / "fields.xdmf") as file:
             x, (cells,) = file.read_points_cells()
             displacement = file.read_data(0)[1]["displacement"]
