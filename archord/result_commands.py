@@ -62,9 +62,9 @@ def compare(folders: tuple[Path, ...], output: Path, pictures: bool) -> int:
 
 @click.command()
 @argument("folder", "RUN", "run folder")
-@file("--vtk", "write .vtu files for each step and run.pvd into DIR", "DIR")
+@file("--vtk", "write bodies.vtkhdf and contact.vtkhdf into DIR", "DIR")
 @file("--csv", "write history and contact into DIR", "DIR")
-@click.option("--step", type=int, metavar="N", help="write the .vtu files of this step alone [all]")
+@click.option("--step", type=int, metavar="N", help="write .vtkhdf files of this step alone [all]")
 @flag("--force", "overwrite files that are there")
 def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, force: bool) -> int:
     """Write a run for other programs: VTK files for ParaView and pyvista, CSV tables for anything else."""
@@ -75,8 +75,7 @@ def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, f
         raise InputError("export: give --vtk DIR, --csv DIR or both.")
     run = Run(folder)
     if vtk is not None:
-        collection, *files = export_vtk(run, vtk, step, force=force)
-        print(f"{collection}\n{len(files)} .vtu files beside it, {files[0].name} to {files[-1].name}")
+        print(*export_vtk(run, vtk, step, force=force), sep="\n")
     if csv is not None:
         print(*export_csv(run, csv, force=force), sep="\n")
     return 0

@@ -86,7 +86,7 @@ class FieldWriter:
         self._sizes, self._grids = (len(x), *cells.shape), list[str]()
         shown, self._vtk = BodyGrid(order, mesh, nodes.cells, points), None
         if after == 0 or (folder / "fields.vtkhdf").exists():
-            self._vtk = VtkHdf(folder / "fields.vtkhdf", shown.grid, total, after)
+            self._vtk = VtkHdf(folder / "fields.vtkhdf", shown.grid, total)
         self._vtk_values = shown.values
         fixed = {name: nodes.along(values) if name.startswith("edges/") else values for name, values in mesh.items()}
         del fixed["facets/nodes"]

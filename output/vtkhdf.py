@@ -24,8 +24,10 @@ from archord.scene.errors import InputError
 
 Arrays = dict[str, np.ndarray]
 
-# VTK's numbers of cells: with straight sides, and Lagrange's of any degree by the number of their corners
+# VTK's numbers of cells: with straight sides, curved ones of second order by the number of their nodes, and Lagrange's
+# of any degree by that of their corners
 VERTEX, LINE = 1, 3
+SECOND_ORDER = {6: 22, 9: 28}
 LAGRANGE = {2: 68, 3: 69, 4: 70}
 _PAGE = 4096
 
@@ -61,56 +63,55 @@ class Grid:
 
 
 class VtkHdf:
-    """The file ``path`` with a ``grid`` and room for ``total`` steps; goes on ``after`` some that are there.
+    """The file ``path`` with a ``grid``, and room for ``total`` steps, or more if they come. It appears with a step."""
 
-    It appears with the next step.
-    """
-
-    def __init__(self, path: Path, grid: Grid, total: int, after: int = 0) -> None:
-        self.path, self._total, self._after = path, total, after
-        self._fixed, self._values = grid.arrays(), Arrays()
-        self._times: Sequence[float] = ()  # of the steps that are there
+    def __init__(self, path: Path, grid: Grid, total: int) -> None:
+        self.path, self._total, self._room = path, total, 0
+        self._fixed = {name: np.ascontiguousarray(values) for name, values in grid.arrays().items()}
+        self._values, self._times = Arrays(), list[float]()
 
     def write(self, times: Sequence[float], arrays: Arrays) -> None:
-        """Add a step: "PointData/NAME" ``(n, ...)`` and "CellData/NAME" ``(m, ...)``; ``times`` are those of all steps.
-        Raises `OSError`: then the file is what it was, this object of no use; and `InputError` if the file should go on
-        and is missing, damaged or does not hold the steps before."""
+        """Add a step: "PointData/NAME" ``(n, ...)`` and "CellData/NAME" ``(m, ...)``; ``times`` are those of all steps,
+        of which those before are in the file. Raises `OSError`: then the file is what it was, this object of no use;
+        and `InputError` if the file is missing, damaged or does not hold the steps before."""
         arrays = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
-        if self._times:
+        if len(times) <= self._room:
             with naming(self.path), self.path.open("r+b") as file:
                 self._add(file, times, arrays)
         else:
             self._values = arrays
-            self._renew(self._total, self._after, times, arrays)
-        self._times = times
+            self._renew(max(self._total, len(times)), times, arrays)
+        self._times = list(times)
 
     def end(self) -> None:
         """Give up the room of steps that never came, if there is space to do so."""
-        if 0 < len(self._times) < self._total:
+        if 0 < len(self._times) < self._room:
             with suppress(OSError, InputError):
-                self._renew(len(self._times), len(self._times), self._times, {})
+                self._renew(len(self._times), self._times, {})
 
-    def _renew(self, total: int, kept: int, times: Sequence[float], arrays: Arrays) -> None:
-        """Replace the file by one with room for ``total`` steps, the first ``kept`` ones of the old one, and one more,
-        if it has ``arrays``."""
-        self._lay_out(total)
+    def _renew(self, room: int, times: Sequence[float], arrays: Arrays) -> None:
+        """Replace the file by one with ``room`` for so many steps, in which the last one has these ``arrays``, if any,
+        and the others what they had."""
+        self._lay_out(room)
         new = new_name(self.path)
         try:
-            with naming(self.path), new.open("w+b") as file:
-                file.truncate(self._head.size)
-                self._head.save(file)
-                for name, values in self._fixed.items():
-                    _put(file, self._places[name], values)
-                for place, values in self._earlier(kept):
-                    _put(file, place, values)
-                self._add(file, times, arrays)
-            new.replace(self.path)
-        except BaseException:
+            with naming(self.path):
+                with new.open("w+b") as file:
+                    file.truncate(self._head.size)
+                    self._head.save(file)
+                    for name, values in self._fixed.items():
+                        _put(file, self._places[name], values)
+                    for place, values in self._earlier(len(times) - bool(arrays)):
+                        _put(file, place, values)
+                    self._add(file, times, arrays)
+                new.replace(self.path)
+        except (OSError, InputError):
             new.unlink(missing_ok=True)
             raise
+        self._room = room
 
-    def _lay_out(self, total: int) -> None:
-        """Compose a file with room for ``total`` steps."""
+    def _lay_out(self, room: int) -> None:
+        """Compose a file with ``room`` for so many steps."""
         self._head = _Head()
         with h5py.File(self._head, "w") as file:
             root = file.create_group("VTKHDF")
@@ -118,21 +119,21 @@ class VtkHdf:
             # first, so that both the number of steps and that of their times lie within the first page
             steps = root.create_group("Steps")
             steps.attrs["NSteps"] = 0
-            steps.create_dataset("Values", (1,), "f8", maxshape=(total,), chunks=(total,), dcpl=_AT_ONCE.copy())
+            steps.create_dataset("Values", (1,), "f8", maxshape=(room,), chunks=(room,), dcpl=_AT_ONCE.copy())
             shapes = {name: values.shape for name, values in self._fixed.items()}
-            shapes |= {name: (total * len(values), *values.shape[1:]) for name, values in self._values.items()}
+            shapes |= {name: (room * len(values), *values.shape[1:]) for name, values in self._values.items()}
             self._places = {}
             for name, values in (self._fixed | self._values).items():
                 dataset = root.create_dataset(name, shapes[name], values.dtype, dcpl=_AT_ONCE)
                 self._places[name] = dataset.id.get_offset()
             for name, counted in {"Points": "Points", "Cells": "Types", "ConnectivityIds": "Connectivity"}.items():
                 root[f"NumberOf{name}"] = [len(self._fixed[counted])]
-            nothing = np.zeros(total, dtype=np.int64)  # where in the arrays a step begins
+            nothing = np.zeros(room, dtype=np.int64)  # where in the arrays a step begins
             steps["NumberOfParts"], steps["PartOffsets"], steps["PointOffsets"] = nothing + 1, nothing, nothing
             steps["CellOffsets"] = steps["ConnectivityIdOffsets"] = nothing[:, None]
             for name in (name for name in shapes if "/" in name):
                 rows = len(self._values.get(name, ()))
-                steps[name.replace("/", "Offsets/")] = np.arange(total) * rows
+                steps[name.replace("/", "Offsets/")] = np.arange(room) * rows
 
     def _add(self, file: BinaryIO, times: Sequence[float], arrays: Arrays) -> None:
         """Write the last step's ``arrays``, and then that it is there."""

@@ -38,7 +38,7 @@ def holds(path, at: list[float], steps: list[int]) -> None:
 
 
 def test_steps_are_kept_and_continued(tmp_path):
-    """With room to spare, after fewer steps than are there, and with more or less room; the length is that of it all
+    """With room to spare, after fewer steps than are there, and with more or too little room; the length is that of it all
     from the first step on, on a disk that holds little of it."""
     path, loads = tmp_path / "x.vtkhdf", [0.1, 0.2, 0.3, 0.4]
     file = VtkHdf(path, GRID, 5000)
@@ -46,9 +46,9 @@ def test_steps_are_kept_and_continued(tmp_path):
         file.write(loads[:k], values(k))
         holds(path, loads[:k], [1, 2, 3][:k])
     assert path.stat().st_blocks * 512 < path.stat().st_size / 4
-    VtkHdf(path, GRID, 4, after=2).write([0.1, 0.2, 0.5], values(7))
+    VtkHdf(path, GRID, 2).write([0.1, 0.2, 0.5], values(7))
     holds(path, [0.1, 0.2, 0.5], [1, 2, 7])
-    again = VtkHdf(path, GRID, 9, after=3)
+    again = VtkHdf(path, GRID, 9)
     again.write([1, 2, 3, 4], values(4))
     size = path.stat().st_size
     again.end()
@@ -106,7 +106,7 @@ def test_a_file_that_cannot_go_on_is_refused(tmp_path, damage, said):
         file.write([0.1, 0.2][:k], values(k))
     damage(path)
     with pytest.raises(InputError, match=rf"x\.vtkhdf: .*{said}"):
-        VtkHdf(path, GRID, 3, after=2).write([0.1, 0.2, 0.3], values(3))
+        VtkHdf(path, GRID, 3).write([0.1, 0.2, 0.3], values(3))
     assert not list(tmp_path.glob("*.new"))
 
 

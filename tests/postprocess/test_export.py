@@ -4,11 +4,11 @@ import h5py
 import numpy as np
 import pandas as pd
 import pytest
-import pyvista
 
 from archord.cli import run as command
 from archord.postprocess.export import export_vtk
 from archord.postprocess.run import Run
+from tests.output.vtk_reader import VtkFile
 
 _QUADRATIC_TRIANGLE = 22  # VTK's number
 
@@ -18,11 +18,10 @@ def test_vtk_reads_back_fields_and_contact(runs, tmp_path):
     lines along both arcs, which warped by their displacement are where contact.h5 has them."""
     run = Run(runs["plastic"])
     export_vtk(run, tmp_path)
-    reader = pyvista.get_reader(str(tmp_path / "run.pvd"))
-    np.testing.assert_allclose(reader.time_values, run.columns["delta"], rtol=1e-15)
+    bodies, contact = (VtkFile(tmp_path / f"{name}.vtkhdf") for name in ("bodies", "contact"))
+    assert bodies.times == contact.times == run.columns["delta"]
     for step in (1, run.steps):
-        reader.set_active_time_value(reader.time_values[step - 1])
-        (mesh, arcs), fields = reader.read(), run.fields(step)
+        (mesh, arcs), fields = (bodies.at(step), contact.at(step)), run.fields(step)
         assert set(mesh.celltypes) == {_QUADRATIC_TRIANGLE}
         np.testing.assert_array_equal(mesh.cells.reshape(-1, 7)[:, 1:], fields.cells)
         np.testing.assert_array_equal(mesh.points[:, :2], fields.coordinates)
@@ -56,15 +55,15 @@ def test_csv_reads_back_the_tables(runs, tmp_path):
 
 
 def test_a_step_alone_and_nothing_overwritten_without_force(runs, tmp_path, capsys, refused):
-    """Two files and the collection, which are printed; a file in the way is named, and none changed."""
+    """Two files, which are printed; a file in the way is named, and none changed."""
     folder = tmp_path / "new" / "vtk"
     arguments = ["export", str(runs["coarse"]), "--vtk", str(folder), "--step", "4"]
     assert command(arguments) == 0
-    assert "2 .vtu files beside it, bodies_0004.vtu to contact_0004.vtu" in capsys.readouterr().out
-    assert {file.name for file in folder.iterdir()} == {"run.pvd", "bodies_0004.vtu", "contact_0004.vtu"}
-    (folder / "run.pvd").write_text("mine")
-    said = f"{folder}/run.pvd: is there already; choose another file, or overwrite it with --force.\n"
+    assert capsys.readouterr().out == f"{folder}/bodies.vtkhdf\n{folder}/contact.vtkhdf\n"
+    assert {file.name for file in folder.iterdir()} == {"bodies.vtkhdf", "contact.vtkhdf"}
+    (folder / "contact.vtkhdf").write_text("mine")
+    said = f"{folder}/bodies.vtkhdf: is there already; choose another file, or overwrite it with --force.\n"
     assert refused(arguments) == said
-    assert (folder / "run.pvd").read_text() == "mine"
+    assert (folder / "contact.vtkhdf").read_text() == "mine"
     assert command([*arguments[:-2], "--force"]) == 0
-    assert len(list(folder.iterdir())) == 1 + 2 * 6
+    assert len(VtkFile(folder / "contact.vtkhdf").times) == 6

@@ -7,8 +7,17 @@ import meshio
 import numpy as np
 import pytest
 from mpi4py import MPI
+from vtkmodules.vtkCommonCore import reference
 
-from archord.geometry.basis import QUADRILATERAL, Array, bulk_quadrature, lagrange_element, strain_matrix
+from archord.geometry.basis import (
+    QUADRILATERAL,
+    Array,
+    bulk_quadrature,
+    cell_kind,
+    lagrange_element,
+    strain_matrix,
+    tabulate,
+)
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.interpolation import Interpolation
 from archord.geometry.meshes.second_order import SecondOrder
@@ -17,6 +26,7 @@ from archord.materials.j2 import J2Material
 from archord.output.fields import FieldWriter, collect_fields, collect_mesh
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.problem import Body, Interaction, Problem, Support
+from tests.output.vtk_reader import VtkFile, only
 from tests.solver.parts import ELASTIC, NU, PERFECT, E, blocks, coordinates, quarter_annulus, solve
 
 DEPTH = 0.01
@@ -119,7 +129,7 @@ def test_fully_plastic_cells_do_not_lock(quads):
 @every_order
 @every_degree
 def test_fields_and_states_do_not_depend_on_the_ranks(order, degree, quads, comm, tmp_path):
-    """Nodes and cells come in one order; what is spread is what was collected; meshio reads the file."""
+    """Nodes and cells come in one order; what is spread is what was collected; meshio and VTK read the files."""
     systems = [pressed(c, order, degree, quads, PERFECT, [DEPTH, 2 * DEPTH]) for c in (comm, MPI.COMM_SELF)]
     whole, alone = (MeshOrder(system) for system in systems)
     u = systems[0].equilibrium.displacement()
@@ -142,6 +152,12 @@ def test_fields_and_states_do_not_depend_on_the_ranks(order, degree, quads, comm
         np.testing.assert_allclose(x[cells.data[:, k : 2 * k]], middles, atol=1e-14)
         if quads:
             np.testing.assert_allclose(x[cells.data[:, 8]], x[cells.data[:, :4]].mean(axis=1), atol=0.02)
+        cell = only(VtkFile(tmp_path / "fields.vtkhdf").at(1), 2).GetCell(1)
+        place, at = np.array([0.2, 0.3, 0.0]), np.zeros(3)
+        cell.EvaluateLocation(reference(0), place, at, np.zeros(cell.GetNumberOfPoints()))
+        nodes = whole.nodes_of_cell[1]
+        shape = tabulate(*cell_kind(len(nodes)), place[:2])[0]
+        np.testing.assert_allclose(at, shape @ whole.coordinates[nodes], atol=1e-12)
         assert np.ptp(displacement[:, 1]) == pytest.approx(np.ptp(fields["displacement"][:, 1]), rel=1e-9)
         with h5py.File(tmp_path / "fields.h5") as file:
             assert file["mesh/cells"].shape == cells.data.shape
