@@ -4,10 +4,9 @@ contact surfaces, and on request a vertex for each integration point."""
 from __future__ import annotations
 
 import numpy as np
-from dolfinx.cpp.io import perm_vtk
-from dolfinx.mesh import to_type
 
 from archord.geometry.basis import Array, bulk_quadrature, cell_kind, lagrange_element, tabulate
+from archord.geometry.meshes.plane_mesh import in_vtk_order
 from archord.materials.elasticity import mean_stress, von_mises
 from archord.output.vtkhdf import LAGRANGE, VERTEX, Grid
 from archord.solver.mesh_order import Arrays, MeshOrder
@@ -26,9 +25,8 @@ class BodyGrid:
         self._from_second = tabulate(kind, 2, lagrange_element(kind, degree).points)[0]
         self._at_points = tabulate(kind, degree, bulk_quadrature(kind, degree)[0])[0]
         inner = np.arange(1, degree)
-        vtk = np.argsort(perm_vtk(to_type(kind.name), n))
         x, corners = order.coordinates, len(lagrange_element(kind, 1).points)
-        cells = [(LAGRANGE[corners], self._nodes[:, vtk]), (LAGRANGE[2], self._facets[:, [0, -1, *inner]])]
+        cells = [(LAGRANGE[corners], in_vtk_order(self._nodes)), (LAGRANGE[2], self._facets[:, [0, -1, *inner]])]
         owner = [np.arange(m), self._cell_of_facet]
         if points:
             places = mesh["points/coordinates"]
@@ -52,21 +50,20 @@ class BodyGrid:
         at_facets["contact_pressure"] = force / length
         at_cells = {name: np.concatenate([values, at_facets[name]]) for name, values in at_cells.items()}
         if self._points:
-            points = {name: fields[f"points/{name}"] for name in nodal}
-            points = {name: _symmetric(v) if v.ndim == 3 else v for name, v in points.items()}
-            points = {name: v.reshape(-1, *v.shape[2:]) for name, v in points.items()}
-            u = np.einsum("qa,mak->mqk", self._at_points, fields["displacement"][self._nodes]).reshape(-1, 2)
-            nowhere = np.zeros(len(u))
-            points |= {"displacement": _in_space(u), "contact_pressure": nowhere, "contact_state": nowhere}
-            stress = fields["points/stress"].reshape(-1, 4)
-            points |= {"von_mises": von_mises(stress), "mean_stress": mean_stress(stress)}
-            at_nodes, at_cells = (
-                {name: np.concatenate([values, points[name]]) for name, values in arrays.items()}
-                for arrays in (at_nodes, at_cells)
-            )
-        return {f"PointData/{name}": values for name, values in at_nodes.items()} | {
-            f"CellData/{name}": values for name, values in at_cells.items()
-        }
+            points = self._of_points(fields, list(nodal))
+            at_nodes = {name: np.concatenate([values, points[name]]) for name, values in at_nodes.items()}
+            at_cells = {name: np.concatenate([values, points[name]]) for name, values in at_cells.items()}
+        found = {f"PointData/{name}": values for name, values in at_nodes.items()}
+        return found | {f"CellData/{name}": values for name, values in at_cells.items()}
+
+    def _of_points(self, fields: Arrays, names: list[str]) -> Arrays:
+        """The values ``(m q, ...)`` of the integration points, of which those called ``names`` are known."""
+        found = {name: fields[f"points/{name}"] for name in names}
+        found = {name: v.reshape(-1) if v.ndim == 2 else _symmetric(v.reshape(-1, 4)) for name, v in found.items()}
+        u = np.einsum("qa,mak->mqk", self._at_points, fields["displacement"][self._nodes]).reshape(-1, 2)
+        stress, nothing = fields["points/stress"].reshape(-1, 4), np.zeros(len(u))
+        found |= {"von_mises": von_mises(stress), "mean_stress": mean_stress(stress), "displacement": _in_space(u)}
+        return found | {"contact_pressure": nothing, "contact_state": nothing}
 
     def _pressure(self, fields: Arrays) -> Array:
         """Contact pressure ``(n,)`` of the nodes: their force over their share of the length, which is exact where the
@@ -91,4 +88,4 @@ def _in_space(values: Array) -> Array:
 
 
 def _symmetric(tensor: Array) -> Array:
-    return np.pad(tensor, [(0, 0)] * (tensor.ndim - 1) + [(0, 2)])
+    return np.pad(tensor, ((0, 0), (0, 2)))

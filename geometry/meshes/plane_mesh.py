@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import basix
 import numpy as np
-from dolfinx.cpp.io import perm_gmsh
+from dolfinx.cpp.io import perm_gmsh, perm_vtk
 from dolfinx.mesh import CellType, to_type
 
 from archord.geometry.basis import TRIANGLE, Array, cell_kind, lagrange_element
@@ -199,6 +199,12 @@ def in_basix_order(
     if cells.shape[1] == 8:
         x, cells = with_middle_nodes(x, cells)
     return x, cells[:, order(to_type(cell_kind(cells.shape[1])[0].name), cells.shape[1])]
+
+
+def in_vtk_order(cells: np.ndarray) -> np.ndarray:
+    """Lagrange ``cells`` ``(m, a)`` of any degree with their nodes in VTK's order."""
+    n = cells.shape[1]
+    return cells[:, np.argsort(perm_vtk(to_type(cell_kind(n)[0].name), n))]
 
 
 def sides_of(cells: np.ndarray) -> np.ndarray:

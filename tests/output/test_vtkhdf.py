@@ -38,7 +38,7 @@ def holds(path, at: list[float], steps: list[int]) -> None:
 
 
 def test_steps_are_kept_and_continued(tmp_path):
-    """With room to spare, after fewer steps than are there, and with more or too little room; the length is that of it all
+    """With room to spare, after fewer steps than are there, with more or too little room; the length is that of it all
     from the first step on, on a disk that holds little of it."""
     path, loads = tmp_path / "x.vtkhdf", [0.1, 0.2, 0.3, 0.4]
     file = VtkHdf(path, GRID, 5000)
