@@ -7,7 +7,6 @@ whatever the degree of the elements. The arrays are in the order of the mesh gen
 
 from __future__ import annotations
 
-from operator import add
 from pathlib import Path
 
 import numpy as np
@@ -112,16 +111,18 @@ class FieldWriter:
         now = times(self._file.loads)
         if self._vtk:
             self._vtk.write(now, self._vtk_values(fields, nodal))
-        for step in range(len(self._grids), len(now)):
-            there = self._file.names[step]
-            self._grids.append(self._grid(step + 1, *([n for n in names if n in there] for names in (of_nodes, cells))))
-        head = '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
-        collection = '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
-        begun = [
-            f'<Grid Name="step {k}" GridType="Uniform">\n<Time Value="{time!r}"/>\n' for k, time in enumerate(now, 1)
-        ]
-        grids = "".join(map(add, begun, self._grids))
-        replace_file(self.path, f"{head}{collection}{grids}</Grid>\n</Domain>\n</Xdmf>\n")
+        self._write_xdmf(now, list(of_nodes), list(cells))
+
+    def _write_xdmf(self, now: list[float], of_nodes: list[str], of_cells: list[str]) -> None:
+        """Name the fields of nodes and cells of all steps, whose times are ``now`` these."""
+        for there in self._file.names[len(self._grids) :]:
+            shown = ([name for name in names if name in there] for names in (of_nodes, of_cells))
+            self._grids.append(self._grid(len(self._grids) + 1, *shown))
+        text = '<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n'
+        text += '<Grid Name="joint" GridType="Collection" CollectionType="Temporal">\n'
+        for step, (time, grid) in enumerate(zip(now, self._grids, strict=True), 1):
+            text += f'<Grid Name="step {step}" GridType="Uniform">\n<Time Value="{time!r}"/>\n{grid}'
+        replace_file(self.path, f"{text}</Grid>\n</Domain>\n</Xdmf>\n")
 
     def end(self) -> None:
         """Give up the room of steps that never came."""
