@@ -79,11 +79,10 @@ def _run(arguments: list[str], begun: float) -> int:
             print(error if bad else "archord: interrupted.", file=sys.stderr, flush=True)
         return 2 if bad else 130
     except ModuleNotFoundError as error:
-        name = (error.name or "").partition(".")[0]
-        if name not in SOLVERS:
+        if (error.name or "").partition(".")[0] not in SOLVERS:
             return _fail(error)
         if launcher_rank() == 0:
-            said = f"needs {name}, which pip install 'archord[solve]' brings"
+            said = f"{error}; pip install 'archord[solve]' brings what solves (docs/containers.md)"
             print(f"archord {_command(arguments)}: {said}.", file=sys.stderr, flush=True)
         return 2
     except Exception as error:

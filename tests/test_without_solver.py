@@ -58,5 +58,8 @@ def test_what_solves_says_in_one_sentence_what_it_needs(command, runs, tmp_path)
     words = [*command, "-o", str(tmp_path / "out")] if command[0] == "solve" else command
     result = without_solver(tmp_path, [words], runs["elastic"])
     assert "# 2" in result.stdout
-    assert result.stderr == f"archord {command[0]}: needs mpi4py, which pip install 'archord[solve]' brings.\n"
+    assert result.stderr == (
+        f"archord {command[0]}: No module named 'mpi4py'; "
+        "pip install 'archord[solve]' brings what solves (docs/containers.md).\n"
+    )
     assert not (tmp_path / "out").exists()

@@ -48,15 +48,18 @@ def gmsh_to_mesh(
     names of gmsh's physical groups. ``partitioner`` replaces `sectors`. A mesh whose ``key`` says all that enters it is
     kept (`kept_mesh`). What has a mesh already is taken by `read_mesh`.
     """
-    made, failure = None, None
+    made: PlaneMesh | None = None
+    failure: Exception | None = None
     if comm.rank == 0:
         make = partial(_made, build, circles, order, refinements, quads)
         try:
             made = kept_mesh((*key, order, refinements, quads), make) if key else make()
-        except Exception as error:  # raised on all ranks below
-            failure = f"gmsh could not mesh the problem: {error}"
+        except ModuleNotFoundError as error:  # raised on all ranks below, as what follows
+            failure = error
+        except Exception as error:
+            failure = RuntimeError(f"gmsh could not mesh the problem: {error}")
     if failure := comm.bcast(failure):
-        raise RuntimeError(failure)
+        raise failure
     return distribute(comm, made, partitioner)
 
 
@@ -82,7 +85,10 @@ def _made(build: Callable, circles: Sequence[Circle], order: int, refinements: i
 @contextmanager
 def own_gmsh() -> Iterator[Any]:
     """gmsh with its defaults and an empty model; a user's model and options come back at the end."""
-    import gmsh
+    try:
+        import gmsh
+    except OSError as error:  # a library of the system is missing
+        raise ModuleNotFoundError(f"gmsh cannot be loaded, {error}", name="gmsh") from None
 
     with TemporaryDirectory() as folder:
         in_use, options = gmsh.isInitialized(), f"{folder}/gmsh.opt"

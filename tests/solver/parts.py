@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 from dolfinx import fem
-from dolfinx.graph import adjacencylist
+from dolfinx.cpp.graph import AdjacencyList_int32
 from dolfinx.mesh import Mesh, MeshTags
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -46,7 +46,7 @@ def partition(owner: Callable[[np.ndarray, np.ndarray], np.ndarray]):
     def partitioner(comm, n_parts, cell_types, cells):
         mine = np.asarray(cells[0]).reshape(-1, 3)
         rank = owner((comm.exscan(len(mine)) or 0) + np.arange(len(mine)), mine) % n_parts
-        return adjacencylist(rank.astype(np.int32), np.arange(len(mine) + 1, dtype=np.int32))
+        return AdjacencyList_int32(rank.astype(np.int32).reshape(-1, 1))
 
     return partitioner
 
