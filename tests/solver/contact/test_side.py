@@ -218,7 +218,7 @@ def test_a_fork_is_an_error():
     """Two squares that touch at a corner: four facets meet there."""
     x = np.array([[i, j] for j in range(3) for i in range(3)], dtype=float)
     element = basix.ufl.element("P", "quadrilateral", 1, shape=(2,))
-    mesh = create_mesh(MPI.COMM_SELF, np.array([[0, 1, 3, 4], [4, 5, 7, 8]]), x, element)
+    mesh = create_mesh(MPI.COMM_SELF, cells=np.array([[0, 1, 3, 4], [4, 5, 7, 8]]), x=x, e=element)
     mesh.topology.create_connectivity(1, 2)
     with pytest.raises(ValueError, match=r"branches at \(1, 1\)"):
         Surface(space(mesh), exterior_facet_indices(mesh.topology), ELASTIC)
