@@ -10,6 +10,7 @@ import basix
 import numpy as np
 import numpy.typing as npt
 
+from archord.kernels.compat import cell_degree, cell_nodes
 from archord.kernels.compiled import library, pointer
 
 if TYPE_CHECKING:
@@ -53,9 +54,9 @@ class CellBasis:
 
 def cell_basis(mesh: Mesh, degree: int, cells: npt.NDArray[np.int32], X: Array) -> CellBasis:
     """Basis of the given ``degree`` at the reference points ``X`` ``(q, 2)`` of ``cells``, or ``(n, q, 2)`` of each."""
-    geometry = tabulate(mesh.basix_cell(), mesh.geometry.cmap.degree, X)
+    geometry = tabulate(mesh.basix_cell(), cell_degree(mesh), X)
     table = tabulate(mesh.basix_cell(), degree, X)
-    nodes = mesh.geometry.x[mesh.geometry.dofmap[cells], :2]
+    nodes = mesh.geometry.x[cell_nodes(mesh)[cells], :2]
     at = "qa" if X.ndim == 2 else "nqa"
     point = np.einsum(f"{at},nai->nqi", geometry[0], nodes)
     J = np.einsum(f"j{at},nai->nqij", geometry[1:], nodes)

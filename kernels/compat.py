@@ -13,7 +13,9 @@ if find_spec("dolfinx_solver"):
     import dolfinx_solver  # noqa: F401  (PyPI's dolfinx finds its MPI through it)
 
 import dolfinx
+import numpy as np
 from dolfinx.common import IndexMap
+from dolfinx.mesh import Geometry, Mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -23,10 +25,21 @@ with suppress(TypeError, ValueError):  # a handler of another language, or not t
 
 _REASONS = vars(PETSc.SNES.ConvergedReason)
 RESIDUAL_NOT_FINITE = _REASONS.get("DIVERGED_FNORM_NAN", _REASONS.get("DIVERGED_FUNCTION_NANORINF"))  # until PETSc 3.24
+_KINDS = hasattr(Geometry, "dofmaps")  # of cells, of which dolfinx from 0.11 on may have several in a mesh
 
 # of Debian (gmsh needs it), of conda on Linux and macOS, and beside PyPI's dolfinx
 _FOLDERS = ("", f"{sys.prefix}/lib/", f"{Path(dolfinx.__file__).parents[1]}/dolfinx_solver/lib/")
 METIS = tuple(folder + name for folder in _FOLDERS for name in ("libmetis.so.5", "libmetis.so", "libmetis.dylib"))
+
+
+def cell_nodes(mesh: Mesh) -> np.ndarray:
+    """The nodes ``(n, a)`` of the cells of a ``mesh``."""
+    return mesh.geometry.dofmaps[0] if _KINDS else mesh.geometry.dofmap
+
+
+def cell_degree(mesh: Mesh) -> int:
+    """The polynomial degree of the cells of a ``mesh``."""
+    return (mesh.geometry.cmaps[0] if _KINDS else mesh.geometry.cmap).degree
 
 
 def ghosted_vector(index_map: IndexMap, components: int) -> PETSc.Vec:

@@ -15,6 +15,7 @@ from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 
 from archord.geometry.basis import Array, tabulate
+from archord.kernels.compat import cell_degree, cell_nodes
 from archord.materials.material import Points
 from archord.solver.bulk import PointFields
 from archord.solver.contact.pair import Pair
@@ -58,17 +59,17 @@ class MeshOrder:
         self.cells = Gather(system.comm, self._cell_index)
         index, owned = np.asarray(geometry.input_global_indices), geometry.index_map().size_local
         nodes = Gather(system.comm, index[:owned])
-        self.coordinates, cells = nodes(geometry.x[:owned]), self.cells(index[geometry.dofmap[: self.n_cells]])
+        self.coordinates, cells = nodes(geometry.x[:owned]), self.cells(index[cell_nodes(mesh)[: self.n_cells]])
         root = system.comm.rank == 0
         self.nodes_of_cell = np.searchsorted(nodes.unique, cells) if root else cells
-        if V.element.basix_element.degree == geometry.cmap.degree:  # both number the nodes of a cell alike
+        if V.element.basix_element.degree == cell_degree(mesh):  # both number the nodes of a cell alike
             self._index = np.zeros(self._n_local, dtype=np.int64)
-            self._index[dofs] = index[geometry.dofmap]
+            self._index[dofs] = index[cell_nodes(mesh)]
         else:
             numbers = V.dofmap.index_map.local_to_global(np.arange(self._n_local, dtype=np.int32))
             of_cells, first = self.cells(numbers[dofs[: self.n_cells]]), None
             if root:
-                at = tabulate(mesh.basix_cell(), geometry.cmap.degree, V.element.basix_element.points)[0]
+                at = tabulate(mesh.basix_cell(), cell_degree(mesh), V.element.basix_element.points)[0]
                 places = np.einsum("qa,nai->nqi", at, self.coordinates[self.nodes_of_cell]).reshape(-1, 3)
                 first = np.unique(of_cells, return_index=True)[1]
                 self.coordinates = places[np.sort(first)]
@@ -77,7 +78,7 @@ class MeshOrder:
         self._nodes = Gather(system.comm, self._index[: self._n_owned])
         corners = slice(len(basix.topology(mesh.basix_cell())[0]))  # come first in every cell
         self._dof_of_vertex = np.zeros(len(geometry.x), dtype=np.int64)
-        self._dof_of_vertex[geometry.dofmap[:, corners]] = dofs[:, corners]
+        self._dof_of_vertex[cell_nodes(mesh)[:, corners]] = dofs[:, corners]
 
     def mesh_digest(self) -> str:
         """SHA-256 of coordinates and cells, on rank 0."""

@@ -11,6 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
+from archord.kernels.compat import cell_degree
 from archord.report.timer import Timer
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
@@ -52,7 +53,7 @@ class System:
             self.equilibrium = Equilibrium(problem, self.bulk, self.contact, self.timer)
             self.solver = Recovery(NewtonSolver(self.equilibrium))
         self.n_dofs, self.n_cells = 2 * self.V.dofmap.index_map.size_global, mesh.topology.index_map(2).size_global
-        self.cell_kind = f"{'curved' if mesh.geometry.cmap.degree > 1 else 'straight'} {mesh.basix_cell().name}s"
+        self.cell_kind = f"{'curved' if cell_degree(mesh) > 1 else 'straight'} {mesh.basix_cell().name}s"
         self.drive_names = self.equilibrium.drives.names
         self._path: LoadPath | None = None
 

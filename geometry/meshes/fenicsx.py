@@ -23,6 +23,7 @@ from archord.geometry.meshes.mesh_cache import kept_mesh
 from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_of
 from archord.geometry.meshes.refine import Circle, on_circles
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.kernels.compat import cell_nodes
 
 Cut = Callable[[Array, np.ndarray, int], np.ndarray]
 
@@ -151,7 +152,7 @@ def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
         number = np.asarray(topology.original_cell_index)[:n]
     except RuntimeError:  # of a submesh
         number = topology.index_map(2).local_range[0] + np.arange(n)
-    cells = node[mesh.geometry.dofmap[:n]]
+    cells = node[cell_nodes(mesh)[:n]]
     parts = mesh.comm.gather((number, cells, body[:n], node[ends], tags, node, mesh.geometry.x[:, :2]))
     if parts is None:
         return None

@@ -13,6 +13,7 @@ from dolfinx import fem
 
 from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis, strain, strain_matrix
 from archord.geometry.curve import Curve, RigidCircle, in_pieces
+from archord.kernels.compat import cell_degree
 from archord.materials.material import Material, Points
 
 _ASKEW = np.array([0.5257, 0.8507])  # a direction in which no two nodes of a closed piece should be equally far
@@ -87,7 +88,7 @@ class Surface:
         self.weight = length * w[self.facet]
         self.outward = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
         self.point, self.gradient, self.shape = basis.point, basis.gradient, np.ascontiguousarray(basis.shape)
-        if self.V.mesh.geometry.cmap.degree > self.degree:
+        if cell_degree(self.V.mesh) > self.degree:
             self.point = self.shape @ self._nodes  # on the curve
         on_facet = np.broadcast_to(self.trace[:, None, :], (*self.weight.shape, self.trace.shape[1]))
         self.trace_shape = np.take_along_axis(self.shape, on_facet, axis=2)
