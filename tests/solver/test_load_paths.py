@@ -131,7 +131,7 @@ def test_zero_load_is_no_load():
     """Steps at zero displacement or force converge to nothing, without nan, and the next step goes on from there."""
     for problem in (scene(H, 1, load={"displacement": [0.0, 1.0]}), by_force([0.0, 0.005], 1)):
         first, second = solve(problem).steps
-        assert all(value == 0 for name, value in vars(first).items() if name not in ("step", "seconds"))
+        assert all(value == 0 for name, value in vars(first).items() if name not in ("step", "seconds", "peeq"))
         assert second.P > 0
 
 

@@ -84,7 +84,7 @@ def test_a_signal_ends_a_sweep_in_order(whole, tmp_path, ranks):
     until_cases_are_done(process, 2)
     process.send_signal(signal.SIGTERM)
     said, _ = process.communicate(timeout=60)
-    assert process.returncode == (1 if ranks else 143)
+    assert process.returncode in ((1, 143) if ranks else (143,))  # Open MPI, MPICH
     if ranks:  # mpirun kills its ranks after a quarter of a second: the tables may not be there
         assert sweep(file, "-o", out, "--gather", "-q") == 0
     else:

@@ -101,8 +101,10 @@ def test_bad_input_is_one_sentence(runs, tmp_path, refused, arguments, said):
     texts = {"begun": f"{heading}\n", "broken": f"{history}1,2\n", "apart": f"{heading}\n{apart}\n"}
     for name, text in texts.items():
         (tmp_path / name).mkdir()
-        for file in ("scene.toml", "run.json"):
-            (tmp_path / name / file).write_text((runs["elastic"] / file).read_text())
+        (tmp_path / name / "scene.toml").write_text((runs["elastic"] / "scene.toml").read_text())
+        content = json.loads((runs["elastic"] / "run.json").read_text())
+        content["steps"] = content["steps"][: len(text.splitlines()) - 1]
+        (tmp_path / name / "run.json").write_text(json.dumps(content))
         (tmp_path / name / "history.csv").write_text(text)
     assert refused(["fit", *(a.format(**folders) for a in arguments)]).startswith(said.format(**folders))
     assert not list((tmp_path / "empty").iterdir())
