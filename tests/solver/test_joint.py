@@ -217,8 +217,10 @@ def test_results_do_not_depend_on_the_ranks(cut, variant):
     assert together.joint.n_dofs == alone.joint.n_dofs
     for a, b in zip(together.steps, alone.steps, strict=True):
         assert (a.iterations, a.cutbacks) == (b.iterations, b.cutbacks)
-        for name in set(vars(a)) - {"work", "force_balance", "seconds"}:
+        for name in set(vars(a)) - {"work", "force_balance", "seconds", "peeq"}:
             assert getattr(a, name) == pytest.approx(getattr(b, name), rel=1e-9), name
+        assert a.peeq.keys() == b.peeq.keys()
+        assert all(a.peeq[where] == pytest.approx(b.peeq[where], rel=1e-9) for where in a.peeq)
 
 
 def test_peeq_is_told_by_body_and_near_the_contact(tmp_path):
