@@ -24,17 +24,18 @@ from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.general.general_law import law_of_numbers
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
-from archord.postprocess.laws.general.law_fit import NodeRun, complete, first_loading, solved_joints
+from archord.postprocess.laws.general.law_fit import SOFT, NodeRun, complete, first_loading, solved_joints
 from archord.postprocess.run import Run
-from archord.report.table import Table
+from archord.report.table import Table, rms_largest
 
 _RANGES = {"P to 0.1 dR": (0.0, 0.099), "P 0.1 to 2 dR": (0.099, 2.001), "P 2 to 3 dR": (2.001, 3.001)}
-_SOFT = 0.5  # p nu1/(1 - nu1), beyond which the pin is soft and hardly compressible
+_OPEN = 0.01  # of the largest force, below which a joint counts as open on its way back
 
 
 @dataclass(frozen=True)
 class Off:
-    """Errors of one joint: by quantity an array, relative in per cent but for eps [degrees]; ``kind`` is its plane and
+    """Errors of one joint: by quantity an array, relative in per cent but for eps [degrees]; of the stiffness over the
+    larger of itself and P/delta, as it vanishes where the whole contact yields in plane stress. ``kind`` is plane and
     what yields; ``inside`` which errors of P are within the expected ones."""
 
     kind: str
@@ -53,7 +54,7 @@ def off(numbers: tuple[float, ...], runs: list[NodeRun]) -> Off:
     errors = {name: relative[(x > low) & (x <= high)] for name, (low, high) in _RANGES.items()}
     usual = (x > 0.099) & (x <= 2.001)
     slope = CubicSpline(np.log(x), np.log(y))(np.log(x), 1) * y / x
-    errors["stiffness"] = (100 * (stiffness / slope - 1))[usual & (np.arange(len(x)) < len(x) - 1)]
+    errors["stiffness"] = (100 * (stiffness - slope) / np.maximum(slope, y / x))[usual & (x < x[-1])]
     errors["p0"], errors["eps"] = (100 * (p0 / peak - 1))[usual], np.degrees(eps - angle)[usual]
     for run in runs:
         if run.steps == 1 and len(run.back) > 3 and run.back[0, 0] <= 3.001:
@@ -72,36 +73,37 @@ def kind_of(numbers: tuple[float, ...]) -> str:
         body = "both"
     else:
         body = f"{'pin' if pin < block else 'block'} {'alone' if np.isinf(stresses).any() else 'weaker'}"
-    soft = ", soft pin" if p * m > _SOFT else ""
+    soft = ", soft pin" if p * m > SOFT else ""
     return f"{'strain' if strain else 'stress'} {body}{soft}"
 
 
 def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
-    """Errors of a way back, in per cent: of P over the largest P, of the residual clearance over dR, of the energy lost
-    over the work of loading; and where P is within what is expected."""
-    x, y = run.back.T
+    """Errors of a way back, in per cent: of P over the largest P, of the displacement at which hardly a force is left
+    over dR, of the energy lost over the work of loading, of P on reloading; and where P is within what is expected."""
+    (x, y), largest = run.back.T, run.back[0, 1]
     said = law.at(x[None], x[0])
     load = said.load[0]
-    closed = y > 0
-    bracket = max([0.0, *x[~closed]]), float(x[closed].min())  # where it opens
-    opens = sum(bracket) / 2
-    fine = np.linspace(0.0, x[0], 400)
-    loading = np.vstack([[0.0, 0.0], run.nodes[: run.loading, :2]])
-    work = float(trapezoid(PchipInterpolator(*loading.T)(fine), fine))
-    solved = np.interp(fine, np.append(opens, x[closed][::-1]), np.append(0.0, y[closed][::-1]))
-    returned = [float(trapezoid(values, fine)) for values in (solved, law.at(fine[None], x[0]).load[0])]
-    off, z = 100 * (load - y)[1:] / y[0], float(law.residual([[x[0]]])[0, 0])
+    fine = np.linspace(0.0, x[0], 2000)
+    loading = PchipInterpolator(*np.vstack([[0.0, 0.0], run.nodes[: run.loading, :2]]).T)(fine)
+    ways = [PchipInterpolator(np.append(-1.0, x[::-1]), np.append(0.0, values[::-1]))(fine) for values in (y, load)]
+    left = [fine[np.searchsorted(way, _OPEN * largest)] for way in ways]
+    returned = [trapezoid(way, fine) for way in ways]
+    off = 100 * (load - y)[1:] / largest
+    again = run.nodes[run.loading + len(x) - 1 :, :2]
+    again = again[again[:, 0] <= x[0]]
+    reloaded = law.at(again[None, :, 0], x[0])
     return {
         "back": np.array([np.sqrt(np.mean(off**2))]),
-        "residual": np.array([100 * (z - np.clip(z, *bracket))]),
-        "energy": np.array([100 * (returned[0] - returned[1]) / work]),
-        "back inside": np.abs(off) <= 100 * said.error[0, 1:] / y[0],
+        "residual": 100 * (left[1] - left[0])[None] if y[-1] < _OPEN * largest else np.zeros(0),
+        "energy": np.array([100 * (returned[0] - returned[1]) / trapezoid(loading, fine)]),
+        "reloaded": 100 * (reloaded.load[0] - again[:, 1]) / largest,
+        "back inside": np.abs(off) <= 100 * said.error[0, 1:] / largest,
     }
 
 
 def table_of(found: list[Off]) -> Table:
     """rms and largest of every quantity by kind of joint; and the share of P within the expected error."""
-    names = [*_RANGES, "stiffness", "p0", "eps", "back", "residual", "energy"]
+    names = [*_RANGES, "stiffness", "p0", "eps", "back", "residual", "energy", "reloaded"]
     table = Table("joints", "number", *names, "inside", "back inside")
     kinds = defaultdict(list)
     for one in found:
@@ -115,7 +117,7 @@ def table_of(found: list[Off]) -> Table:
             for name in (*names, "back inside")
         }
         shown = [values[name] for name in names]
-        cells = [f"{np.sqrt(np.mean(v**2)):.2f}/{np.abs(v).max():.1f}" if len(v) else "-" for v in shown]
+        cells = [rms_largest(v) for v in shown]
         inside = np.concatenate([one.inside for one in kinds[kind]]), values["back inside"]
         cells += [f"{share.mean():.0%}" if len(share) else "-" for share in inside]
         table.add(kind, len(kinds[kind]), *cells)
@@ -149,7 +151,7 @@ def other_laws(solved: dict[tuple[float, ...], list[NodeRun]]) -> Table:
             kind = "elastic" if np.isinf(numbers[5:]).all() else "strain" if numbers[0] else "stress"
             off[kind].append(100 * (law(numbers, x, y) / y - 1))
         cells = [np.concatenate(off[kind]) for kind in ("elastic", "strain", "stress")]
-        table.add(name, *(f"{np.sqrt(np.mean(v**2)):.2f}/{np.abs(v).max():.1f}" for v in cells))
+        table.add(name, *map(rms_largest, cells))
     return table
 
 

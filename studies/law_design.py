@@ -45,7 +45,8 @@ FRESH = {kind: number for kind, number in JOINTS.items() if "soft" not in kind} 
 }
 ELASTIC = [0.01, 0.02, 0.035, 0.06, 0.1, 0.16, 0.25, 0.38, 0.55, 0.8, 1.1, 1.5, 2.0, 2.5, 3.05]  # x of elastic joints
 _BEYOND = 0.03  # of the range, by which the joints to fit to exceed it
-_WAY = np.array([0.15, 0.4, 0.62, 0.78, 0.9, 1.0, 1.1, 1.22])  # of the way back
+_WAY = np.array([0.15, 0.4, 0.62, 0.78, 0.9, 1.0, 1.1, 1.22])  # of about the way back
+_FRESH_WAY = np.array([0.1, 0.25, 0.4, 0.53, 0.64, 0.73, 0.8, 0.86, 0.92, 0.98, 1.04, 1.1, 1.17, 1.25, 1.35, 1.5])
 _SOFTENING = {"strain": 0.45, "strain pin": 0.1, "stress": 0.72}  # -d(ln P/P_el)/d(ln x) beyond yield, about
 _CYCLES = 0.25  # share of joints that come back from a smaller displacement, too
 _BASE = {
@@ -118,7 +119,7 @@ def training() -> Iterator[Row]:
             x = x0 * MULTIPLES[: int(np.searchsorted(x0 * MULTIPLES, 3.0)) + 1]
             before = 0.95 * first * 1.25 ** np.arange(30)
             x = np.concatenate([before[before < 0.85 * x0], x])
-            yield from _yielding(own, kind, x0, x, chance / _CYCLES)
+            yield from _yielding(own, kind, x0, x, _WAY, chance / _CYCLES)
 
 
 def fresh(number: int, seed: int) -> Iterator[Row]:
@@ -132,29 +133,27 @@ def fresh(number: int, seed: int) -> Iterator[Row]:
                 continue
             x = x0 * (0.9 + 0.2 * odd) * 1.16 ** np.arange(30)
             x = np.array([*(e for e in early if e < 0.8 * x0), *x[x < 2.9], 3.0])
-            yield from _yielding(own, kind, last, x, chance)
+            yield from _yielding(own, kind, last, x, _FRESH_WAY, chance)
 
 
-def _yielding(own: Row, kind: str, x0: float, x: Array, chance: float) -> Iterator[Row]:
+def _yielding(own: Row, kind: str, x0: float, x: Array, way: Array, chance: float) -> Iterator[Row]:
     """Scenes of one joint that yields: to the last of ``x`` and back, twice as fine where it yields early, and, where
     ``chance`` is less than one, to an earlier one, back, and on."""
     softening = _SOFTENING["strain pin" if kind in ("strain pin", "strain pin soft") else kind.split()[0]]
 
     def back(deepest: float) -> list[float]:
         elastic_way = deepest * min(1.0, max(deepest / x0, 1.0) ** -softening)
-        return [t for t in deepest - elastic_way * _WAY if t > 0.01]
+        return [t for t in deepest - elastic_way * way if t > 0.01]
 
     yield own | {"load.displacement": [*x, *back(x[-1])]}
-    strength = (
-        min(own.get(f"{body}.yield_stress", np.inf) for body in ("pin", "block")) / own["joint.clearance"]
-    )
+    strength = min(own.get(f"{body}.yield_stress", np.inf) for body in ("pin", "block")) / own["joint.clearance"]
     if strength < EARLY:
         yield own | {"load.displacement": [*x], "load.steps": 2}
     if chance < 1 and len(x) > 3:
         i = 2 + int(chance * (len(x) - 3))
-        way = back(x[i])
-        again = (way[min(2, len(way) - 1)] + x[i]) / 2
-        yield own | {"load.displacement": [*x[: i + 1], *way, again, *x[i : i + 2]]}
+        below = back(x[i])
+        again = (below[min(2, len(below) - 1)] + x[i]) / 2
+        yield own | {"load.displacement": [*x[: i + 1], *below, again, *x[i : i + 2]]}
 
 
 def sweep_file(rows: Iterable[Row]) -> str:
@@ -165,7 +164,9 @@ def sweep_file(rows: Iterable[Row]) -> str:
             return [float(f"{v:.4g}") for v in value]
         return float(f"{value:.5g}") if isinstance(value, float) else value
 
-    lines = (",".join(f"{key}={toml_value(short(value)).replace(' ', '')}" for key, value in row.items()) for row in rows)
+    lines = (
+        ",".join(f"{key}={toml_value(short(value)).replace(' ', '')}" for key, value in row.items()) for row in rows
+    )
     return "list = [\n" + "".join(f"{{{line}}},\n" for line in lines) + "]\n\n" + tomli_w.dumps({"base": _BASE})
 
 

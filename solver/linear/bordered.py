@@ -8,6 +8,7 @@ control is, and beyond.
 from __future__ import annotations
 
 from collections.abc import Callable
+from weakref import proxy
 
 import numpy as np
 from petsc4py import PETSc
@@ -46,7 +47,8 @@ class Bordered(Strategy):
         self._x, self._y = A.createVecs()
         self._ksp = PETSc.KSP()
         size = (self._n + self._extra, None)
-        self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=self.comm)
+        # a matrix that kept its context alive would be kept alive by it
+        self.matrix = PETSc.Mat().createPython((size, size), context=proxy(self), comm=self.comm)
         self.matrix.setUp()
         self.replace(A)
 

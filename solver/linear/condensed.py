@@ -16,6 +16,7 @@ of the points at the contact's edge.
 from __future__ import annotations
 
 from collections.abc import Callable
+from weakref import proxy
 
 import numpy as np
 from mpi4py import MPI
@@ -63,7 +64,8 @@ class Condensed(Strategy):
         self._y = K.createVecLeft()
         self._Z = self._responses(_dofs(nodes))
         self.occupy(*np.zeros((2, 0), dtype=np.int64))
-        self.matrix = PETSc.Mat().createPython(K.getSizes(), context=self, comm=K.comm)
+        # a matrix that kept its context alive would be kept alive by it
+        self.matrix = PETSc.Mat().createPython(K.getSizes(), context=proxy(self), comm=K.comm)
         self.matrix.setUp()
 
     def _responses(self, dofs: np.ndarray) -> Array:

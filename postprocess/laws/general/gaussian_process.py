@@ -54,12 +54,12 @@ class Process:
         self.likelihood = -(0.5 * count * np.log(np.maximum(self.size, 1e-300)) + told)[count > 0].sum()
 
     def predict(self, points: Array) -> tuple[Array, Array]:
-        """Means and standard deviations ``(m, outputs)`` at ``points`` ``(m, d)``; of the process, without noise."""
+        """Means and standard deviations ``(m, outputs)`` of values at ``points`` ``(m, d)``."""
         reduced = solve_triangular(
             self.factor, self.kernel.between(self.points, points), lower=True, check_finite=False
         )
         told = (reduced**2).T @ self.known
-        left = np.maximum(self.kernel.at(points)[:, None] - told, 0.0)
+        left = np.maximum(self.kernel.at(points)[:, None] - told, 0.0) + self.kernel.noise
         return reduced.T @ self.weights, np.sqrt(left * self.size)
 
     def left_out(self) -> tuple[Array, Array]:

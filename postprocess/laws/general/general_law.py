@@ -119,7 +119,7 @@ def reduce_joints(side: str, joints: Elastic, yielding: Yielding | None = None) 
         travel = x - np.maximum.accumulate(x - travel, axis=1)
         rows = zip(base.y, base.slope, y, travel, strict=True)
         ratio = _from_zero(np.stack([_ratio(x, *map(np.asarray, row)) for row in rows]), 1.0)
-        back_error = _from_zero(lost.travel_deviation)
+        back_error = _from_zero(np.hypot(error, lost.way_error))
     root = np.sqrt(y)
     F0 = elastic_model().F.at(joints, np.zeros(1))[0][:, 0]
     rise, end = base.F[:, 0] - F0, base.F_slope[:, 0]

@@ -14,6 +14,7 @@ remembered. Reloading goes the same way, and on along the first loading.
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, NamedTuple
 
@@ -23,6 +24,7 @@ import numpy.typing as npt
 from archord.postprocess.laws.general.joint import Array
 
 _ITERATIONS = 6  # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
+_INSIDE = 1 + 1e-9
 _BRACKETED = 60  # iterations at most of Newton's method for an inverse, which bisects where it must
 
 
@@ -82,10 +84,14 @@ class JointCurve:
 
     def at(self, delta: npt.ArrayLike, deepest: npt.ArrayLike = 0.0) -> CurveState:
         """All quantities at ``delta`` after the joint has been as deep as ``deepest`` (both ``(..., k)``); 0 where the
-        joint is open."""
+        joint is open. Warns beyond the table."""
         x = np.asarray(delta, float) / self.length
         most = np.maximum(np.asarray(deepest, float) / self.length, 0.0)
         x, most = np.broadcast_arrays(x, most)
+        if (np.maximum(x, most) > _INSIDE * self.x[-1]).any():
+            warnings.warn(
+                f"archord: beyond {self.x[-1]:g} dR, where the joint's table ends, it goes on straight", stacklevel=2
+            )
         y, dy = self._loading(np.maximum(x, 0.0))
         root = np.sqrt(y)
         peak, angle = (

@@ -53,13 +53,14 @@ from archord.postprocess.laws.general.yield_model import (
     total_loss,
 )
 from archord.postprocess.run import Run
-from archord.report.table import Table
+from archord.report.table import Table, rms_largest
 
 _TERMS = {"F": (4, 5), "peak": (2, 4), "angle": (2, 4)}  # degree in the joint's numbers, and in x/(1 + x)
 EARLY = 0.6  # s below which steps count
-_LAST, _SOFT = 3.0, 0.5  # x that the law reaches; p m of soft pins in plane strain
+_LAST, SOFT = 3.0, 0.5  # x that the law reaches; p m of soft pins in plane strain
 _SPACING = 1.02  # beyond the last node by which a multiple counts as known
 _STARTS = {"force": 1e-5, "shape": 1e-3, "back": 1e-4}  # of the noise
+_MISFIT_NOISE = 0.03
 _LENGTHS = (0.7, 0.5, 0.6, 4.0, 1.4, 1.0, 1.0, 1.0)  # with which the search for a kernel's begins
 _FINE = np.geomspace(1e-3, 3.8, 400)
 
@@ -165,7 +166,7 @@ def yielding_joints(
         nodes, dense = first_loading(runs), model.at(joint, _FINE)
         base = model.at(joint, nodes[:, 0])
         total = np.log(nodes[:, 1:].T / np.stack([base.y[0], base.peak[0], base.angle[0]]))
-        ways = [(run.back[0, 0], travel(dense, run.back)) for run in runs if run.steps == 1 and len(run.back) > 2]
+        ways = [way_told(dense, run) for run in runs if run.steps == 1 and len(run.back) > 2]
         for side in sides_of(numbers):
             lost = total
             if side == PIN_WEAKER and pins is not None:
@@ -173,10 +174,11 @@ def yielding_joints(
                 lost = total - np.concatenate([own.force, own.peak, own.angle])
             x0 = float(first_yield(model, bool(numbers[0]), joint, yielding.of(side))[0])
             count, curves = _at_multiples(nodes[:, 0] / x0, lost)
-            back += [(len(rows), deepest / x0, way) for deepest, way in ways]
+            back += [(len(rows), deepest / x0, *told) for deepest, *told in ways]
             rows.append((SIDES.index(side), numbers, x0, count, curves))
     index, given, onsets, counts, losses = (np.array(column) for column in zip(*rows, strict=True))
     force, peak, angle = np.moveaxis(losses, 1, 0)
+    back.sort(key=lambda way: np.isnan(way[-1]))
     return SolvedJoints(index, given, onsets, counts, force, peak, angle, np.array(back)).stored()
 
 
@@ -192,24 +194,31 @@ def _at_multiples(u: Array, lost: Array) -> tuple[int, Array]:
     return count, curves
 
 
-def travel(elastic: ElasticState, points: Array) -> float:
-    """The travel of `Loss` that fits best to a way back ``points`` ``(k, 2)`` of x and y, by least squares."""
-    (deepest, largest), base = points[0], (_FINE, elastic.y[0], elastic.slope[0])
+def way_told(elastic: ElasticState, run: NodeRun) -> tuple[float, float, float, float]:
+    """Of a way back its deepest x, the travel of `Loss` that fits best by least squares, and over the largest force how
+    far P is from that way, rms, and at the first point of reloading, nan without one."""
+    (deepest, largest), base = run.back[0], (_FINE, elastic.y[0], elastic.slope[0])
     unit = deepest * largest / np.interp(deepest, _FINE, elastic.y[0])
 
-    def off(way: float) -> float:
-        return float(((way_back(*base, points[:, 0] - deepest, largest, way * unit) - points[:, 1]) ** 2).sum())
+    def off(travel: float, points: Array) -> Array:
+        return (way_back(*base, points[:, 0] - deepest, largest, travel * unit) - points[:, 1]) / largest
 
-    return float(
-        minimize_scalar(off, bounds=(0.3, min(1.5, deepest / unit)), method="bounded", options={"xatol": 1e-7}).x
-    )
+    found = minimize_scalar(
+        lambda travel: float((off(travel, run.back) ** 2).sum()),
+        bounds=(0.3, min(1.5, deepest / unit)),
+        method="bounded",
+        options={"xatol": 1e-7},
+    ).x
+    again = off(found, run.nodes[run.loading + len(run.back) - 1 :, :2][:1])
+    rms = np.sqrt(np.mean(off(found, run.back[1:]) ** 2))
+    return float(deepest), float(found), float(rms), float(abs(again[0])) if len(again) else np.nan
 
 
 def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
     """The kernels of one of `SIDES`, largest in likelihood, and the spread of errors of joints left out."""
     data = joints.of(side)
     shape = np.concatenate([data["peak"], data["angle"]], axis=1)
-    values = {"force": data["force"], "shape": shape, "back": data["travel"][:, None] - 1}
+    values = {"force": data["force"], "shape": shape, "back": data["back"][:, :1] - 1}
     found: dict[str, Any] = {"kernels": {}, "spread": {}}
     for name, of in values.items():
         points = data["back_inputs" if name == "back" else "inputs"]
@@ -217,6 +226,7 @@ def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
         found["kernels"][name] = {"lengths": kernel.lengths.tolist(), "noise": kernel.noise}
         off, deviation = Process(kernel, points, of).left_out()
         found["spread"][name] = float(f"{np.nanquantile(np.abs(off / deviation), 0.9):.3g}")
+    found["kernels"]["misfit"] = found["kernels"]["back"] | {"noise": _MISFIT_NOISE}
     return found
 
 
@@ -241,14 +251,12 @@ def error_table(joints: SolvedJoints, kernels: dict[str, Any]) -> Table:
     table = Table("process", "joints", "P 0.1 to 2 dR", "P 2 to 3 dR", "soft pins, to 3 dR", "inside", left=1)
     for side in SIDES:
         off, deviation = side_model(joints, side, kernels[side]).processes["force"].left_out()
-        chosen = np.flatnonzero(joints.side == SIDES.index(side))
-        chosen = chosen[np.lexsort((joints.x0[chosen], -joints.count[chosen]))]
+        chosen = joints.rows(side)
         x, own = MULTIPLES * joints.x0[chosen, None], joints.numbers[chosen]
-        soft = (own[:, 0] * own[:, 1] * own[:, 2] > _SOFT)[:, None] & (x <= _LAST)
+        soft = (own[:, 0] * own[:, 1] * own[:, 2] > SOFT)[:, None] & (x <= _LAST)
         cells = []
         for part in (~soft & (x >= 0.1) & (x <= 2), ~soft & (x > 2) & (x <= _LAST), soft):
-            values = 100 * off[part & ~np.isnan(off)]
-            cells.append(f"{np.sqrt(np.mean(values**2)):.2f}/{np.abs(values).max():.1f}" if len(values) else "-")
+            cells.append(rms_largest(100 * off[part & ~np.isnan(off)]))
         inside = np.abs(off) <= kernels[side]["spread"]["force"] * deviation
         table.add(side, len(chosen), *cells, f"{inside[~np.isnan(off)].mean():.0%}")
     return table

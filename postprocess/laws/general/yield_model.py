@@ -2,7 +2,8 @@
 
 Everything is told at multiples ``u = x/x0`` of about the displacement x0 of first yield, and relative to the elastic
 joint: ``ln(P/P_el)``, ``ln(p0/p0_el)``, ``ln(eps/eps_el)`` on first loading, and, by the deepest x, the way from there
-to where the joint opens, ``travel = (x - z)/(x P/P_el)``, which is 1 without yielding.
+to where the joint opens, ``travel = (x - z)/(x P/P_el)``, which is 1 without yielding. How far that is from the way
+that a joint was solved on, and from the one on reloading, goes into the expected error.
 
 There is a process for each of `SIDES`. In plane stress the weaker body limits the pressure. In plane strain a weak pin
 is held by the hole and loses little: one process tells of pins that yield alone, and another what yielding of the
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from archord.postprocess.laws.general.elastic_model import Elastic, ElasticModel
@@ -34,6 +36,7 @@ PIN_ALONE, PIN_WEAKER = "strain pin alone", "strain pin weaker"
 SIDES = (PIN_ALONE, PIN_WEAKER, "strain block", "stress pin", "stress block")  # plane, and the body that yields first
 ELASTIC_BELOW = 0.8  # u: nothing has yielded
 _CURVES = ("force", "peak", "angle")
+_NINE_IN_TEN = 1.645  # standard deviations
 _STEP, _UNKNOWN = 1e-4, -32768  # of stored logarithms, and what stands for nan
 _GRID = np.geomspace(0.03, 3.8, 300)  # x, among which first yield is found
 
@@ -52,7 +55,8 @@ class Yielding(NamedTuple):
 
 class Loss(NamedTuple):
     """What yielding does at ``x`` ``(m, k)``: ``ln(P/P_el)`` with its slope by x and its error, ``ln(p0/p0_el)``,
-    ``ln(eps/eps_el)``, ``travel`` back and its error; errors are those of 9 in 10 joints."""
+    ``ln(eps/eps_el)``, ``travel`` back, and the error of P on that way over the largest P; errors are those of 9 in 10
+    joints."""
 
     force: Array
     slope: Array
@@ -60,7 +64,7 @@ class Loss(NamedTuple):
     peak: Array
     angle: Array
     travel: Array
-    travel_deviation: Array
+    way_error: Array
 
 
 def first_yield(model: ElasticModel, strain: bool, joints: Elastic, s: Array) -> Array:
@@ -93,8 +97,9 @@ def features(side: str, joints: Elastic, yielding: Yielding) -> Array:
 class YieldModel:
     """The processes of a ``side``: ``inputs`` ``(n, d)`` of its joints, from the one known to most `MULTIPLES`
     down, and their curves ``force``, ``peak``, ``angle`` ``(n, multiples)``, nan beyond what is known; ``back_inputs``
-    ``(k, d + 1)``, of which the last is ln u of the deepest point, and ``travel`` ``(k,)``. ``kernels`` by the names
-    "force", "shape" and "back", and ``spread``, the factors on standard deviations below which 9 in 10 errors are."""
+    ``(k, d + 1)``, of which the last is ln u of the deepest point, and ``back`` ``(k, 3)``, the last columns of
+    `SolvedJoints.back`. ``kernels`` by the names of `processes`, and ``spread``, the factors on standard deviations
+    below which 9 in 10 errors are."""
 
     side: str
     inputs: Array
@@ -102,7 +107,7 @@ class YieldModel:
     peak: Array
     angle: Array
     back_inputs: Array
-    travel: Array
+    back: Array
     kernels: Mapping[str, Kernel]
     spread: Mapping[str, float]
 
@@ -113,7 +118,8 @@ class YieldModel:
         return {
             "force": Process(self.kernels["force"], self.inputs, self.force),
             "shape": Process(self.kernels["shape"], self.inputs, shape),
-            "back": Process(self.kernels["back"], self.back_inputs, self.travel[:, None] - 1),
+            "back": Process(self.kernels["back"], self.back_inputs, self.back[:, :1] - 1),
+            "misfit": Process(self.kernels["misfit"], self.back_inputs, self.back[:, 1:]),
         }
 
     def at(self, joints: Elastic, yielding: Yielding, x0: Array, x: Array) -> Loss:
@@ -124,10 +130,12 @@ class YieldModel:
         rows = np.stack([force, *np.split(shape, 2, axis=1), deviation], axis=2)
         found = np.stack([_between(row, own, float(x[-1] / at)) for row, own, at in zip(rows, u, x0, strict=True)])
         deep = np.concatenate([np.repeat(inputs, len(x), axis=0), u.reshape(-1, 1)], axis=1)
-        way = [values.reshape(u.shape) for values in self.processes["back"].predict(deep)]
+        travel, uncertain = self.processes["back"].predict(deep)
+        misfit, _ = self.processes["misfit"].predict(deep)
+        errors = np.column_stack([self.spread["back"] * uncertain, _NINE_IN_TEN * misfit[:, 0], misfit[:, 1]])
         force, slope, peak, angle, deviation = np.moveaxis(found, -1, 0)
-        return Loss(force, slope / x, self.spread["force"] * deviation, peak, angle, 1 + way[0],
-                    self.spread["back"] * way[1])  # fmt: skip
+        return Loss(force, slope / x, self.spread["force"] * deviation, peak, angle,
+                    1 + travel.reshape(u.shape), np.linalg.norm(errors, axis=1).reshape(u.shape))  # fmt: skip
 
 
 def loss(side: str, model: ElasticModel, joints: Elastic, yielding: Yielding, x: Array) -> Loss:
@@ -158,7 +166,7 @@ def total_loss(
             getattr(found, name)[some] += getattr(own, name)
         found.deviation[some] = np.hypot(total.deviation[some], own.deviation)
         found.travel[some] += begun * (own.travel - total.travel[some])
-        found.travel_deviation[some] += begun * (own.travel_deviation - total.travel_deviation[some])
+        found.way_error[some] += begun * (own.way_error - total.way_error[some])
         total = found
     return total
 
@@ -181,7 +189,8 @@ class SolvedJoints:
     """Joints that yield, ``(n, ...)``, as yield_model.npz has them: ``side`` is the index in `SIDES` of the process
     that a row is for (joints of like bodies have two), ``numbers`` are plane (1: strain), p, m, n, dR/R, s of pin and
     of block; ``count`` how many `MULTIPLES` of ``x0`` are known; ``force``, ``peak`` and ``angle`` there; ``back``
-    ``(k, 3)`` the row of a joint, u of its deepest point, and its travel back."""
+    ``(k, 5)`` the row of a joint, u of its deepest point, its travel back, and over the largest force how far P is from
+    that way, rms, and on reloading; those that tell of it first."""
 
     side: Array
     numbers: Array
@@ -203,10 +212,14 @@ class SolvedJoints:
             found[name] = np.where(np.isnan(found[name]), _UNKNOWN, np.round(found[name] / _STEP)).astype(np.int16)
         return found
 
+    def rows(self, side: str) -> npt.NDArray[np.intp]:
+        """Those of one of `SIDES`, from the joint known to most `MULTIPLES` down."""
+        chosen = np.flatnonzero(self.side == SIDES.index(side))
+        return chosen[np.lexsort((self.x0[chosen], -self.count[chosen]))]
+
     def of(self, side: str) -> dict[str, Array]:
         """What `YieldModel` takes of the joints of one of `SIDES`."""
-        chosen = np.flatnonzero(self.side == SIDES.index(side))
-        chosen = chosen[np.lexsort((self.x0[chosen], -self.count[chosen]))]
+        chosen = self.rows(side)
         beyond = np.arange(len(MULTIPLES)) >= self.count[chosen, None]
         curves = {name: np.where(beyond, np.nan, getattr(self, name)[chosen]) for name in _CURVES}
         own = self.numbers[chosen].T
@@ -216,7 +229,7 @@ class SolvedJoints:
         back = self.back[row[self.back[:, 0].astype(int)] >= 0]
         back = back[back[:, 1] > ELASTIC_BELOW]
         deep = np.column_stack([inputs[row[back[:, 0].astype(int)]], np.log(back[:, 1])])
-        return {"inputs": inputs, **curves, "back_inputs": deep, "travel": back[:, 2]}
+        return {"inputs": inputs, **curves, "back_inputs": deep, "back": back[:, 2:]}
 
 
 def sides_of(numbers: Any) -> tuple[str, ...]:

@@ -72,6 +72,9 @@ def curve(request: pytest.FixtureRequest) -> JointCurve:
     return curves()[request.param]
 
 
+pytestmark = pytest.mark.filterwarnings("ignore:archord. beyond")
+
+
 def inputs(curve: JointCurve, n: int = 10_000) -> np.ndarray:
     """Pairs of displacement and deepest displacement ``(n, 2)``: open, first touch, through the table and beyond."""
     rng = np.random.default_rng(19)
@@ -122,8 +125,9 @@ def test_python_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> N
     assert [ast.unparse(node) for node in tops] == ["import math"]
     pairs = inputs(curve)
     with pytest.warns(UserWarning, match="beyond the tables") as caught:
-        check(curve, pairs, evaluate(vars(law), pairs))
+        values = evaluate(vars(law), pairs)
     assert len(caught) == 1
+    check(curve, pairs, values)
     assert curve.about == law.ABOUT
     assert law.advance(0.1, 0.2) == 0.2
     assert law.in_range(curve.limit)

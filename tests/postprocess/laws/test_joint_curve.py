@@ -10,7 +10,7 @@ import pytest
 from archord.postprocess.laws.general.joint_curve import JointCurve, first_touch
 from tests.postprocess.laws.curves import yielding_curve
 
-X = np.linspace(0.0, 3.3, 500)
+X = np.linspace(0.0, 3.0, 500)
 
 
 def test_slopes_are_those_of_the_force() -> None:
@@ -35,6 +35,12 @@ def test_both_branches_meet_at_the_deepest_point_and_the_way_back_is_below() -> 
         np.testing.assert_array_equal(back > 0, (z < X) & (X > 0))
         assert abs(float(curve.at([deepest - 1e-12], deepest).load[0] - curve.at([deepest]).load[0])) < 1e-10
     assert float(curve.residual(np.array([2.5]))[0]) > 0.5
+
+
+def test_beyond_the_table_there_is_a_warning() -> None:
+    curve = yielding_curve()
+    with pytest.warns(UserWarning, match="beyond 3 dR"):
+        assert curve.at([1.01 * curve.limit]).load > curve.at([curve.limit]).load
 
 
 def test_the_inverse_gives_the_displacement_back() -> None:

@@ -1,5 +1,7 @@
 """One factorisation for all linear systems of an elastic joint."""
 
+from weakref import ref
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -61,6 +63,18 @@ def test_a_singular_system_has_no_number_for_an_answer():
     r.array[:] = 1.0
     condensed.apply(None, r, x)
     assert not np.isfinite(x.array_r).all()
+
+
+def test_nothing_keeps_a_system_that_is_used_no_more():
+    """Its responses are most of the memory of a run; sweeps solve thousands of runs in one process."""
+    _, A = stiffness(8, np.random.default_rng(1))
+    condensed, ksp = Condensed(A, np.array([0, 2]), as_it_is), PETSc.KSP().create(MPI.COMM_SELF)
+    condensed.attach(ksp)
+    ksp.setUp()
+    still = ref(condensed)
+    del condensed
+    ksp.destroy()
+    assert still() is None
 
 
 @pytest.mark.parametrize("kinematics", ["current", "reference"])
