@@ -8,14 +8,13 @@ control is, and beyond.
 from __future__ import annotations
 
 from collections.abc import Callable
-from weakref import proxy
 
 import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.solver.linear.direct import Direct
-from archord.solver.linear.strategy import Facts, Strategy
+from archord.solver.linear.strategy import Facts, Product, Strategy
 
 _SINGULAR = 1e-9  # stiffness against a motion over ``stiffness`` below which nothing resists the force
 _FORCED = 1e-3  # part of a right-hand side along such a motion above which the system has no solution
@@ -47,8 +46,7 @@ class Bordered(Strategy):
         self._x, self._y = A.createVecs()
         self._ksp = PETSc.KSP()
         size = (self._n + self._extra, None)
-        # a matrix that kept its context alive would be kept alive by it
-        self.matrix = PETSc.Mat().createPython((size, size), context=proxy(self), comm=self.comm)
+        self.matrix = PETSc.Mat().createPython((size, size), context=Product(self), comm=self.comm)
         self.matrix.setUp()
         self.replace(A)
 

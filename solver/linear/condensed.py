@@ -16,7 +16,6 @@ of the points at the contact's edge.
 from __future__ import annotations
 
 from collections.abc import Callable
-from weakref import proxy
 
 import numpy as np
 from mpi4py import MPI
@@ -24,7 +23,7 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.solver.linear.direct import Direct
-from archord.solver.linear.strategy import Facts, Strategy
+from archord.solver.linear.strategy import Facts, Product, Strategy
 
 _MOST_DOFS = 8_000  # beyond, the work on contact dofs takes longer than factorisations
 _LARGE_GAMMA = 5.0  # beyond, the small system is close to singular
@@ -64,8 +63,7 @@ class Condensed(Strategy):
         self._y = K.createVecLeft()
         self._Z = self._responses(_dofs(nodes))
         self.occupy(*np.zeros((2, 0), dtype=np.int64))
-        # a matrix that kept its context alive would be kept alive by it
-        self.matrix = PETSc.Mat().createPython(K.getSizes(), context=proxy(self), comm=K.comm)
+        self.matrix = PETSc.Mat().createPython(K.getSizes(), context=Product(self), comm=K.comm)
         self.matrix.setUp()
 
     def _responses(self, dofs: np.ndarray) -> Array:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+from weakref import ref
 
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -36,3 +38,15 @@ class Strategy:
         ksp.setOperators(self.matrix)
         ksp.getPC().setType("python")
         ksp.getPC().setPythonContext(self)
+
+
+class Product:
+    """Python context of the matrix that a ``strategy`` with a method `mult` makes. It does not keep the strategy alive,
+    which holds the matrix: what PETSc refers to Python cannot collect."""
+
+    def __init__(self, strategy: Any) -> None:
+        self._strategy = ref(strategy)
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """``y = matrix x``, called by PETSc."""
+        self._strategy().mult(matrix, x, y)
