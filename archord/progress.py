@@ -86,10 +86,10 @@ class Progress:
         self.iterations += iterations
         self.move(f"load {load:.6g}, {self.iterations} Newton iterations")
 
-    def move(self, said: str) -> None:
-        """Show on a terminal what is being done."""
+    def move(self, said: str, at_once: bool = False) -> None:
+        """Show on a terminal what is being done: with the next picture, or ``at_once``."""
         if self.moving is not None:
-            self.moving.update(self.moving.task_ids[0], description=said)
+            self.moving.update(self.moving.task_ids[0], description=said, refresh=at_once)
 
     def phase(self, name: str) -> None:
         """Show a phase before the first load is tried: on a terminal, or of a large mesh by a line."""
@@ -97,7 +97,7 @@ class Progress:
         said = {"mesh": f"meshing{about}", "setup": "setting up"}.get(name)
         if said is None:
             return
-        self.move(said)
+        self.move(said, at_once=True)
         if self.moving is None and self.cells > _LARGE:
             self.print(f"{said} ...")
 

@@ -24,9 +24,9 @@ from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.general.general_law import law_of_numbers
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
-from archord.postprocess.laws.general.law_fit import SOFT, NodeRun, complete, first_loading, solved_joints
+from archord.postprocess.laws.general.law_fit import SOFT, NodeRun, complete, first_loading, rms_largest, solved_joints
 from archord.postprocess.run import Run
-from archord.report.table import Table, rms_largest
+from archord.report.table import Table
 
 _RANGES = {"P to 0.1 dR": (0.0, 0.099), "P 0.1 to 2 dR": (0.099, 2.001), "P 2 to 3 dR": (2.001, 3.001)}
 _OPEN = 0.01  # of the largest force, below which a joint counts as open on its way back

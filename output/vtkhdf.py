@@ -68,7 +68,8 @@ class VtkHdf:
     def __init__(self, path: Path, grid: Grid, total: int) -> None:
         self.path, self._total, self._room = path, total, 0
         self._fixed = {name: np.ascontiguousarray(values) for name, values in grid.arrays().items()}
-        self._values, self._times = Arrays(), list[float]()
+        self._values: Arrays = {}
+        self._times: list[float] = []
 
     def write(self, times: Sequence[float], arrays: Arrays) -> None:
         """Add a step: "PointData/NAME" ``(n, ...)`` and "CellData/NAME" ``(m, ...)``; ``times`` are those of all steps,

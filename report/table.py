@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
-import numpy.typing as npt
-
 
 class Table:
     """Rows of cells under ``headings``; ``str()`` is the table in aligned columns, `markdown` that of a document.
@@ -48,11 +45,6 @@ class Table:
         """As Markdown, a bar within a cell escaped, with a line break at the end."""
         lines = [_line(self.headings), "|---" * len(self.headings) + "|", *map(_line, self.rows)]
         return "\n".join(lines) + "\n"
-
-
-def rms_largest(errors: npt.NDArray[np.float64]) -> str:
-    """The cell of ``errors`` ``(n,)``: their root mean square and the largest; a dash of none."""
-    return f"{np.sqrt(np.mean(errors**2)):.2f}/{np.abs(errors).max():.1f}" if len(errors) else "-"
 
 
 def _line(cells: Iterable[str]) -> str:

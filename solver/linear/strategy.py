@@ -49,4 +49,6 @@ class Product:
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """``y = matrix x``, called by PETSc."""
-        self._strategy().mult(matrix, x, y)
+        strategy = self._strategy()
+        assert strategy is not None  # it holds the matrix
+        strategy.mult(matrix, x, y)

@@ -53,7 +53,7 @@ from archord.postprocess.laws.general.yield_model import (
     total_loss,
 )
 from archord.postprocess.run import Run
-from archord.report.table import Table, rms_largest
+from archord.report.table import Table
 
 _TERMS = {"F": (4, 5), "peak": (2, 4), "angle": (2, 4)}  # degree in the joint's numbers, and in x/(1 + x)
 EARLY = 0.6  # s below which steps count
@@ -243,6 +243,11 @@ def fit_kernel(points: Array, values: Array, noise: float) -> Kernel:
     start = np.log([*_LENGTHS[: points.shape[1]], noise])
     bounds = [(np.log(0.1), np.log(60.0))] * points.shape[1] + [(np.log(1e-7), np.log(0.1))]
     return kernel(minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}).x)
+
+
+def rms_largest(errors: Array) -> str:
+    """The cell of ``errors`` ``(n,)``: their root mean square and the largest; a dash of none."""
+    return f"{np.sqrt(np.mean(errors**2)):.2f}/{np.abs(errors).max():.1f}" if len(errors) else "-"
 
 
 def error_table(joints: SolvedJoints, kernels: dict[str, Any]) -> Table:
