@@ -29,7 +29,7 @@ from archord.postprocess.run import Run
 from archord.report.table import Table
 
 _RANGES = {"P to 0.1 dR": (0.0, 0.099), "P 0.1 to 2 dR": (0.099, 2.001), "P 2 to 3 dR": (2.001, 3.001)}
-_OPEN = 0.01  # of the largest force, below which a joint counts as open on its way back
+_LEFT = {"3 % left": 0.03, "1 % left": 0.01}  # parts of the largest force on the way back
 
 
 @dataclass(frozen=True)
@@ -78,15 +78,19 @@ def kind_of(numbers: tuple[float, ...]) -> str:
 
 
 def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
-    """Errors of a way back, in per cent: of P over the largest P, of the displacement at which hardly a force is left
+    """Errors of a way back, in per cent: of P over the largest P, of the displacements at which parts of it are left
     over dR, of the energy lost over the work of loading, of P on reloading; and where P is within what is expected."""
     (x, y), largest = run.back.T, run.back[0, 1]
-    said = law.at(x[None], x[0])
-    load = said.load[0]
+    state = law.at(x[None], x[0])
+    load = state.load[0]
     fine = np.linspace(0.0, x[0], 2000)
     loading = PchipInterpolator(*np.vstack([[0.0, 0.0], run.nodes[: run.loading, :2]]).T)(fine)
     ways = [PchipInterpolator(np.append(-1.0, x[::-1]), np.append(0.0, values[::-1]))(fine) for values in (y, load)]
-    left = [fine[np.searchsorted(way, _OPEN * largest)] for way in ways]
+    left = {
+        name: [fine[np.searchsorted(way, share * largest)] for way in ways]
+        for name, share in _LEFT.items()
+        if y[-1] < share * largest
+    }
     returned = [trapezoid(way, fine) for way in ways]
     off = 100 * (load - y)[1:] / largest
     again = run.nodes[run.loading + len(x) - 1 :, :2]
@@ -94,16 +98,16 @@ def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
     reloaded = law.at(again[None, :, 0], x[0])
     return {
         "back": np.array([np.sqrt(np.mean(off**2))]),
-        "residual": 100 * (left[1] - left[0])[None] if y[-1] < _OPEN * largest else np.zeros(0),
+        **{name: np.array([100 * (said - solved)]) for name, (solved, said) in left.items()},
         "energy": np.array([100 * (returned[0] - returned[1]) / trapezoid(loading, fine)]),
         "reloaded": 100 * (reloaded.load[0] - again[:, 1]) / largest,
-        "back inside": np.abs(off) <= 100 * said.error[0, 1:] / largest,
+        "back inside": np.abs(off) <= 100 * state.error[0, 1:] / largest,
     }
 
 
 def table_of(found: list[Off]) -> Table:
     """rms and largest of every quantity by kind of joint; and the share of P within the expected error."""
-    names = [*_RANGES, "stiffness", "p0", "eps", "back", "residual", "energy", "reloaded"]
+    names = [*_RANGES, "stiffness", "p0", "eps", "back", *_LEFT, "energy", "reloaded"]
     table = Table("joints", "number", *names, "inside", "back inside")
     kinds = defaultdict(list)
     for one in found:

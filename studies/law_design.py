@@ -27,7 +27,7 @@ from archord.postprocess.laws.general.yield_model import MULTIPLES, first_yield
 from archord.scene.keys import toml_value
 
 Row = dict[str, Any]
-JOINTS = {  # by plane, bodies that yield, whether the other is stronger or elastic, and whether the pin is soft
+JOINTS = {  # by plane, what yields, whether the other body is stronger, and whether by little or the pin is soft
     **{
         "strain both": 280,
         "strain block": 170,
@@ -38,8 +38,9 @@ JOINTS = {  # by plane, bodies that yield, whether the other is stronger or elas
     **{"strain both soft": 60, "strain block soft": 35, "strain block weaker soft": 35, "strain pin soft": 35},
     **{"strain pin weaker soft": 35, "strain elastic": 320, "strain elastic soft": 64},
     **{"stress both": 100, "stress block": 70, "stress block weaker": 80, "stress pin": 70, "stress pin weaker": 80},
+    **{"stress block weaker alike": 40, "stress pin weaker alike": 40},
 }
-FRESH = {kind: number for kind, number in JOINTS.items() if "soft" not in kind} | {
+FRESH = {kind: number for kind, number in JOINTS.items() if kind.split()[-1] not in ("soft", "alike")} | {
     "strain elastic": 90,
     "stress elastic": 60,
 }
@@ -88,7 +89,11 @@ def joints(kind: str, number: int, seed: int, beyond: float = 0.0) -> Iterator[t
             s = _between(SMALLEST_S[plane] / wide, latest, u[4] ** 1.2)
             other = s if yields == "both" else np.inf
             if "weaker" in more:  # a weak pin in a block keeps its force in plane strain: the block yields, too
-                other = _between(s, latest, u[5]) if yields == "pin" and strain else s / (0.98 - 0.75 * u[5])
+                other = (
+                    _between(s, latest, u[5])
+                    if yields == "pin" and strain
+                    else s / (0.98 - (0.25 if "alike" in more else 0.75) * u[5])
+                )
             stresses = {"pin": s, "block": other} if yields == "pin" else {"pin": other, "block": s}
             for body, stress in stresses.items():
                 if np.isfinite(stress) and f"{body}.E" in own:

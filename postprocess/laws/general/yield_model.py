@@ -89,7 +89,7 @@ def features(side: str, joints: Elastic, yielding: Yielding) -> Array:
         inputs.append(np.log(yielding.pin / s))
     elif side != PIN_ALONE:
         share = s / (yielding.block if side == "stress pin" else yielding.pin)
-        inputs += [1 - share, np.tanh(3 * (1 - share))]
+        inputs += [1 - share, np.tanh((6 if side.startswith("stress") else 3) * (1 - share))]
     return np.stack(inputs, axis=-1)
 
 
