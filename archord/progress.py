@@ -93,10 +93,11 @@ class Progress:
 
     def phase(self, name: str) -> None:
         """Show a phase before the first load is tried: on a terminal, or of a large mesh by a line."""
-        about = f" about {float(f'{self.cells:.2g}'):.0f} triangles" if self.cells else ""
-        said = {"mesh": f"meshing{about}", "setup": "setting up"}.get(name)
+        said = {"mesh": "meshing", "setup": "setting up"}.get(name)
         if said is None:
             return
+        if name == "mesh" and self.cells:
+            said += f" about {float(f'{self.cells:.2g}'):.0f} triangles"
         self.move(said, at_once=True)
         if self.moving is None and self.cells > _LARGE:
             self.print(f"{said} ...")

@@ -35,8 +35,8 @@ _LEFT = {"3 % left": 0.03, "1 % left": 0.01}  # parts of the largest force on th
 @dataclass(frozen=True)
 class Off:
     """Errors of one joint: by quantity an array, relative in per cent but for eps [degrees]; of the stiffness over the
-    larger of itself and P/delta, as it vanishes where the whole contact yields in plane stress. ``kind`` is plane and
-    what yields; ``inside`` which errors of P are within the expected ones."""
+    larger of itself and P/delta, as it vanishes where the whole contact yields in plane stress, and over itself.
+    ``kind`` is plane and what yields; ``inside`` which errors of P are within the expected ones."""
 
     kind: str
     errors: dict[str, Array]
@@ -54,7 +54,9 @@ def off(numbers: tuple[float, ...], runs: list[NodeRun]) -> Off:
     errors = {name: relative[(x > low) & (x <= high)] for name, (low, high) in _RANGES.items()}
     usual = (x > 0.099) & (x <= 2.001)
     slope = CubicSpline(np.log(x), np.log(y))(np.log(x), 1) * y / x
-    errors["stiffness"] = (100 * (stiffness - slope) / np.maximum(slope, y / x))[usual & (x < x[-1])]
+    before = usual & (x < x[-1])
+    errors["stiffness"] = (100 * (stiffness - slope) / np.maximum(slope, y / x))[before]
+    errors["own stiffness"] = (100 * (stiffness / slope - 1))[before]
     errors["p0"], errors["eps"] = (100 * (p0 / peak - 1))[usual], np.degrees(eps - angle)[usual]
     for run in runs:
         if run.steps == 1 and len(run.back) > 3 and run.back[0, 0] <= 3.001:
@@ -107,7 +109,7 @@ def _back(law: JointCurve, run: NodeRun) -> dict[str, Array]:
 
 def table_of(found: list[Off]) -> Table:
     """rms and largest of every quantity by kind of joint; and the share of P within the expected error."""
-    names = [*_RANGES, "stiffness", "p0", "eps", "back", *_LEFT, "energy", "reloaded"]
+    names = [*_RANGES, "stiffness", "own stiffness", "p0", "eps", "back", *_LEFT, "energy", "reloaded"]
     table = Table("joints", "number", *names, "inside", "back inside")
     kinds = defaultdict(list)
     for one in found:

@@ -45,10 +45,9 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
 
 
 def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool = False) -> list[Path]:
-    """Write all steps of ``run``, or one ``step`` alone, into ``folder``; returns the files, the .pvd first. Time is
+    """Write all steps of ``run``, or one ``step`` alone, into ``folder``; returns the files, the bodies' first. Time is
     delta, or the load factor; the number of the step, where that does not only grow. Raises `InputError` as
     `export_csv`, and if the run wrote no fields."""
-
     steps = [run.number(step)] if step is not None else range(1, run.number(None) + 1)
     parts = {"bodies": _bodies(run, steps[-1])} | ({"contact": _contact(run, steps[-1])} if run.has_contact else {})
     files = {folder / f"{name}.vtkhdf": part for name, part in parts.items()}

@@ -7,6 +7,7 @@ import copy
 import hashlib
 import itertools
 import math
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -277,8 +278,11 @@ def _checked_keys(found: list[Factor]) -> list[str]:
 
 
 def run_name(scene: Scene) -> str:
-    """Twelve hexadecimal digits that stand for the resolved scene and how archord solves it."""
-    return hashlib.sha256(f"archord {_SOLVED_ALIKE_SINCE}\n{resolved(scene)}".encode()).hexdigest()[:12]
+    """Twelve hexadecimal digits that stand for the resolved scene, its output in the words of the first version that
+    solved it so, and how archord solves it."""
+    data, fields = tomllib.loads(resolved(scene)), scene.output.fields
+    data["output"] = {"fields": bool(fields), "stress": fields in ("nodes", "points"), "points": fields == "points"}
+    return hashlib.sha256(f"archord {_SOLVED_ALIKE_SINCE}\n{tomli_w.dumps(data)}".encode()).hexdigest()[:12]
 
 
 def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:

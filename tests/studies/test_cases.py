@@ -112,6 +112,11 @@ def test_identical_scenes_are_one_run(tmp_path):
     assert len({run_name(load_scene(ELASTIC, [f"load.steps={n}"])) for n in range(1, 20)}) == 19
 
 
+def test_runs_of_version_0_1_have_the_names_that_they_had():
+    """Read off a run folder of 0.1: sweeps that it began go on."""
+    assert run_name(load_scene(SCENES / "steel_pin.toml")) == "4bccb21874f0"
+
+
 def test_the_resolved_file_gives_the_same_cases(tmp_path):
     """From another folder, too, though a path of the base counts from the base's folder."""
     (tmp_path / "scenes").mkdir()

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from archord.postprocess.laws.general.joint import Array
 
 _ITERATIONS = 6  # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
-_INSIDE = 1 + 1e-9
+_INSIDE = 1 + 1e-9  # of the last node, but for round-off
 _BRACKETED = 60  # iterations at most of Newton's method for an inverse, which bisects where it must
 
 

@@ -60,7 +60,7 @@ EARLY = 0.6  # s below which steps count
 _LAST, SOFT = 3.0, 0.5  # x that the law reaches; p m of soft pins in plane strain
 _SPACING = 1.02  # beyond the last node by which a multiple counts as known
 _STARTS = {"force": 1e-5, "shape": 1e-3, "back": 1e-4}  # of the noise
-_MISFIT_NOISE = 0.03
+_MISFIT_NOISE = 0.03  # of how far P is from the way back, which tells an expected error alone
 _LENGTHS = (0.7, 0.5, 0.6, 4.0, 1.4, 1.0, 1.0, 1.0)  # with which the search for a kernel's begins
 _FINE = np.geomspace(1e-3, 3.8, 400)
 
