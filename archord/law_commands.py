@@ -98,7 +98,7 @@ def law(
     """Print a table of laws of the joint, draw them against each other, or export archord's."""
     from archord.output.user_file import check_target
     from archord.postprocess.laws.law import LawRangeWarning
-    from archord.postprocess.laws.law_report import draw_laws, law_table, sample, says_nothing
+    from archord.postprocess.laws.law_report import draw_laws, law_table, sample, says_nothing, too_elastic
     from archord.postprocess.laws.laws import default_law, find_law
     from archord.scene.file import files_read
 
@@ -132,7 +132,7 @@ def law(
             silent.append([f"{entry.name}: has no number here", *told][-1])
         else:
             states.append((entry, state))
-            said += told
+            said += [*told, *too_elastic(entry, joint, state)]
     if not states:
         raise InputError(f"{'; '.join(silent)}.")
     if plot:

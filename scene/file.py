@@ -52,6 +52,8 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> AnyScene:
 
     A mesh file is looked for beside it. Raises `InputError` with one sentence per fault: file, key, value, what may be.
     """
+    if Path(path).is_dir():
+        raise InputError(f"{path}: is a folder, not a scene; that of a run is {Path(path) / 'scene.toml'}.")
     data = read_toml(path)
     if "base" in data and "joint" not in data:
         raise InputError(f"{path}: is a sweep, not a scene; archord sweep solves it.")

@@ -8,7 +8,7 @@ smallest s of the range to one at which yielding begins at 3 dR), and the other 
 solved at multiples of about the displacement of first yield up to 3 dR, then taken back, and a quarter of them once
 more from a smaller displacement. Where yielding begins early it is solved with two steps between the same nodes, too.
 
-First yield is that of the elastic law that is there. To fit that anew moves displacements in their last digits, so
+First yield and the way back are those of the law that is there. To fit that anew moves displacements, so
 scenes/law.sweep.toml, which the law was fitted to, is kept.
 """
 
@@ -16,6 +16,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,8 +25,9 @@ import tomli_w
 from scipy.stats import qmc
 
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
-from archord.postprocess.laws.general.general_law import CLEARANCES, NU, RATIOS, SMALLEST_S
+from archord.postprocess.laws.general.general_law import CLEARANCES, NU, RATIOS, SMALLEST_S, law_of_numbers
 from archord.postprocess.laws.general.joint import Array
+from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.general.law_fit import EARLY
 from archord.postprocess.laws.general.yield_model import MULTIPLES, first_yield
 from archord.scene.keys import toml_value
@@ -41,7 +44,7 @@ JOINTS = {  # by plane, what yields, whether the other body is stronger, and whe
     **{"strain both soft": 60, "strain block soft": 35, "strain block weaker soft": 35, "strain pin soft": 35},
     **{"strain pin weaker soft": 35, "strain elastic": 320, "strain elastic soft": 64},
     **{"stress both": 100, "stress block": 70, "stress block weaker": 80, "stress pin": 70, "stress pin weaker": 80},
-    **{"stress block weaker alike": 40, "stress pin weaker alike": 40},
+    **{"stress block weaker alike": 110, "stress pin weaker alike": 40},
 }
 FRESH = {kind: number for kind, number in JOINTS.items() if kind.split()[-1] not in ("soft", "alike")} | {
     "strain elastic": 90,
@@ -49,9 +52,8 @@ FRESH = {kind: number for kind, number in JOINTS.items() if kind.split()[-1] not
 }
 ELASTIC = [0.01, 0.02, 0.035, 0.06, 0.1, 0.16, 0.25, 0.38, 0.55, 0.8, 1.1, 1.5, 2.0, 2.5, 3.05]  # x of elastic joints
 _BEYOND = 0.03  # of the range, by which the joints to fit to exceed it
-_WAY = np.array([0.15, 0.4, 0.62, 0.78, 0.9, 1.0, 1.1, 1.22])  # of about the way back
-_FRESH_WAY = np.array([0.1, 0.25, 0.4, 0.53, 0.64, 0.73, 0.8, 0.86, 0.92, 0.98, 1.04, 1.1, 1.17, 1.25, 1.35, 1.5])
-_SOFTENING = {"strain": 0.45, "strain pin": 0.1, "stress": 0.72}  # -d(ln P/P_el)/d(ln x) beyond yield, about
+_WAY = np.array([0.2, 0.45, 0.66, 0.8, 0.9, 0.97, 1.03, 1.1])  # of the way back
+_FRESH_WAY = np.array([0.15, 0.35, 0.53, 0.67, 0.78, 0.86, 0.92, 0.96, 1.0, 1.04, 1.09, 1.16, 1.25, 1.4])
 _CYCLES = 0.25  # share of joints that come back from a smaller displacement, too
 _BASE = {
     "units": {"length": "R", "stress": "E*"},
@@ -63,10 +65,31 @@ _BASE = {
 }
 
 
-def joints(kind: str, number: int, seed: int, beyond: float = 0.0) -> Iterator[tuple[Row, list[float], list[float]]]:
-    """``number`` joints of a ``kind``, one of `JOINTS`: what of the scene is theirs, in units of R, E*; x0 of the body
-    that yields first and of the one that decides (infinite: elastic); and two random numbers more. Their range exceeds
-    that of the law by ``beyond``."""
+@dataclass(frozen=True)
+class Drawn:
+    """A joint: what of the scene is its ``own``, in units of R and E*; its ``numbers`` (see `SolvedJoints`); x0 of the
+    body that yields ``first`` and of the one that decides ``last`` (infinite: elastic); two random numbers more."""
+
+    own: Row
+    numbers: tuple[float, ...]
+    first: float
+    last: float
+    odd: float
+    chance: float
+
+    @cached_property
+    def law(self) -> JointCurve:
+        """What is known of it."""
+        return law_of_numbers(self.numbers)
+
+    def back(self, deepest: float, way: Array) -> list[float]:
+        """Displacements at these shares of the way back from the ``deepest``."""
+        opens = float(self.law.residual([[deepest]])[0, 0])
+        return [t for t in deepest - (deepest - opens) * way if t > 0.01]
+
+
+def joints(kind: str, number: int, seed: int, beyond: float = 0.0) -> Iterator[Drawn]:
+    """``number`` joints of a ``kind``, one of `JOINTS`; their range exceeds that of the law by ``beyond``."""
     plane, yields, *more = kind.split()
     strain, soft, wide = plane == "strain", "soft" in more, 1 + beyond
     for u in qmc.Sobol(8, seed=seed).random(number):
@@ -86,7 +109,7 @@ def joints(kind: str, number: int, seed: int, beyond: float = 0.0) -> Iterator[t
         own |= {"pin.E": ends[0] / p, "pin.nu": nu[0]} if p else {"pin.rigid": True}
         m, n = nu / (1 - nu) if strain else nu
         elastic = Elastic(*np.array([[p], [m if p else 0.0], [n], [clearance]]))
-        onsets = [np.inf, np.inf]
+        onsets, stresses = [np.inf, np.inf], {"pin": np.inf, "block": np.inf}
         if yields != "elastic":
             latest = _latest(strain, elastic)
             s = _between(SMALLEST_S[plane] / wide, latest, u[4] ** 1.2)
@@ -100,7 +123,8 @@ def joints(kind: str, number: int, seed: int, beyond: float = 0.0) -> Iterator[t
                     own[f"{body}.yield_stress"] = stress * clearance
             each = (s, other) if yields == "pin" and strain and "weaker" in more else (s, s)
             onsets = [float(first_yield(elastic_model(), strain, elastic, np.array([each_s]))[0]) for each_s in each]
-        yield own, onsets, u[6:].tolist()
+        numbers = (float(strain), *(float(value[0]) for value in elastic), stresses["pin"], stresses["block"])
+        yield Drawn(own, numbers, *onsets, *u[6:].tolist())
 
 
 def _between(low: float, high: float, share: float) -> float:
@@ -117,48 +141,41 @@ def _latest(strain: bool, elastic: Elastic) -> float:
 def training() -> Iterator[Row]:
     """The scenes that the law is fitted to."""
     for seed, (kind, number) in enumerate(JOINTS.items(), 100):
-        for own, (first, x0), (_, chance) in joints(kind, number, seed, _BEYOND):
-            if np.isinf(x0):
-                yield own | {"load.displacement": ELASTIC, "joint.relative_element_size": 0.03}
+        for joint in joints(kind, number, seed, _BEYOND):
+            if np.isinf(joint.first):
+                yield joint.own | {"load.displacement": ELASTIC, "joint.relative_element_size": 0.03}
                 continue
-            x = x0 * MULTIPLES[: int(np.searchsorted(x0 * MULTIPLES, 3.0)) + 1]
-            before = 0.95 * first * 1.25 ** np.arange(30)
-            x = np.concatenate([before[before < 0.85 * x0], x])
-            yield from _yielding(own, kind, x0, x, _WAY, chance / _CYCLES)
+            x = joint.last * MULTIPLES[: int(np.searchsorted(joint.last * MULTIPLES, 3.0)) + 1]
+            before = 0.95 * joint.first * 1.25 ** np.arange(30)
+            x = np.concatenate([before[before < 0.85 * joint.last], x])
+            yield from _yielding(joint, x, _WAY, joint.chance / _CYCLES)
 
 
 def fresh(number: int, seed: int) -> Iterator[Row]:
     """Scenes of ``number`` joints, elastic ones among them, at other displacements than the law was fitted to."""
     shares = np.diff(np.round(np.cumsum(np.append(0, [*FRESH.values()])) * number / sum(FRESH.values()))).astype(int)
     for offset, (kind, share) in enumerate(zip(FRESH, shares, strict=True)):
-        for own, (x0, last), (odd, chance) in joints(kind, share, 1000 * seed + offset):
-            early = [0.02, 0.05, 0.1]
+        for joint in joints(kind, share, 1000 * seed + offset):
+            x0, early = joint.first, [0.02, 0.05, 0.1]
             if np.isinf(x0):
-                yield own | {"load.displacement": [*early, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0]}
+                yield joint.own | {"load.displacement": [*early, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0]}
                 continue
-            x = x0 * (0.9 + 0.2 * odd) * 1.16 ** np.arange(30)
+            x = x0 * (0.9 + 0.2 * joint.odd) * 1.16 ** np.arange(30)
             x = np.array([*(e for e in early if e < 0.8 * x0), *x[x < 2.9], 3.0])
-            yield from _yielding(own, kind, last, x, _FRESH_WAY, chance)
+            yield from _yielding(joint, x, _FRESH_WAY, joint.chance)
 
 
-def _yielding(own: Row, kind: str, x0: float, x: Array, way: Array, chance: float) -> Iterator[Row]:
+def _yielding(joint: Drawn, x: Array, way: Array, chance: float) -> Iterator[Row]:
     """Scenes of one joint that yields: to the last of ``x`` and back, twice as fine where it yields early, and, where
     ``chance`` is less than one, to an earlier one, back, and on."""
-    softening = _SOFTENING["strain pin" if kind in ("strain pin", "strain pin soft") else kind.split()[0]]
-
-    def back(deepest: float) -> list[float]:
-        elastic_way = deepest * min(1.0, max(deepest / x0, 1.0) ** -softening)
-        return [t for t in deepest - elastic_way * way if t > 0.01]
-
-    yield own | {"load.displacement": [*x, *back(x[-1])]}
-    strength = min(own.get(f"{body}.yield_stress", np.inf) for body in ("pin", "block")) / own["joint.clearance"]
-    if strength < EARLY:
-        yield own | {"load.displacement": [*x], "load.steps": 2}
+    yield joint.own | {"load.displacement": [*x, *joint.back(x[-1], way)]}
+    if min(joint.numbers[5:]) < EARLY:
+        yield joint.own | {"load.displacement": [*x], "load.steps": 2}
     if chance < 1 and len(x) > 3:
         i = 2 + int(chance * (len(x) - 3))
-        below = back(x[i])
+        below = joint.back(x[i], way)
         again = (below[min(2, len(below) - 1)] + x[i]) / 2
-        yield own | {"load.displacement": [*x[: i + 1], *below, again, *x[i : i + 2]]}
+        yield joint.own | {"load.displacement": [*x[: i + 1], *below, again, *x[i : i + 2]]}
 
 
 def sweep_file(rows: Iterable[Row]) -> str:

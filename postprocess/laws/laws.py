@@ -60,6 +60,7 @@ _FUNCTIONS: dict[str, dict[str, Any]] = {
         "limit": lambda joint: general.NODES[-1] * joint.clearance,
         "unfit": general.outside,
         "needs": ("plane", "nu"),
+        "plastic": True,
     },
     "paper": {"state": chord.parabola, **_CHORD},
     "paper-plastic": {"state": chord.plastic_winkler, "needs": ("yield_stress",), "plastic": True, **_CHORD},

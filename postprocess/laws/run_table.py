@@ -101,7 +101,7 @@ def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> 
     x, root = np.append(0.0, steps.x[k]), np.sqrt(steps.y[touched])
     cubics = {"y": loading, "back": back.curve, "ratio": _cubic(loading.x, back.ratio)}
     cubics |= {"peak": _cubic(x, steps.peak[touched] / root), "angle": _cubic(x, steps.angle[touched] / root)}
-    tables: dict[str, Any] = {"x": nodes, "touch": np.empty(0)}
+    tables: dict[str, Any] = {"x": nodes, "toe": np.zeros(len(nodes)), "touch": np.empty(0)}
     for name, cubic in cubics.items():
         tables[name], tables[f"d{name}"] = cubic.at(nodes)
     return tables | {"length": steps.length, "force": steps.force, "pressure": steps.pressure}

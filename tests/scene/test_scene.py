@@ -99,7 +99,7 @@ def test_a_missing_section_is_named(section):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (None, "cannot be read"),
+        (None, "is a folder, not a scene"),
         (b"\xff\xfe\x00", "UTF-8"),
         (b"[joint\n", "is not valid TOML"),
         (b"x = " + b"9" * 5000, "is not valid TOML"),

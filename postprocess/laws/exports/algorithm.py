@@ -15,6 +15,7 @@ Table = tuple[float, ...]
 
 WITH_TOUCH = True  # the logarithmic law below the first node
 WITH_WAY_BACK = True  # a way back below first loading, after yielding
+WITH_TOE = True  # which ends more softly than it begins
 
 LAST = 1  # index of the last node
 RANGE = 1.0  # displacement up to which the tables reach
@@ -27,6 +28,7 @@ BACK: Table = (0.0, 1.0)  # force of the curve that unloading follows
 BACK_SLOPE: Table = (1.0, 1.0)
 RATIO: Table = (1.0, 1.0)  # its scale, by the deepest displacement
 RATIO_SLOPE: Table = (0.0, 0.0)
+TOE: Table = (0.0, 0.0)  # how far before the end of the way back it bends, by the deepest displacement
 TOUCH: Table = (2.0, 0.0, 0.0)  # a, b, c of the logarithmic law
 PEAK: Table = (1.0, 1.0)  # largest pressure over the root of the force
 PEAK_SLOPE: Table = (0.0, 0.0)
@@ -159,11 +161,22 @@ def scale(deepest: float) -> float:
 
 
 def way_back(delta: float, deepest: float) -> tuple[float, float]:
-    """Force and stiffness below the deepest displacement: r BACK((delta - z)/r), which meets first loading there."""
+    """Force and stiffness below the deepest displacement: r BACK(h(a)/r), which meets first loading there."""
     ratio = scale(deepest)
     largest, stiffness = curve(LOAD, LOAD_SLOPE, deepest)
-    P, stiffness = curve(BACK, BACK_SLOPE, (delta - deepest) / ratio + back_displacement(largest / ratio))
+    travel = ratio * back_displacement(largest / ratio)
+    a = delta - deepest + travel
+    bend = 1.0
+    if WITH_TOE:
+        toe = straight(TOE, deepest)
+        cut = (math.sqrt(2) - 1) * toe
+        root = max(math.sqrt(a * a + toe * toe), 1e-300)
+        share = travel / max(travel + math.sqrt(travel * travel + toe * toe) - cut, 1e-300)
+        bend = share * (1 + a / root)
+        a = share * (a + root - cut)
+    P, stiffness = curve(BACK, BACK_SLOPE, a / ratio)
     P = ratio * P
+    stiffness = bend * stiffness
     return P, stiffness
 
 
@@ -187,7 +200,10 @@ def residual(deepest: float) -> float:
         start = max(deepest, 0.0)
         ratio = scale(start)
         largest, slope = curve(LOAD, LOAD_SLOPE, start)
-        z = max(start - ratio * back_displacement(largest / ratio), 0.0)
+        z = start - ratio * back_displacement(largest / ratio)
+        if WITH_TOE:
+            z = z - straight(TOE, start)
+        z = max(z, 0.0)
     return z
 
 

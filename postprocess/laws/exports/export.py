@@ -119,7 +119,8 @@ def export_curve(curve: JointCurve, target: Path) -> str:
     wanted += [
         f for f, key in (("peak_pressure", "PEAK"), ("contact_angle", "ANGLE")) if np.isfinite(tables[key]).all()
     ]
-    functions, used = select(wanted, {"WITH_TOUCH": curve.touch.size > 0, "WITH_WAY_BACK": curve.yields})
+    flags = {"WITH_TOUCH": curve.touch.size > 0, "WITH_WAY_BACK": curve.yields, "WITH_TOE": bool(curve.toe.any())}
+    functions, used = select(wanted, flags)
     tables = {key: values for key, values in tables.items() if key in {*used, "RANGE"}}
     _check(tables)
     title = str(curve.about.get("title", "law of a pin joint"))
@@ -146,6 +147,7 @@ def _tables(curve: JointCurve) -> Tables:
         "BACK_SLOPE": force / length * curve.dback,
         "RATIO": curve.ratio,
         "RATIO_SLOPE": curve.dratio / length,
+        "TOE": length * curve.toe,
         "TOUCH": curve.touch,
         "PEAK": pressure / root * curve.peak,
         "PEAK_SLOPE": pressure / root / length * curve.dpeak,

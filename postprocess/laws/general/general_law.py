@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 
 from archord.postprocess.laws.general.elastic_model import Elastic, elastic_model
 from archord.postprocess.laws.general.joint import Array, LawJoint
-from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.postprocess.laws.general.joint_curve import JointCurve, bent
 from archord.postprocess.laws.general.yield_model import ELASTIC_BELOW, Yielding, first_yield, loss, sides_of
 from archord.report.version import VERSION
 
@@ -38,8 +38,11 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     tables = {name: value[0] for name, value in vars(found).items() if np.ndim(value) == 2}
     units = {"length": joint.clearance, "force": joint.unit, "pressure": joint.unit / joint.radius}
     title = f"a pin joint in plane {joint.plane}, by archord's law of solved joints"
+    usual, most = (float(tables["error"][(NODES >= 0.1) & (end >= NODES)].max()) for end in (2.0, 3.0))
+    error = (f"9 in 10 such joints are within {usual:.1%} of P from 0.1 to 2 dR, {most:.1%} to 3 dR, and on the way "
+             f"back within {tables['back_error'].max():.1%} of the largest P")  # fmt: skip
     about = {"title": title, "archord": VERSION, "joint": {name: value for name, value in vars(joint).items() if value},
-             "outside": reason or "nothing: inside the range of solved joints"}  # fmt: skip
+             "outside": reason or "nothing: inside the range of solved joints", "expected error": error}  # fmt: skip
     changes: dict[str, Any] = {**tables, **units, "about": about}
     return replace(found, **changes)
 
@@ -108,15 +111,17 @@ def reduce_joints(side: str, joints: Elastic, yielding: Yielding | None = None) 
     back, dback = _from_zero(base.y), _from_zero(base.slope)
     y, dy, peak, angle = base.y, base.slope, base.peak, base.angle
     error = np.full_like(y, _ELASTIC_ERROR)
-    ratio, back_error = np.ones_like(back), np.zeros_like(back)
+    ratio, toe, back_error = np.ones_like(back), np.zeros_like(back), np.zeros_like(back)
     if yielding is not None:
         lost = loss(side, elastic_model(), joints, yielding, x)
         y, dy = y * np.exp(lost.force), (dy / y + lost.slope) * y * np.exp(lost.force)
         y, dy = _rising(x, y, dy)
         peak, angle = peak * np.exp(lost.peak), angle * np.exp(lost.angle)
         error = np.hypot(error, lost.deviation)
-        travel = np.clip(lost.travel * x * y / base.y, 1e-3 * x, x)
+        unit = x * y / base.y
+        travel = np.clip(lost.travel * unit, 1e-3 * x, x)
         travel = x - np.maximum.accumulate(x - travel, axis=1)
+        toe = _from_zero(np.clip(lost.toe * unit, 0.0, x - travel))
         rows = zip(base.y, base.slope, y, travel, strict=True)
         ratio = _from_zero(np.stack([_ratio(x, *map(np.asarray, row)) for row in rows]), 1.0)
         back_error = _from_zero(np.hypot(error, lost.way_error))
@@ -124,7 +129,8 @@ def reduce_joints(side: str, joints: Elastic, yielding: Yielding | None = None) 
     F0 = elastic_model().F.at(joints, np.zeros(1))[0][:, 0]
     rise, end = base.F[:, 0] - F0, base.F_slope[:, 0]
     touch = np.stack([F0, 2 * rise / x[0] - end, end / x[0] - rise / x[0] ** 2], axis=1)
-    tables: dict[str, Any] = {"y": _from_zero(y), "dy": _from_zero(dy), "back": back, "dback": dback, "touch": touch}
+    tables: dict[str, Any] = {"y": _from_zero(y), "dy": _from_zero(dy), "back": back, "dback": dback, "toe": toe}
+    tables["touch"] = touch
     for name, values in (("ratio", ratio), ("peak", _first_again(peak / root)), ("angle", _first_again(angle / root))):
         tables |= {name: values, f"d{name}": _slopes(values)}
     return JointCurve(NODES, **tables, error=_first_again(error), back_error=back_error)
@@ -163,10 +169,12 @@ def _ratio(x: Array, base: Array, slope: Array, y: Array, travel: Array) -> Arra
     return travel / np.where(secant > last, far, np.interp(secant, base / x, x))
 
 
-def way_back(x: Array, base: Array, slope: Array, below: Array, largest: float, travel: float) -> Array:
-    """y ``(k,)`` at ``below`` the deepest point, negative, where it is ``largest``, of a joint that opens after
-    ``travel``; of the elastic joint ``base`` with its ``slope`` at ``x`` ``(n,)``."""
+def way_back(
+    x: Array, base: Array, slope: Array, below: Array, largest: float, travel: float, toe: float = 0.0
+) -> Array:
+    """y ``(k,)`` at ``below`` the deepest point, negative, where it is ``largest``, of a joint with this ``travel`` and
+    ``toe``; of the elastic joint ``base`` with its ``slope`` at ``x`` ``(n,)``."""
     ratio = float(_ratio(x, base, slope, np.array([largest]), np.array([travel]))[0])
-    u = (below + travel) / ratio
+    u = bent(below + travel, np.asarray(travel), np.asarray(toe))[0] / ratio
     straight = base[-1] + slope[-1] * (u - x[-1])
     return ratio * np.where(u > x[-1], straight, np.interp(u, np.append(0.0, x), np.append(0.0, base)))

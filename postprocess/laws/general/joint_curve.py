@@ -6,9 +6,10 @@ above zero, where the contact is Hertz's, the table may follow the logarithmic l
     pi x/y + ln(y/(1 + y)) = F(x),    F = a + b x + c x^2,
 
 which has no slope at x = 0. After yielding, a joint comes back along its ``back`` curve, that of an elastic joint of
-another clearance and origin: ``y = r back((x - z)/r)`` below the deepest x so far, with the ``ratio`` r, a function of
-the deepest x, and the residual clearance z, by which both curves meet there. ``deepest`` is all that has to be
-remembered. Reloading goes the same way, and on along the first loading.
+another clearance and origin: ``y = r back(h(a)/r)``, ``a = x - deepest + travel``, with the ``ratio`` r, a function of
+the deepest x, and the ``travel`` by which both curves meet there. As what has yielded does not fit any longer, contact
+ends more softly: ``h`` is a above the ``toe`` w, another such function, bends there, and is 0 at -w, where the joint
+opens. ``deepest`` is all that has to be remembered. Reloading goes the same way, and on along the first loading.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from archord.postprocess.laws.general.joint import Array
 
 _ITERATIONS = 6  # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
 _INSIDE = 1 + 1e-9  # of the last node, but for round-off
+_BEND = np.sqrt(2) - 1
 _BRACKETED = 60  # iterations at most of Newton's method for an inverse, which bisects where it must
 
 
@@ -45,11 +47,12 @@ class JointCurve:
 
     ``length`` (dR), ``force`` and ``pressure`` are the units of x, y and p0, positive numbers or ``(..., 1)``. ``y``
     and ``dy`` are force and slope on first loading, ``back`` and ``dback`` those of the curve that unloading follows,
-    ``ratio`` and ``dratio`` its r by the deepest x. ``touch`` ``(..., 3)`` has a, b, c of the logarithmic law; empty
-    ``(0,)`` without one. ``peak``, ``dpeak`` are of p0/sqrt(y), ``angle``, ``dangle`` of eps/sqrt(y): nearly constant
-    at first touch; nan where unknown. Beyond the last node curves go on along their tangents. Expected errors are of 9
-    in 10 joints, straight between nodes: ``error`` that of y on loading, over y, ``back_error`` on the way back, over
-    the largest y. ``about`` says what it is the law of and where it comes from.
+    ``ratio`` and ``dratio`` its r by the deepest x, ``toe``, straight between nodes, its toe. ``touch`` ``(..., 3)``
+    has a, b, c of the logarithmic law; empty ``(0,)`` without one. ``peak``, ``dpeak`` are of p0/sqrt(y), ``angle``,
+    ``dangle`` of eps/sqrt(y): nearly constant at first touch; nan where unknown. Beyond the last node curves go on
+    along their tangents. Expected errors are of 9 in 10 joints, straight between nodes: ``error`` that of y on loading,
+    over y, ``back_error`` on the way back, over the largest y. ``about`` says what it is the law of and where it comes
+    from.
     """
 
     x: Array
@@ -59,6 +62,7 @@ class JointCurve:
     dback: Array
     ratio: Array
     dratio: Array
+    toe: Array
     touch: Array
     peak: Array
     dpeak: Array
@@ -100,11 +104,10 @@ class JointCurve:
         error = y * linear(self.x, self.error, x)
         returning = x < most
         if returning.any() and self.yields:
-            ymost, _ = self._loading(most)
-            ratio = np.maximum(hermite(self.x, self.ratio, self.dratio, most)[0], 1e-3)
-            u = (x - most) / ratio + self._back_displacement(ymost / ratio)
-            yb, dyb = self._curve(self.back, self.dback, np.maximum(u, 0.0))
-            yb, dyb = ratio * yb, np.where(u > 0, dyb, 0.0)
+            ymost, ratio, travel, toe = self._way(most)
+            a, da = bent(x - most + travel, travel, toe)
+            yb, dyb = self._curve(self.back, self.dback, np.maximum(a / ratio, 0.0))
+            yb, dyb = ratio * yb, np.where(a > 0, da * dyb, 0.0)
             above = yb > y
             yb, dyb = np.where(above, y, yb), np.where(above, dy, dyb)
             y, dy = np.where(returning, yb, y), np.where(returning, dyb, dy)
@@ -123,9 +126,14 @@ class JointCurve:
     def residual(self, deepest: npt.ArrayLike) -> Array:
         """The displacement ``(..., k)`` at which the joint opens on its way back from ``deepest``."""
         most = np.maximum(np.asarray(deepest, float) / self.length, 0.0)
+        _, _, travel, toe = self._way(most)
+        return np.maximum(most - travel - toe, 0.0) * self.length
+
+    def _way(self, most: Array) -> tuple[Array, Array, Array, Array]:
+        """Of the way back from ``most`` its y there, ratio, travel and toe."""
+        y = self._loading(most)[0]
         ratio = np.maximum(hermite(self.x, self.ratio, self.dratio, most)[0], 1e-3)
-        opens = most - ratio * self._back_displacement(self._loading(most)[0] / ratio)
-        return np.maximum(opens, 0.0) * self.length
+        return y, ratio, ratio * self._back_displacement(y / ratio), linear(self.x, self.toe, most)
 
     def _loading(self, x: Array) -> tuple[Array, Array]:
         return self._curve(self.y, self.dy, x)
@@ -212,6 +220,14 @@ def line_contact(x: Array, F: Array, slope: Array) -> tuple[Array, Array]:
     for _ in range(_ITERATIONS):
         t = t - (np.pi * x * t - np.log1p(t) - F) / (np.pi * x - 1 / (1 + t))
     return 1 / t, (np.pi - slope / t) / (np.pi * x * t - t / (1 + t))
+
+
+def bent(a: Array, travel: Array, toe: Array) -> tuple[Array, Array]:
+    """``h(a)`` and its slope: ``t f(a)/f(t)``, ``f(a) = a + sqrt(a^2 + w^2) - (sqrt(2) - 1) w``, of ``travel`` t and
+    ``toe`` w, which is t at t and 0 at -w, negative below."""
+    root = np.maximum(np.hypot(a, toe), 1e-300)
+    share = travel / np.maximum(travel + np.hypot(travel, toe) - _BEND * toe, 1e-300)
+    return share * (a + root - _BEND * toe), share * (1 + a / root)
 
 
 def hermite(nodes: Array, f: Array, df: Array, x: Array) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.optimize import minimize, minimize_scalar
+from scipy.optimize import least_squares, minimize
 
 from archord.postprocess.curve import RunCurve
 from archord.postprocess.laws.general.elastic_model import (
@@ -60,6 +60,7 @@ EARLY = 0.6  # s below which steps count
 _LAST, SOFT = 3.0, 0.5  # x that the law reaches; p m of soft pins in plane strain
 _SPACING = 1.02  # beyond the last node by which a multiple counts as known
 _STARTS = {"force": 1e-5, "shape": 1e-3, "back": 1e-4}  # of the noise
+_LITTLE = 0.03  # of the largest force, below which points on the way back count alike
 _MISFIT_NOISE = 0.03  # of how far P is from the way back, which tells an expected error alone
 _LENGTHS = (0.7, 0.5, 0.6, 4.0, 1.4, 1.0, 1.0, 1.0)  # with which the search for a kernel's begins
 _FINE = np.geomspace(1e-3, 3.8, 400)
@@ -194,38 +195,45 @@ def _at_multiples(u: Array, lost: Array) -> tuple[int, Array]:
     return count, curves
 
 
-def way_told(elastic: ElasticState, run: NodeRun) -> tuple[float, float, float, float]:
-    """Of a way back its deepest x, the travel of `Loss` that fits best by least squares, and over the largest force how
-    far P is from that way, rms, and at the first point of reloading, nan without one."""
+def way_told(elastic: ElasticState, run: NodeRun) -> tuple[float, ...]:
+    """Of a way back its deepest x, the travel and toe of `Loss` that fit best by least squares, which count more where
+    little is left, and over the largest force how far P is from that way, rms, and at the first point of reloading, nan
+    without one."""
     (deepest, largest), base = run.back[0], (_FINE, elastic.y[0], elastic.slope[0])
     unit = deepest * largest / np.interp(deepest, _FINE, elastic.y[0])
 
-    def off(travel: float, points: Array) -> Array:
-        return (way_back(*base, points[:, 0] - deepest, largest, travel * unit) - points[:, 1]) / largest
+    def off(way: Array, points: Array) -> Array:
+        return (way_back(*base, points[:, 0] - deepest, largest, *(way * unit)) - points[:, 1]) / largest
 
-    found = minimize_scalar(
-        lambda travel: float((off(travel, run.back) ** 2).sum()),
-        bounds=(0.3, min(1.5, deepest / unit)),
-        method="bounded",
-        options={"xatol": 1e-7},
-    ).x
+    weights, most = 1 / (_LITTLE + run.back[:, 1] / largest), min(1.5, deepest / unit)
+    tries = [
+        least_squares(
+            lambda way: weights * off(way, run.back),
+            start,
+            bounds=([0.3, 0.0], [most, 1.0]),
+            x_scale=0.1,
+        )
+        for start in ([0.99 * most, 1e-3], [0.85 * most, 0.2])
+    ]
+    found = min(tries, key=lambda way: way.cost).x
     again = off(found, run.nodes[run.loading + len(run.back) - 1 :, :2][:1])
     rms = np.sqrt(np.mean(off(found, run.back[1:]) ** 2))
-    return float(deepest), float(found), float(rms), float(abs(again[0])) if len(again) else np.nan
+    return float(deepest), *map(float, found), float(rms), float(abs(again[0])) if len(again) else np.nan
 
 
 def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
     """The kernels of one of `SIDES`, largest in likelihood, and the spread of errors of joints left out."""
     data = joints.of(side)
     shape = np.concatenate([data["peak"], data["angle"]], axis=1)
-    values = {"force": data["force"], "shape": shape, "back": data["back"][:, :1] - 1}
+    values = {"force": data["force"], "shape": shape, "back": data["back"][:, :2] - [1, 0]}
     found: dict[str, Any] = {"kernels": {}, "spread": {}}
     for name, of in values.items():
         points = data["back_inputs" if name == "back" else "inputs"]
         kernel = fit_kernel(points, of, _STARTS[name])
         found["kernels"][name] = {"lengths": kernel.lengths.tolist(), "noise": kernel.noise}
         off, deviation = Process(kernel, points, of).left_out()
-        found["spread"][name] = float(f"{np.nanquantile(np.abs(off / deviation), 0.9):.3g}")
+        part = slice(1) if name == "back" else slice(None)  # errors of travel
+        found["spread"][name] = float(f"{np.nanquantile(np.abs(off / deviation)[:, part], 0.9):.3g}")
     found["kernels"]["misfit"] = found["kernels"]["back"] | {"noise": _MISFIT_NOISE}
     return found
 

@@ -2,8 +2,9 @@
 
 Everything is told at multiples ``u = x/x0`` of about the displacement x0 of first yield, and relative to the elastic
 joint: ``ln(P/P_el)``, ``ln(p0/p0_el)``, ``ln(eps/eps_el)`` on first loading, and, by the deepest x, the way from there
-to where the joint opens, ``travel = (x - z)/(x P/P_el)``, which is 1 without yielding. How far that is from the way
-that a joint was solved on, and from the one on reloading, goes into the expected error.
+to where the joint would open, ``travel = (x - z)/(x P/P_el)``, which is 1 without yielding, and its ``toe``, in that
+unit. How far that is from the way that a joint was solved on, and from the one on reloading, goes into the expected
+error.
 
 There is a process for each of `SIDES`. In plane stress the weaker body limits the pressure. In plane strain a weak pin
 is held by the hole and loses little: one process tells of pins that yield alone, and another what yielding of the
@@ -35,6 +36,7 @@ MULTIPLES = np.array([0.95, 1.05, 1.15, 1.27, 1.4, 1.55, 1.75, 2, 2.3, 2.65, 3.0
 PIN_ALONE, PIN_WEAKER = "strain pin alone", "strain pin weaker"
 SIDES = (PIN_ALONE, PIN_WEAKER, "strain block", "stress pin", "stress block")  # plane, and the body that yields first
 ELASTIC_BELOW = 0.8  # u: nothing has yielded
+_STRONGER = {"strain": (0.5,), "stress": (1 - np.sqrt(0.75), 0.2)}  # by more: elastic; pressed at 2/sqrt(3) sigY or so
 _CURVES = ("force", "peak", "angle")
 _NINE_IN_TEN = 1.645  # standard deviations
 _STEP, _UNKNOWN = 1e-4, -32768  # of stored logarithms, and what stands for nan
@@ -55,8 +57,8 @@ class Yielding(NamedTuple):
 
 class Loss(NamedTuple):
     """What yielding does at ``x`` ``(m, k)``: ``ln(P/P_el)`` with its slope by x and its error, ``ln(p0/p0_el)``,
-    ``ln(eps/eps_el)``, ``travel`` back, and the error of P on that way over the largest P; errors are those of 9 in 10
-    joints."""
+    ``ln(eps/eps_el)``, ``travel`` back and its ``toe``, and the error of P on that way over the largest P; errors are
+    those of 9 in 10 joints."""
 
     force: Array
     slope: Array
@@ -64,6 +66,7 @@ class Loss(NamedTuple):
     peak: Array
     angle: Array
     travel: Array
+    toe: Array
     way_error: Array
 
 
@@ -89,8 +92,7 @@ def features(side: str, joints: Elastic, yielding: Yielding) -> Array:
         inputs.append(np.log(yielding.pin / s))
     elif side != PIN_ALONE:
         share = s / (yielding.block if side == "stress pin" else yielding.pin)
-        steep = 6 if side.startswith("stress") else 3  # one body or both: a difference of less tells in plane stress
-        inputs += [1 - share, np.tanh(steep * (1 - share))]
+        inputs += [np.minimum((1 - share) / within, 1.0) for within in _STRONGER[side.split()[0]]]
     return np.stack(inputs, axis=-1)
 
 
@@ -98,7 +100,7 @@ def features(side: str, joints: Elastic, yielding: Yielding) -> Array:
 class YieldModel:
     """The processes of a ``side``: ``inputs`` ``(n, d)`` of its joints, from the one known to most `MULTIPLES`
     down, and their curves ``force``, ``peak``, ``angle`` ``(n, multiples)``, nan beyond what is known; ``back_inputs``
-    ``(k, d + 1)``, of which the last is ln u of the deepest point, and ``back`` ``(k, 3)``, the last columns of
+    ``(k, d + 1)``, of which the last is ln u of the deepest point, and ``back`` ``(k, 4)``, the last columns of
     `SolvedJoints.back`. ``kernels`` by the names of `processes`, and ``spread``, the factors on standard deviations
     below which 9 in 10 errors are."""
 
@@ -119,24 +121,24 @@ class YieldModel:
         return {
             "force": Process(self.kernels["force"], self.inputs, self.force),
             "shape": Process(self.kernels["shape"], self.inputs, shape),
-            "back": Process(self.kernels["back"], self.back_inputs, self.back[:, :1] - 1),
-            "misfit": Process(self.kernels["misfit"], self.back_inputs, self.back[:, 1:]),
+            "back": Process(self.kernels["back"], self.back_inputs, self.back[:, :2] - [1, 0]),
+            "misfit": Process(self.kernels["misfit"], self.back_inputs, self.back[:, 2:]),
         }
 
     def at(self, joints: Elastic, yielding: Yielding, x0: Array, x: Array) -> Loss:
         """What yielding does to ``joints``, of which ``x0`` ``(m,)`` is about first yield, at ``x`` ``(k,)``; of side
-        `PIN_WEAKER` what that of the block adds, but for the travel."""
+        `PIN_WEAKER` what that of the block adds, but for the way back."""
         inputs, u = features(self.side, joints, yielding), np.log(x / x0[:, None])
         (force, deviation), (shape, _) = (self.processes[name].predict(inputs) for name in ("force", "shape"))
         rows = np.stack([force, *np.split(shape, 2, axis=1), deviation], axis=2)
         found = np.stack([_between(row, own, float(x[-1] / at)) for row, own, at in zip(rows, u, x0, strict=True)])
         deep = np.concatenate([np.repeat(inputs, len(x), axis=0), u.reshape(-1, 1)], axis=1)
-        travel, uncertain = self.processes["back"].predict(deep)
+        way, uncertain = self.processes["back"].predict(deep)
         misfit, _ = self.processes["misfit"].predict(deep)
-        errors = np.column_stack([self.spread["back"] * uncertain, _NINE_IN_TEN * misfit[:, 0], misfit[:, 1]])
+        errors = np.column_stack([self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit[:, 0], misfit[:, 1]])
         force, slope, peak, angle, deviation = np.moveaxis(found, -1, 0)
-        return Loss(force, slope / x, self.spread["force"] * deviation, peak, angle,
-                    1 + travel.reshape(u.shape), np.linalg.norm(errors, axis=1).reshape(u.shape))  # fmt: skip
+        travel, toe, error = (part.reshape(u.shape) for part in (*way.T, np.linalg.norm(errors, axis=1)))
+        return Loss(force, slope / x, self.spread["force"] * deviation, peak, angle, 1 + travel, toe, error)
 
 
 def loss(side: str, model: ElasticModel, joints: Elastic, yielding: Yielding, x: Array) -> Loss:
@@ -154,7 +156,7 @@ def total_loss(
 ) -> Loss:
     """The sum of what ``models`` tell; each begins where its body yields."""
     none = np.zeros((len(joints.p), len(x)))
-    total = Loss(none, none, none, none, none, none + 1, none)
+    total = Loss(none, none, none, none, none, none + 1, none, none)
     for side, told in models.items():
         x0 = first_yield(model, side.startswith("strain"), joints, yielding.of(side))
         some = ELASTIC_BELOW * x0 < x[-1]
@@ -166,8 +168,8 @@ def total_loss(
         for name in ("force", "slope", "peak", "angle"):
             getattr(found, name)[some] += getattr(own, name)
         found.deviation[some] = np.hypot(total.deviation[some], own.deviation)
-        found.travel[some] += begun * (own.travel - total.travel[some])
-        found.way_error[some] += begun * (own.way_error - total.way_error[some])
+        for name in ("travel", "toe", "way_error"):
+            getattr(found, name)[some] += begun * (getattr(own, name) - getattr(total, name)[some])
         total = found
     return total
 
@@ -190,8 +192,8 @@ class SolvedJoints:
     """Joints that yield, ``(n, ...)``, as yield_model.npz has them: ``side`` is the index in `SIDES` of the process
     that a row is for (joints of like bodies have two), ``numbers`` are plane (1: strain), p, m, n, dR/R, s of pin and
     of block; ``count`` how many `MULTIPLES` of ``x0`` are known; ``force``, ``peak`` and ``angle`` there; ``back``
-    ``(k, 5)`` the row of a joint, u of its deepest point, its travel back, and over the largest force how far P is from
-    that way, rms, and on reloading; those that tell of it first."""
+    ``(k, 6)`` the row of a joint, u of its deepest point, its travel back and toe, and over the largest force how far P
+    is from that way, rms, and on reloading; those that tell of it first."""
 
     side: Array
     numbers: Array

@@ -35,6 +35,7 @@ def yielding_curve(onset: float = 0.4, nodes: int = 61) -> JointCurve:
     return JointCurve(
         x,
         *table,
+        0.2 * loss(x),
         TOUCH,
         1.2 * one,
         none,
