@@ -135,7 +135,7 @@ def table(law):
     known = np.isfinite(state.load)
     y, dy = state.load[known] / JOINT.unit, state.stiffness[known] * DR / JOINT.unit
     one, none, unknown = np.ones_like(y), np.zeros_like(y), [np.full_like(y, np.nan)] * 4
-    return JointCurve(x[known], y, dy, y, dy, one, none, none[:0], *unknown, none, none, DR, JOINT.unit)
+    return JointCurve(x[known], y, dy, y, dy, one, none, none, none[:0], *unknown, none, none, DR, JOINT.unit)
 
 
 def study(curve, steps=STEPS, turns=TURNS):

@@ -29,7 +29,7 @@ class Kernel:
         a, b = one / self.lengths, other / self.lengths
         distance = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2 * a @ b.T
         r = np.sqrt(7 * np.maximum(distance, 0.0))
-        return (1 + r + 0.4 * r**2 + r**3 / 15) * np.exp(-r) + _WIDE * (1 + one @ other.T)
+        return (1 + r * (1 + r * (0.4 + r / 15))) * np.exp(-r) + _WIDE * (1 + one @ other.T)
 
     def at(self, points: Array) -> Array:
         """Variances ``(n,)`` at points ``(n, d)``."""

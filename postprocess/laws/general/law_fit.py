@@ -61,7 +61,6 @@ _LAST, SOFT = 3.0, 0.5  # x that the law reaches; p m of soft pins in plane stra
 _SPACING = 1.02  # beyond the last node by which a multiple counts as known
 _STARTS = {"force": 1e-5, "shape": 1e-3, "back": 1e-4}  # of the noise
 _LITTLE = 0.03  # of the largest force, below which points on the way back count alike
-_MISFIT_NOISE = 0.03  # of how far P is from the way back, which tells an expected error alone
 _LENGTHS = (0.7, 0.5, 0.6, 4.0, 1.4, 1.0, 1.0, 1.0)  # with which the search for a kernel's begins
 _FINE = np.geomspace(1e-3, 3.8, 400)
 
@@ -234,7 +233,6 @@ def fit_side(joints: SolvedJoints, side: str) -> dict[str, Any]:
         off, deviation = Process(kernel, points, of).left_out()
         part = slice(1) if name == "back" else slice(None)  # errors of travel
         found["spread"][name] = float(f"{np.nanquantile(np.abs(off / deviation)[:, part], 0.9):.3g}")
-    found["kernels"]["misfit"] = found["kernels"]["back"] | {"noise": _MISFIT_NOISE}
     return found
 
 

@@ -121,8 +121,7 @@ class YieldModel:
         return {
             "force": Process(self.kernels["force"], self.inputs, self.force),
             "shape": Process(self.kernels["shape"], self.inputs, shape),
-            "back": Process(self.kernels["back"], self.back_inputs, self.back[:, :2] - [1, 0]),
-            "misfit": Process(self.kernels["misfit"], self.back_inputs, self.back[:, 2:]),
+            "back": Process(self.kernels["back"], self.back_inputs, self.back - [1, 0, 0, 0]),
         }
 
     def at(self, joints: Elastic, yielding: Yielding, x0: Array, x: Array) -> Loss:
@@ -134,11 +133,11 @@ class YieldModel:
         found = np.stack([_between(row, own, float(x[-1] / at)) for row, own, at in zip(rows, u, x0, strict=True)])
         deep = np.concatenate([np.repeat(inputs, len(x), axis=0), u.reshape(-1, 1)], axis=1)
         way, uncertain = self.processes["back"].predict(deep)
-        misfit, _ = self.processes["misfit"].predict(deep)
-        errors = np.column_stack([self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit[:, 0], misfit[:, 1]])
+        travel, toe, misfit, again = way.T
+        error = np.linalg.norm([self.spread["back"] * uncertain[:, 0], _NINE_IN_TEN * misfit, again], axis=0)
         force, slope, peak, angle, deviation = np.moveaxis(found, -1, 0)
-        travel, toe, error = (part.reshape(u.shape) for part in (*way.T, np.linalg.norm(errors, axis=1)))
-        return Loss(force, slope / x, self.spread["force"] * deviation, peak, angle, 1 + travel, toe, error)
+        back = (part.reshape(u.shape) for part in (1 + travel, toe, error))
+        return Loss(force, slope / x, self.spread["force"] * deviation, peak, angle, *back)
 
 
 def loss(side: str, model: ElasticModel, joints: Elastic, yielding: Yielding, x: Array) -> Loss:
