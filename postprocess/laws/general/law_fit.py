@@ -60,6 +60,12 @@ EARLY = 0.6  # s below which steps count
 _LAST, SOFT = 3.0, 0.5  # x that the law reaches; p m of soft pins in plane strain
 _SPACING = 1.02  # beyond the last node by which a multiple counts as known
 _STARTS = {"force": 1e-5, "shape": 1e-3, "back": 1e-4}  # of the noise
+# Fits of a way back begin with these travels, at most that share of the largest, and toes. In plane stress they find
+# the best fit. In plane strain deep dents have two, of which processes follow the one near the largest travel.
+_WAYS = {
+    "strain": ((1.5, 0.99, 1e-3), (1.5, 0.85, 0.2)),
+    "stress": ((1.0, 0.99, 1e-3), (1.0, 0.99, 0.7), (0.9, 0.99, 0.3), (0.8, 0.99, 1e-3)),
+}
 _LITTLE = 0.03  # of the largest force, below which points on the way back count alike
 _LENGTHS = (0.7, 0.5, 0.6, 4.0, 1.4, 1.0, 1.0, 1.0)  # with which the search for a kernel's begins
 _FINE = np.geomspace(1e-3, 3.8, 400)
@@ -166,7 +172,8 @@ def yielding_joints(
         nodes, dense = first_loading(runs), model.at(joint, _FINE)
         base = model.at(joint, nodes[:, 0])
         total = np.log(nodes[:, 1:].T / np.stack([base.y[0], base.peak[0], base.angle[0]]))
-        ways = [way_told(dense, run) for run in runs if run.steps == 1 and len(run.back) > 2]
+        plane = "strain" if numbers[0] else "stress"
+        ways = [way_told(plane, dense, run) for run in runs if run.steps == 1 and len(run.back) > 2]
         for side in sides_of(numbers):
             lost = total
             if side == PIN_WEAKER and pins is not None:
@@ -194,7 +201,7 @@ def _at_multiples(u: Array, lost: Array) -> tuple[int, Array]:
     return count, curves
 
 
-def way_told(elastic: ElasticState, run: NodeRun) -> tuple[float, ...]:
+def way_told(plane: str, elastic: ElasticState, run: NodeRun) -> tuple[float, ...]:
     """Of a way back its deepest x, the travel and toe of `Loss` that fit best by least squares, which count more where
     little is left, and over the largest force how far P is from that way, rms, and at the first point of reloading, nan
     without one."""
@@ -205,14 +212,10 @@ def way_told(elastic: ElasticState, run: NodeRun) -> tuple[float, ...]:
         return (way_back(*base, points[:, 0] - deepest, largest, *(way * unit)) - points[:, 1]) / largest
 
     weights, most = 1 / (_LITTLE + run.back[:, 1] / largest), min(1.5, deepest / unit)
+    starts = [[min(travel, share * most), toe] for travel, share, toe in _WAYS[plane]]
+    bounds = [0.3, 0.0], [most, 1.0]
     tries = [
-        least_squares(
-            lambda way: weights * off(way, run.back),
-            start,
-            bounds=([0.3, 0.0], [most, 1.0]),
-            x_scale=0.1,
-        )
-        for start in ([0.99 * most, 1e-3], [0.85 * most, 0.2])
+        least_squares(lambda way: weights * off(way, run.back), start, bounds=bounds, x_scale=0.1) for start in starts
     ]
     found = min(tries, key=lambda way: way.cost).x
     again = off(found, run.nodes[run.loading + len(run.back) - 1 :, :2][:1])
