@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
+from weakref import WeakMethod
 
 import numpy as np
 from mpi4py import MPI
@@ -68,7 +70,7 @@ class NewtonSolver:
         options["snes_linesearch_type"], options["snes_linesearch_max_it"] = line_search, 8
         snes.setType("newtonls")
         snes.setFunction(self._guarded(self._residual), self._x.duplicate())
-        snes.setConvergenceTest(self._test)
+        snes.setConvergenceTest(self._guarded(self._test))
         snes.setTolerances(stol=0.0)  # else a line search that ends in a short step counts as convergence
         snes.setFromOptions()
         return snes
@@ -76,7 +78,7 @@ class NewtonSolver:
     def _start_linear(self) -> None:
         """Start with a new linear solver: after a singular matrix PETSc's MUMPS may skip the next factorisation."""
         self._ksp = PETSc.KSP().create(self.equilibrium.comm)
-        self._ksp.setPreSolve(lambda ksp, b, x: ksp.getPC().setReusePreconditioner(self._reuse))
+        self._ksp.setPreSolve(self._guarded(self._before_solve))
         for snes in self._solvers.values():
             snes.setKSP(self._ksp)
         self._attach()
@@ -90,14 +92,21 @@ class NewtonSolver:
         if self._lagged is not None:
             self._lagged.attach(self._ksp)
 
-    def _guarded(self, callback: Callable) -> Callable:
-        """Keep what ``callback`` raises, which PETSc would turn into an error number."""
+    def _before_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        ksp.getPC().setReusePreconditioner(self._reuse)
 
-        def call(*arguments) -> None:
+    def _guarded(self, callback: Callable) -> Callable:
+        """Keep what ``callback``, a method, raises, which PETSc would turn into an error number. It does not keep this
+        object alive, which holds PETSc's: not every petsc4py lets Python collect such cycles."""
+        method = WeakMethod(callback)
+
+        def call(*arguments) -> Any:
+            own = method()
+            assert own is not None
             try:
-                callback(*arguments)
+                return own(*arguments)
             except BaseException as error:
-                self._raised = error
+                own.__self__._raised = error
                 raise
 
         return call

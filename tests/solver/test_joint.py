@@ -2,12 +2,14 @@
 
 import json
 from pathlib import Path
+from weakref import ref
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from archord.postprocess.run import Run
+from archord.solver.newton import NewtonSolver
 from tests.output.run_files import solved as solved_runs
 from tests.solver.parts import partition
 from tests.solver.solving import SEVERAL, E, scene, solve
@@ -240,3 +242,14 @@ def test_peeq_is_told_by_body_and_near_the_contact(tmp_path):
             assert (row[f"{name} at x"], row[f"{name} at y"]) == pytest.approx(tuple(x.reshape(-1, 2)[at]), abs=1e-9)
         assert row["peeq_max"] == max(row["pin peeq_max"], row["block peeq_max"]) > row["contact peeq_max"] > 0
     assert run.columns["eps"][2] == 0
+
+
+@pytest.mark.parametrize("material", [{}, {"yield_stress": 0.002}])
+def test_petsc_keeps_no_solver_that_is_used_no_more(material):
+    """Without Python's collector: not every petsc4py shows it what PETSc refers to. MPICH has 2048 communicators, a run
+    needs 16, and sweeps solve thousands of runs in one process."""
+    joint = solve(scene(steps=1, block=material)).joint
+    newton = NewtonSolver(joint.equilibrium)
+    still = ref(newton)
+    del newton
+    assert still() is None
