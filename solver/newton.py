@@ -101,7 +101,7 @@ class NewtonSolver:
         method = WeakMethod(callback)
 
         def call(*arguments) -> Any:
-            own = method()
+            own: Any = method()
             assert own is not None
             try:
                 return own(*arguments)
