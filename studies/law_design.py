@@ -79,7 +79,7 @@ class Drawn:
 
     @cached_property
     def law(self) -> JointCurve:
-        """What is known of it."""
+        """Its law, as it is told before it is solved."""
         return law_of_numbers(self.numbers)
 
     def back(self, deepest: float, way: Array) -> list[float]:

@@ -40,12 +40,12 @@ def says_nothing(state: LawState, by_load: bool) -> bool:
 
 
 def too_elastic(law: Law, joint: LawJoint, state: LawState) -> list[str]:
-    """A sentence if an elastic ``law`` is used where its pressure exceeds the yield stress."""
+    """A sentence if a ``law`` that knows no yielding is used where its pressure exceeds the weaker body's yield stress."""
     p0 = float(np.max(state.peak_pressure, where=np.isfinite(state.peak_pressure), initial=0.0))
     if law.plastic or joint.yield_stress is None or p0 <= joint.yield_stress:
         return []
     over = p0 / joint.yield_stress
-    return [f"{law.name}: is elastic, and its p0 reaches {over:.3g} times the yield stress, where P is too high"]
+    return [f"{law.name}: knows no yielding, and its p0 reaches {over:.3g} times the yield stress"]
 
 
 def law_table(law: Law, joint: LawJoint, state: LawState, units: dict[str, str], thickness: float = 1.0) -> str:

@@ -38,13 +38,18 @@ def general_law(joint: LawJoint, extrapolate: bool = False) -> JointCurve:
     tables = {name: value[0] for name, value in vars(found).items() if np.ndim(value) == 2}
     units = {"length": joint.clearance, "force": joint.unit, "pressure": joint.unit / joint.radius}
     title = f"a pin joint in plane {joint.plane}, by archord's law of solved joints"
-    usual, most = (float(tables["error"][(NODES >= 0.1) & (end >= NODES)].max()) for end in (2.0, 3.0))
-    error = (f"9 in 10 such joints are within {usual:.1%} of P from 0.1 to 2 dR, {most:.1%} to 3 dR, and on the way "
-             f"back within {tables['back_error'].max():.1%} of the largest P")  # fmt: skip
     about = {"title": title, "archord": VERSION, "joint": {name: value for name, value in vars(joint).items() if value},
-             "outside": reason or "nothing: inside the range of solved joints", "expected error": error}  # fmt: skip
+             "outside": reason or "nothing: inside the range of solved joints",
+             "expected error": "unknown" if reason else _error_in_words(found)}  # fmt: skip
     changes: dict[str, Any] = {**tables, **units, "about": about}
     return replace(found, **changes)
+
+
+def _error_in_words(law: JointCurve) -> str:
+    """The errors that 9 in 10 joints like that of ``law`` keep, at most."""
+    usual, most = (law.error[..., (NODES >= 0.1) & (end >= NODES)].max() for end in (2.0, 3.0))
+    back = f", and on the way back within {law.back_error.max():.1%} of the largest P" if law.yields else ""
+    return f"9 in 10 such joints are within {usual:.1%} of P from 0.1 to 2 dR, {most:.1%} to 3 dR{back}"
 
 
 def law_of_numbers(numbers: npt.ArrayLike) -> JointCurve:
@@ -169,9 +174,7 @@ def _ratio(x: Array, base: Array, slope: Array, y: Array, travel: Array) -> Arra
     return travel / np.where(secant > last, far, np.interp(secant, base / x, x))
 
 
-def way_back(
-    x: Array, base: Array, slope: Array, below: Array, largest: float, travel: float, toe: float = 0.0
-) -> Array:
+def way_back(x: Array, base: Array, slope: Array, below: Array, largest: float, travel: float, toe: float) -> Array:
     """y ``(k,)`` at ``below`` the deepest point, negative, where it is ``largest``, of a joint with this ``travel`` and
     ``toe``; of the elastic joint ``base`` with its ``slope`` at ``x`` ``(n,)``."""
     ratio = float(_ratio(x, base, slope, np.array([largest]), np.array([travel]))[0])

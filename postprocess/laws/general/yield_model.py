@@ -36,7 +36,9 @@ MULTIPLES = np.array([0.95, 1.05, 1.15, 1.27, 1.4, 1.55, 1.75, 2, 2.3, 2.65, 3.0
 PIN_ALONE, PIN_WEAKER = "strain pin alone", "strain pin weaker"
 SIDES = (PIN_ALONE, PIN_WEAKER, "strain block", "stress pin", "stress block")  # plane, and the body that yields first
 ELASTIC_BELOW = 0.8  # u: nothing has yielded
-_STRONGER = {"strain": (0.5,), "stress": (1 - np.sqrt(0.75), 0.2)}  # by more: elastic; pressed at 2/sqrt(3) sigY or so
+# Parts by which the other body is stronger, within which it matters by how much: beyond the last it stays elastic. In
+# plane stress the first is that of a contact at the largest pressure of plastic flow, 2/sqrt(3) sigY.
+_STRONGER = {"strain": (0.5,), "stress": (1 - np.sqrt(0.75), 0.2)}
 _CURVES = ("force", "peak", "angle")
 _NINE_IN_TEN = 1.645  # standard deviations
 _STEP, _UNKNOWN = 1e-4, -32768  # of stored logarithms, and what stands for nan

@@ -37,6 +37,16 @@ def test_both_branches_meet_at_the_deepest_point_and_the_way_back_is_below() -> 
     assert float(curve.residual(np.array([2.5]))[0]) > 0.5
 
 
+def test_the_joint_opens_at_its_residual_clearance() -> None:
+    """Also where the toe is wide: there is no force just before, and some just after."""
+    curve = yielding_curve()
+    deepest = np.array([0.6, 1.0, 1.7, 2.9])
+    opens = curve.residual(deepest)
+    assert (opens > 0).all()
+    assert (curve.at(opens - 1e-9, deepest).load == 0).all()
+    assert (curve.at(opens + 1e-6, deepest).load > 0).all()
+
+
 def test_beyond_the_table_there_is_a_warning() -> None:
     curve = yielding_curve()
     with pytest.warns(UserWarning, match="beyond 3 dR"):
