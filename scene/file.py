@@ -23,7 +23,7 @@ ALTERNATIVES: dict[str, list[tuple[str, ...]]] = {
 }
 ABSENT = "none"  # the value that drops a key, so that its default holds
 _BROUGHT = {"material": ("E", "nu", "yield_stress", "hardening")}
-_LARGEST_FILE = 10**6  # bytes
+_LARGEST_FILE = 2 * 10**6  # bytes
 _DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}")

@@ -33,7 +33,8 @@ from archord.postprocess.laws.general.yield_model import MULTIPLES, first_yield
 from archord.scene.keys import toml_value
 
 Row = dict[str, Any]
-JOINTS = {  # by plane, what yields, whether the other body is stronger, and whether by little or the pin is soft
+# By plane, what yields, whether the other body is stronger, and whether by little, or the pin is soft, or yields early.
+JOINTS = {
     **{
         "strain both": 280,
         "strain block": 170,
@@ -44,9 +45,9 @@ JOINTS = {  # by plane, what yields, whether the other body is stronger, and whe
     **{"strain both soft": 60, "strain block soft": 35, "strain block weaker soft": 35, "strain pin soft": 35},
     **{"strain pin weaker soft": 35, "strain elastic": 320, "strain elastic soft": 64},
     **{"stress both": 100, "stress block": 70, "stress block weaker": 80, "stress pin": 70, "stress pin weaker": 80},
-    **{"stress block weaker alike": 110, "stress pin weaker alike": 40},
+    **{"stress block weaker alike": 110, "stress pin weaker alike": 40, "strain pin weaker early": 64},
 }
-FRESH = {kind: number for kind, number in JOINTS.items() if kind.split()[-1] not in ("soft", "alike")} | {
+FRESH = {kind: number for kind, number in JOINTS.items() if kind.split()[-1] not in ("soft", "alike", "early")} | {
     "strain elastic": 90,
     "stress elastic": 60,
 }
@@ -112,7 +113,7 @@ def joints(kind: str, number: int, seed: int, beyond: float = 0.0) -> Iterator[D
         onsets, stresses = [np.inf, np.inf], {"pin": np.inf, "block": np.inf}
         if yields != "elastic":
             latest = _latest(strain, elastic)
-            s = _between(SMALLEST_S[plane] / wide, latest, u[4] ** 1.2)
+            s = _between(SMALLEST_S[plane] / wide, 0.4 if "early" in more else latest, u[4] ** 1.2)
             other = s if yields == "both" else np.inf
             if "weaker" in more:  # a weak pin in a block keeps its force in plane strain: the block yields, too
                 weakest = 0.25 if "alike" in more else 0.75

@@ -40,7 +40,7 @@ def says_nothing(state: LawState, by_load: bool) -> bool:
 
 
 def too_elastic(law: Law, joint: LawJoint, state: LawState) -> list[str]:
-    """A sentence if a ``law`` that knows no yielding is used where its pressure exceeds the weaker body's yield stress."""
+    """A sentence if a ``law`` that knows no yielding has a pressure above the weaker body's yield stress."""
     p0 = float(np.max(state.peak_pressure, where=np.isfinite(state.peak_pressure), initial=0.0))
     if law.plastic or joint.yield_stress is None or p0 <= joint.yield_stress:
         return []

@@ -108,7 +108,7 @@ def test_a_missing_section_is_named(section):
         (b"a." * 20 + b"b = 1", "a key has more than 20 dotted parts"),
         (b"['a'" + b" . 'a'" * 60000 + b"]", "a key has more than 20 dotted parts"),
         (b"x" * 999999, "is not valid TOML"),
-        (b"# " + b"x" * 999999, "it is larger than 1 MB"),
+        (b"# " + b"x" * 1999999, "it is larger than 2 MB"),
         (b"".join(b"k%d = 1\n" % i for i in range(3000)), "k0 = 1 is not a known key"),
         (b"x" * 5000 + b" = 1", "is not a known key"),
         (b'"a\\nb" = 1', r'"a\\nb" = 1 is not a known key'),
@@ -143,7 +143,7 @@ def test_files_that_are_no_scenes_are_refused_briefly(tmp_path, content, said):
 
 def test_what_never_ends_or_takes_forever_is_refused(tmp_path):
     """A device without an end; a long key in the value of --set, which stays text then."""
-    with pytest.raises(InputError, match="/dev/zero: cannot be read: it is larger than 1 MB"):
+    with pytest.raises(InputError, match="/dev/zero: cannot be read: it is larger than 2 MB"):
         load_scene("/dev/zero")
     (tmp_path / "scene.toml").write_text(resolved(parse_scene(basic())))
     with pytest.raises(InputError, match=r"joint\.radius must be a number"):

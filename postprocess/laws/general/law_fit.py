@@ -33,7 +33,7 @@ from archord.postprocess.laws.general.elastic_model import (
     products,
 )
 from archord.postprocess.laws.general.gaussian_process import Kernel, Process
-from archord.postprocess.laws.general.general_law import joint_numbers, way_back
+from archord.postprocess.laws.general.general_law import NODES, joint_numbers, way_back
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.general.yield_model import (
     DATA,
@@ -46,7 +46,7 @@ from archord.postprocess.laws.general.yield_model import (
     SolvedJoints,
     Yielding,
     YieldModel,
-    first_yield,
+    onset,
     side_model,
     sides_of,
     stored_joints,
@@ -69,6 +69,7 @@ _WAYS = {
 _LITTLE = 0.03  # of the largest force, below which points on the way back count alike
 _LENGTHS = (0.7, 0.5, 0.6, 4.0, 1.4, 1.0, 1.0, 1.0)  # with which the search for a kernel's begins
 _FINE = np.geomspace(1e-3, 3.8, 400)
+_LAW = NODES[1:]
 
 
 def exponents(degree: int) -> Array:
@@ -175,18 +176,17 @@ def yielding_joints(
         plane = "strain" if numbers[0] else "stress"
         ways = [way_told(plane, dense, run) for run in runs if run.steps == 1 and len(run.back) > 2]
         for side in sides_of(numbers):
-            lost = total
+            curves, of_pins = total, np.zeros((1, len(_LAW)))
             if side == PIN_WEAKER and pins is not None:
-                own = total_loss({PIN_ALONE: pins}, model, joint, yielding, nodes[:, 0])
-                lost = total - np.concatenate([own.force, own.peak, own.angle])
-            x0 = float(first_yield(model, bool(numbers[0]), joint, yielding.of(side))[0])
-            count, curves = _at_multiples(nodes[:, 0] / x0, lost)
+                own, fine = (total_loss({PIN_ALONE: pins}, model, joint, yielding, x) for x in (nodes[:, 0], _LAW))
+                curves, of_pins = total - np.concatenate([own.force, own.peak, own.angle]), fine.peak
+            (x0,), (lost,) = onset(side, model, joint, yielding, _LAW, of_pins)
             back += [(len(rows), deepest / x0, *told) for deepest, *told in ways]
-            rows.append((SIDES.index(side), numbers, x0, count, curves))
-    index, given, onsets, counts, losses = (np.array(column) for column in zip(*rows, strict=True))
+            rows.append((SIDES.index(side), numbers, x0, lost, *_at_multiples(nodes[:, 0] / x0, curves)))
+    index, given, onsets, lost, counts, losses = (np.array(column) for column in zip(*rows, strict=True))
     force, peak, angle = np.moveaxis(losses, 1, 0)
     back.sort(key=lambda way: np.isnan(way[-1]))
-    return SolvedJoints(index, given, onsets, counts, force, peak, angle, np.array(back)).stored()
+    return SolvedJoints(index, given, onsets, lost, counts, force, peak, angle, np.array(back)).stored()
 
 
 def _at_multiples(u: Array, lost: Array) -> tuple[int, Array]:

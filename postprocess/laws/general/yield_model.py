@@ -8,8 +8,8 @@ error.
 
 There is a process for each of `SIDES`. In plane stress the weaker body limits the pressure. In plane strain a weak pin
 is held by the hole and loses little: one process tells of pins that yield alone, and another what yielding of the
-stronger block adds, with x0 the block's. yield_model.npz has the solved joints, yield_model.json the processes'
-lengths; law_fit.py makes both.
+stronger block adds, with x0 the block's, which the yielded pin delays. yield_model.npz has the solved joints,
+yield_model.json the processes' lengths; law_fit.py makes both.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ ELASTIC_BELOW = 0.8  # u: nothing has yielded
 # Parts by which the other body is stronger, within which it matters by how much: beyond the last it stays elastic. In
 # plane stress the first is that of a contact at the largest pressure of plastic flow, 2/sqrt(3) sigY.
 _STRONGER = {"strain": (0.5,), "stress": (1 - np.sqrt(0.75), 0.2)}
+_FELT, _DEEPER = 0.3, 3.0  # exponent of what a yielded pin leaves; x/x0 where that is asked
 _CURVES = ("force", "peak", "angle")
 _NINE_IN_TEN = 1.645  # standard deviations
 _STEP, _UNKNOWN = 1e-4, -32768  # of stored logarithms, and what stands for nan
@@ -72,26 +73,40 @@ class Loss(NamedTuple):
     way_error: Array
 
 
-def first_yield(model: ElasticModel, strain: bool, joints: Elastic, s: Array) -> Array:
-    """About the x ``(m,)`` of first yield: where the elastic p0 is ``g`` sigY, with g of Hertz's contact at first and
-    less in wide ones; at the end of the range or beyond for a larger s, infinite for an infinite one."""
-    over = model.at(joints, _GRID).peak / _pressure_at_yield(strain, _GRID)
+def first_yield(model: ElasticModel, strain: bool, joints: Elastic, s: Array, left: Array | float = 1.0) -> Array:
+    """About the x ``(m,)`` of first yield: where the elastic p0, times what is ``left`` of it, is ``g`` sigY, with g of
+    Hertz's contact at first and less in wide ones; at the end of the range or beyond for a larger s, infinite for an
+    infinite one."""
+    over = np.maximum.accumulate(left * model.at(joints, _GRID).peak / _pressure_at_yield(strain, _GRID), axis=1)
     found = [np.interp(np.log(own), np.log(row), np.log(_GRID)) for own, row in zip(s, over, strict=True)]
     return np.where(np.isfinite(s), np.exp(found), np.inf)
+
+
+def onset(
+    side: str, model: ElasticModel, joints: Elastic, yielding: Yielding, x: Array, lost: Array
+) -> tuple[Array, Array]:
+    """About the x ``(m,)`` of first yield of the body of one of `SIDES`, and how far ``ln(p0/p0_el)`` is lost
+    ``(m,)`` to a weaker pin some way beyond; ``lost`` ``(m, k)`` is that at ``x`` ``(k,)``."""
+    strain, s = side.startswith("strain"), yielding.of(side)
+    if side != PIN_WEAKER:
+        return first_yield(model, strain, joints, s), np.zeros(len(s))
+    left = np.stack([np.exp(np.interp(_GRID, x, row)) for row in lost]) * _GRID / 0.7
+    x0 = first_yield(model, strain, joints, s, left**_FELT)
+    return x0, np.array([np.interp(_DEEPER * at, x, row) for at, row in zip(x0, lost, strict=True)])
 
 
 def _pressure_at_yield(strain: bool, x: Array) -> Array:
     return 0.95 + (0.5 if strain else 0.12) * np.exp(-x / 0.35)
 
 
-def features(side: str, joints: Elastic, yielding: Yielding) -> Array:
+def features(side: str, joints: Elastic, yielding: Yielding, lost: Array) -> Array:
     """The inputs of the process of a side ``(m, d)``, each of a size of about one; the last ones tell how much stronger
-    the other body is."""
+    the other body is, and what is ``lost`` ``(m,)`` to it (see `onset`)."""
     p, m, n, clearance = joints
     s = yielding.of(side)
     inputs = [p, p * m, (1 - p) * n, np.log(clearance / 0.005) / 1.5, np.log(s)]
     if side == PIN_WEAKER:
-        inputs.append(np.log(yielding.pin / s))
+        inputs += [np.log(yielding.pin / s), lost]
     elif side != PIN_ALONE:
         share = s / (yielding.block if side == "stress pin" else yielding.pin)
         inputs += [np.minimum((1 - share) / within, 1.0) for within in _STRONGER[side.split()[0]]]
@@ -126,10 +141,10 @@ class YieldModel:
             "back": Process(self.kernels["back"], self.back_inputs, self.back - [1, 0, 0, 0]),
         }
 
-    def at(self, joints: Elastic, yielding: Yielding, x0: Array, x: Array) -> Loss:
-        """What yielding does to ``joints``, of which ``x0`` ``(m,)`` is about first yield, at ``x`` ``(k,)``; of side
-        `PIN_WEAKER` what that of the block adds, but for the way back."""
-        inputs, u = features(self.side, joints, yielding), np.log(x / x0[:, None])
+    def at(self, inputs: Array, x0: Array, x: Array) -> Loss:
+        """What yielding does to joints with these `features`, of which ``x0`` ``(m,)`` is about first yield, at ``x``
+        ``(k,)``; of side `PIN_WEAKER` what that of the block adds, but for the way back."""
+        u = np.log(x / x0[:, None])
         (force, deviation), (shape, _) = (self.processes[name].predict(inputs) for name in ("force", "shape"))
         rows = np.stack([force, *np.split(shape, 2, axis=1), deviation], axis=2)
         found = np.stack([_between(row, own, float(x[-1] / at)) for row, own, at in zip(rows, u, x0, strict=True)])
@@ -155,15 +170,15 @@ def needed(side: str) -> tuple[str, ...]:
 def total_loss(
     models: Mapping[str, YieldModel], model: ElasticModel, joints: Elastic, yielding: Yielding, x: Array
 ) -> Loss:
-    """The sum of what ``models`` tell; each begins where its body yields."""
+    """The sum of what ``models`` tell at ``x``; each begins where its body yields."""
     none = np.zeros((len(joints.p), len(x)))
     total = Loss(none, none, none, none, none, none + 1, none, none)
     for side, told in models.items():
-        x0 = first_yield(model, side.startswith("strain"), joints, yielding.of(side))
+        x0, lost = onset(side, model, joints, yielding, x, total.peak)
         some = ELASTIC_BELOW * x0 < x[-1]
         if not some.any():
             continue
-        own = told.at(Elastic(*(v[some] for v in joints)), Yielding(*(v[some] for v in yielding)), x0[some], x)
+        own = told.at(features(side, joints, yielding, lost)[some], x0[some], x)
         begun = np.clip(np.log(x / (ELASTIC_BELOW * x0[some, None])) / 0.2, 0.0, 1.0)
         found = Loss(*(values.copy() for values in total))
         for name in ("force", "slope", "peak", "angle"):
@@ -192,13 +207,14 @@ def _between(nodes: Array, u: Array, most: float) -> Array:
 class SolvedJoints:
     """Joints that yield, ``(n, ...)``, as yield_model.npz has them: ``side`` is the index in `SIDES` of the process
     that a row is for (joints of like bodies have two), ``numbers`` are plane (1: strain), p, m, n, dR/R, s of pin and
-    of block; ``count`` how many `MULTIPLES` of ``x0`` are known; ``force``, ``peak`` and ``angle`` there; ``back``
-    ``(k, 6)`` the row of a joint, u of its deepest point, its travel back and toe, and over the largest force how far P
-    is from that way, rms, and on reloading; those that tell of it first."""
+    of block; ``x0`` and ``lost`` are those of `onset`; ``count`` how many `MULTIPLES` are known; ``force``, ``peak``
+    and ``angle`` there; ``back`` ``(k, 6)`` the row of a joint, u of its deepest point, its travel back and toe, and
+    over the largest force how far P is from that way, rms, and on reloading; those that tell of it first."""
 
     side: Array
     numbers: Array
     x0: Array
+    lost: Array
     count: Array
     force: Array
     peak: Array
@@ -227,7 +243,7 @@ class SolvedJoints:
         beyond = np.arange(len(MULTIPLES)) >= self.count[chosen, None]
         curves = {name: np.where(beyond, np.nan, getattr(self, name)[chosen]) for name in _CURVES}
         own = self.numbers[chosen].T
-        inputs = features(side, Elastic(*own[1:5]), Yielding(*own[5:]))
+        inputs = features(side, Elastic(*own[1:5]), Yielding(*own[5:]), self.lost[chosen])
         row = np.full(len(self.numbers), -1)
         row[chosen] = np.arange(len(chosen))
         back = self.back[row[self.back[:, 0].astype(int)] >= 0]
