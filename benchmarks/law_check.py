@@ -115,7 +115,7 @@ def table_of(found: list[Off]) -> Table:
     for one in found:
         soft = ", soft pin" if "soft" in one.kind else ""
         together = one.kind if "elastic" in one.kind else f"{one.kind.split()[0]} yielding{soft}, all"
-        for kind in {one.kind, together}:
+        for kind in {one.kind, together, "all"}:
             kinds[kind].append(one)
     for kind in sorted(kinds):
         values = {
