@@ -14,6 +14,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from archord.postprocess.laws.general.joint import Array
 
+_ROWS = 64  # of a matrix at a time, which caches hold
 _WIDE = 1.0  # prior variance of the linear mean's coefficients over that of the rest
 
 
@@ -42,7 +43,10 @@ class Process:
 
     def __init__(self, kernel: Kernel, points: Array, values: Array) -> None:
         self.kernel, self.points = kernel, points
-        covariance = kernel.between(points, points)
+        covariance = np.zeros((len(points), len(points)))
+        for start in range(0, len(points), _ROWS):  # of the half that Cholesky's factor needs
+            rows = slice(start, start + _ROWS)
+            covariance[rows, : start + _ROWS] = kernel.between(points[rows], points[: start + _ROWS])
         covariance[np.diag_indices_from(covariance)] += kernel.noise
         self.factor = cholesky(covariance, lower=True, check_finite=False)
         self.known = ~np.isnan(values)
