@@ -70,6 +70,7 @@ _LITTLE = 0.03  # of the largest force, below which points on the way back count
 _LENGTHS = (0.7, 0.5, 0.6, 4.0, 1.4, 1.0, 1.0, 1.0)  # with which the search for a kernel's begins
 _FINE = np.geomspace(1e-3, 3.8, 400)
 _LAW = NODES[1:]
+_NOTHING: Array = np.zeros((1, len(_LAW)))
 
 
 def exponents(degree: int) -> Array:
@@ -176,7 +177,7 @@ def yielding_joints(
         plane = "strain" if numbers[0] else "stress"
         ways = [way_told(plane, dense, run) for run in runs if run.steps == 1 and len(run.back) > 2]
         for side in sides_of(numbers):
-            curves, of_pins = total, np.zeros((1, len(_LAW)))
+            curves, of_pins = total, _NOTHING
             if side == PIN_WEAKER and pins is not None:
                 own, fine = (total_loss({PIN_ALONE: pins}, model, joint, yielding, x) for x in (nodes[:, 0], _LAW))
                 curves, of_pins = total - np.concatenate([own.force, own.peak, own.angle]), fine.peak
