@@ -48,9 +48,10 @@ def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
     for name, edge in surface_profiles(joint).items():
         s = joint.sides[name].arc_position(np.array([0.0, -radius["hole"]]))
         order, along = np.argsort(s[:, 0]), slice(None, None, -1 if s[0, 0] > s[0, -1] else 1)
-        arrays = {
-            key: value[order, along] for key, value in (vars(edge) | {"s": s}).items() if key not in ("X", "slip")
-        }
+        given = {key: value for key, value in (vars(edge) | {"s": s}).items() if key not in ("X", "slip")}
+        arrays = {key: value[order, along] for key, value in given.items() if value is not None}
+        if along.step < 0 and edge.shear is not None:  # s runs the other way
+            arrays["shear"] = -arrays["shear"]
         found[name] = ArcProfile(**arrays, radius=radius[name])
     return found
 

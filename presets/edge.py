@@ -6,7 +6,7 @@ is built from them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solve
     from archord.solver.system import System
 
 PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
+RUBBING = ("shear", "sticks")  # of one with friction, too
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,8 @@ class EdgeProfile:
     pressure: Array  # (n, q) positive in compression; projected: linear on each facet, with the facet's force
     raw_pressure: Array  # (n, q) as integrated by the solver
     gap: Array  # (n, q) positive when open
+    shear: Array | None = field(default=None, kw_only=True)  # (n, q) with friction: on the surface, positive along s
+    sticks: Array | None = field(default=None, kw_only=True)  # (n, q) with friction: 1 where points touch and stick
 
     @property
     def width(self) -> Array:
@@ -79,6 +82,11 @@ class SurfaceProfile(EdgeProfile):
         return int(max(begins - (whole and closed[0] and closed[-1]), 0)) or int(closed.any())
 
 
+def per_step(system: System) -> tuple[str, ...]:
+    """Names of the arrays of contact.h5 that change."""
+    return PER_STEP + RUBBING if system.contact.rubs else PER_STEP
+
+
 def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
     """Contact state along the integrated surfaces, by name, at the last evaluation. Collective."""
     u, found = system.equilibrium.displacement(), {}
@@ -87,13 +95,16 @@ def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
         if pair is None:  # it is not integrated
             continue
         displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
-        local = np.zeros((side.n_facets, side.weight.shape[1], 8))
-        values = np.stack([side.weight, pair.pressure, pair.distance, pair.slip], axis=-1)
+        local = np.zeros((side.n_facets, side.weight.shape[1], 10))
+        # the frame's tangent runs along the opposite surface, which this one meets the other way round
+        rubbing = -pair.shear, pair.sticks.reshape(pair.shear.shape)
+        values = np.stack([side.weight, pair.pressure, pair.distance, pair.slip, *rubbing], axis=-1)
         local[side.facet] = np.concatenate([values, displaced, side.point], axis=-1)
         whole = side.sum_over_ranks(local)
-        (weight, raw, gap, slip), coordinates, X = np.moveaxis(whole[..., :4], -1, 0), whole[..., 4:6], whole[..., 6:]
-        s = side.curve.arc_length(side.curve_xi)
-        found[name] = SurfaceProfile(s, weight, coordinates, project(raw, s, weight), raw, gap, X, slip)
+        weight, raw, gap, slip, *rubbing = np.moveaxis(whole[..., :6], -1, 0)
+        coordinates, X, s = whole[..., 6:8], whole[..., 8:], side.curve.arc_length(side.curve_xi)
+        more = dict(zip(RUBBING, rubbing, strict=True)) if system.contact.rubs else {}
+        found[name] = SurfaceProfile(s, weight, coordinates, project(raw, s, weight), raw, gap, X, slip, **more)
     return found
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.materials.material import Array
-from archord.presets.edge import PER_STEP, SurfaceProfile, surface_profiles
+from archord.presets.edge import SurfaceProfile, per_step, surface_profiles
 from archord.presets.joint_account import sizes
-from archord.presets.measures import Record, costs, energy_balance, headed
+from archord.presets.measures import ENERGIES, Record, costs, dissipated, energy_balance, headed
 from archord.presets.problem import as_input_error, general_problem, require_mirrored
 from archord.report.timer import Timer
 from archord.scene.problem import LIVE, ProblemScene
@@ -33,7 +33,6 @@ class GeneralAccount:
 
     record: ClassVar[type] = Record
     fixed: ClassVar[tuple[str, ...]] = ("s", "weight", "X")
-    per_step: ClassVar[tuple[str, ...]] = (*PER_STEP, "slip")
 
     def __init__(self, scene: ProblemScene, comm: MPI.Comm, timer: Timer | None = None) -> None:
         timer = timer or Timer()
@@ -47,6 +46,7 @@ class GeneralAccount:
                 with timer("mesh"):
                     self._warnings = check(scene, problem)
             self.system = System(problem, timer=timer)
+            self.per_step = (*per_step(self.system), "slip")
             require_mirrored(scene, self.system)
             if scene.mesh.shape is None:
                 self._warnings += require_facing(self.system)
@@ -55,8 +55,8 @@ class GeneralAccount:
     def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
         """Headings of history.csv and their values: loads, supports, interactions, bodies, energies, what the step
         cost."""
-        energies = ("elastic_energy", "plastic_dissipation", "work")
-        last = dict.fromkeys(energies, self.scene.units.energy_of(self.scene.analysis.thickness))
+        energies = ENERGIES if self.system.contact.rubs else ENERGIES[:2]
+        last = dict.fromkeys((*energies, "work"), self.scene.units.energy_of(self.scene.analysis.thickness))
         last |= {"force_balance": "", "iterations": "", "cutbacks": "", "seconds": "s"}
         first = ("step", attrgetter("step")), ("load_factor", attrgetter("at"))
         values = [(headed(name, unit), itemgetter(name)) for name, unit in self._units().items()]
@@ -80,6 +80,8 @@ class GeneralAccount:
             found |= {f"{part.name} largest pressure": units.stress}
             found |= {f"{part.name} {at}": length for at in ("at x", "at y", "contact length", "largest slip")}
             found |= {f"{part.name} arcs": ""}
+            if part.friction:
+                found |= {f"{part.name} moment": moment, f"{part.name} largest shear": units.stress}
         for body in scene.body:
             if body.yield_stress is not None:
                 found |= {f"{body.name} peeq_max": "", f"{body.name} at x": length, f"{body.name} at y": length}
@@ -111,6 +113,9 @@ class GeneralAccount:
             lengths = [p.contact_length for p in met]
             slip = max(p.largest_slip for p in met)
             values += [*system.contact_force(part.name), pressure, *at, float(np.mean(lengths)), slip, met[-1].n_arcs]
+            if part.friction:
+                shear = max(float(np.abs(p.shear).max()) for p in met if p.shear is not None)
+                values += [system.contact_moment(part.name, (0.0, 0.0)), shear]
             area += float(np.mean(lengths))
         for body in system.problem.bodies:
             if body.material.yields:
@@ -120,7 +125,7 @@ class GeneralAccount:
             values=dict(zip(self._units(), map(float, values), strict=True)),
             contact_area=area,
             force_balance=system.force_balance(),
-            **costs(before, step, system.energies(), work, seconds),
+            **costs(before, step, system, work, seconds),
         )
 
     def facts(self) -> dict[str, Any]:
@@ -151,14 +156,14 @@ class GeneralAccount:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
         if m.force_balance > 1e-8:
             said.append(f"the forces on the whole do not balance: {m.force_balance:.1e} of the largest is left")
-        total = max(abs(m.work), m.elastic_energy + m.plastic_dissipation)
+        total = max(abs(m.work), m.elastic_energy + dissipated(m))
         if (spurious := self.system.stabilisation_energy) > _SPURIOUS * total:
             said.append(f"springs that hold floating bodies do {spurious:.1e} of the work {total:.1e}")
         return said
 
     def ending(self, steps: Sequence[Record]) -> tuple[str, list[str]]:
         """A warning where nothing ever touched; that springs alone hold a body is no end."""
-        total = max((max(abs(m.work), m.elastic_energy + m.plastic_dissipation) for m in steps), default=0.0)
+        total = max((max(abs(m.work), m.elastic_energy + dissipated(m)) for m in steps), default=0.0)
         if self.system.stabilisation_energy > _ALONE * total:
             return "nothing holds what the loads move: no contact carries them", []
         return "", [NEVER] if self.scene.interaction and not any(m.contact_area for m in steps) else []

@@ -46,6 +46,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     contact = Interaction(
         "contact",
         (Rigid(RigidCircle(np.array([0.0, -g.dR]), g.radius), (0.0, -1.0)) if rigid else "pin", "hole"),
+        friction=analysis.friction,
         kinematics=analysis.kinematics,
         gamma_factor=analysis.gamma_factor,
         integrated={"both": "", "pin": "pin", "block": "hole"}[analysis.integration],

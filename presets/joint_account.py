@@ -12,9 +12,9 @@ import numpy as np
 
 from archord.materials.material import Array
 from archord.presets.arc import SYMMETRY, ArcProfile, arc_profiles, peak_pressure, semi_angle
-from archord.presets.edge import PER_STEP
+from archord.presets.edge import per_step
 from archord.presets.joint import Joint
-from archord.presets.measures import Measures, costs, energy_balance, headed
+from archord.presets.measures import ENERGIES, Measures, costs, energy_balance, headed
 from archord.solver.stepping import Step
 from archord.solver.system import System
 
@@ -36,10 +36,10 @@ class JointAccount:
 
     record: ClassVar[type] = Measures
     fixed: ClassVar[tuple[str, ...]] = ("s", "angle", "weight")
-    per_step: ClassVar[tuple[str, ...]] = PER_STEP
 
     def __init__(self, system: Joint) -> None:
         self.system, self.scene = system, system.scene
+        self.per_step = per_step(system)
         self._yielding = [body for body in system.problem.bodies if body.material.yields]
 
     def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
@@ -54,11 +54,12 @@ class JointAccount:
             "eps": ("", 1.0, "rad"),
             "contact_area": ("R", R, length),
             "peeq_integral": ("R2", R * R * t, f"{length}{3 if thickness else 2}"),
-            **dict.fromkeys(("elastic_energy", "plastic_dissipation", "work"), ("(E* R2)", E * R * R * t, energy)),
+            **dict.fromkeys((*ENERGIES, "work"), ("(E* R2)", E * R * R * t, energy)),
             "seconds": ("", 1.0, "s"),
         }
         columns: list[tuple[str, Callable[[Any], float | int]]] = []
-        for name in [field.name for field in fields(Measures) if field.name != "peeq"]:
+        left_out = {"peeq", *(() if self.system.contact.rubs else ("friction_dissipation",))}
+        for name in [field.name for field in fields(Measures) if field.name not in left_out]:
             scale, divisor, unit = scales.get(name, ("", 1.0, ""))
             columns.append((headed(name, unit), attrgetter(name)))
             if scale:
@@ -99,7 +100,7 @@ class JointAccount:
             peeq_integral=peeq_integral,
             force_balance=max(abs(f - P) for f in forces.values()) / scale if scale else 0.0,
             peeq=self._peeq(max([eps, *(m.eps for m in before)])),
-            **costs(before, step, joint.energies(), work, seconds),
+            **costs(before, step, joint, work, seconds),
         )
 
     def _peeq(self, eps: float) -> dict[str, Sequence[float]]:

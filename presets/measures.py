@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from archord.solver.stepping import Step
+
+if TYPE_CHECKING:  # records are read from a run folder, too, without the solver
+    from archord.solver.system import System
+
+ENERGIES = ("elastic_energy", "plastic_dissipation", "friction_dissipation")
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,7 @@ class Measures:
     iterations: int
     cutbacks: int
     seconds: float
+    friction_dissipation: float = 0.0
     peeq: dict[str, Sequence[float]] = field(default_factory=dict)
 
     @property
@@ -61,6 +67,7 @@ class Record:
     iterations: int
     cutbacks: int
     seconds: float
+    friction_dissipation: float = 0.0
 
     def __getitem__(self, name: str) -> float:
         """The value of a column."""
@@ -82,13 +89,17 @@ class Work:
         self.delta, self.force = (np.asarray(value).tolist() for value in (delta, force))
 
 
-def costs(
-    before: Sequence[Any], step: Step, energies: tuple[float, float], work: float, seconds: float
-) -> dict[str, Any]:
-    """What both kinds of records tell of a ``step`` that follows the steps ``before``."""
-    energy = {"elastic_energy": energies[0], "plastic_dissipation": energies[1], "work": work}
+def costs(before: Sequence[Any], step: Step, system: System, work: float, seconds: float) -> dict[str, Any]:
+    """What both kinds of records tell of a ``step`` that follows the steps ``before``. Collective."""
+    energy = dict(zip(("elastic_energy", "plastic_dissipation"), system.energies(), strict=True))
+    energy |= {"friction_dissipation": system.rubbed(), "work": work}
     cost = {"iterations": step.iterations, "cutbacks": step.cutbacks, "seconds": seconds}
     return {"step": len(before) + 1} | energy | cost
+
+
+def dissipated(m: Measures | Record) -> float:
+    """Energy dissipated by yielding and by friction."""
+    return m.plastic_dissipation + m.friction_dissipation
 
 
 def headed(name: str, unit: str) -> str:
@@ -105,6 +116,6 @@ def energy_balance(steps: Sequence[Measures | Record], fit: int = 0, *, contact:
     """
     if len(steps) <= fit:
         return None
-    missing = [m.work - m.elastic_energy - m.plastic_dissipation for m in (steps[fit - 1], steps[-1])]
+    missing = [m.work - m.elastic_energy - dissipated(m) for m in (steps[fit - 1], steps[-1])]
     work = max((abs(m.work) for m in steps if m.contact_area or not contact), default=0.0)
     return abs(missing[1] - (missing[0] if fit else 0.0)) / work if work else 0.0

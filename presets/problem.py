@@ -190,6 +190,7 @@ class _Builder:
             part.name,
             surfaces,
             law=part.law,
+            friction=part.friction,
             kinematics=self.scene.analysis.kinematics,
             gamma_factor=self.scene.analysis.gamma_factor,
             integrated=part.integrated or "",

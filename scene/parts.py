@@ -63,6 +63,7 @@ class Interaction(Section):
     surfaces: Surfaces = key("two facet sets, or one beside a rigid disc", example=["pin", "hole"])
     rigid: RigidCircle | None = key("rigid disc, the first surface", other={"centre": [0.0, 0.0], "radius": 10.0})
     law: Literal["frictionless", "tied"] = key("contact without friction, or tied surfaces", default="frictionless")
+    friction: float = key("Coulomb's coefficient of friction", default=0.0, ge=0, le=1e6)
     integrated: Name | None = key("the one facet set whose points carry the contact; both do if absent", other="hole")
     interference: NotNegative = key("how far the surfaces are pushed together, in a stage first", "length", default=0.0)
     overlap: NotNegative = key("how far the surfaces are drawn into each other, for that stage", "length", default=0.0)
@@ -73,6 +74,7 @@ class Interaction(Section):
         require(len(self.surfaces) == wanted, "surfaces", f"must name {said}")
         require(len({*self.surfaces}) == wanted, "surfaces", "must be two different facet sets")
         require(self.integrated in (None, *self.surfaces), "integrated", f"must be one of the surfaces {self.surfaces}")
+        require(not (self.friction and self.law == "tied"), "friction", "is not for tied surfaces")
         fits = self.interference or self.overlap
         require(not (fits and self.law == "tied"), "interference", "is not for tied surfaces")
         return self

@@ -196,7 +196,13 @@ class Modelling(Section):
     max_iterations: int = key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
 
 
-class Analysis(Modelling):
+class PresetAnalysis(Modelling):
+    """How a preset is modelled and solved."""
+
+    friction: float = key("Coulomb's coefficient of friction of all contacts", default=0.0, ge=0, le=1e6)
+
+
+class Analysis(PresetAnalysis):
     """How the joint is modelled and solved."""
 
     coarse_start: bool = key("guess every step on a fine mesh from a coarser one; false: for comparison", default=True)

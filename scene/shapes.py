@@ -10,7 +10,17 @@ from pydantic import Field, model_validator
 from archord.scene.geometry import JointGeometry
 from archord.scene.keys import Pair, Positive, Section, key, require
 from archord.scene.scene import Checked, Scene, plain
-from archord.scene.sections import Loading, Modelling, Pin, ProblemOutput, Solid, StepCounts, Stepping, Targets, Units
+from archord.scene.sections import (
+    Loading,
+    Pin,
+    PresetAnalysis,
+    ProblemOutput,
+    Solid,
+    StepCounts,
+    Stepping,
+    Targets,
+    Units,
+)
 
 _THINNEST, _DEEPEST, _FARTHEST = 0.02 * (1 - 1e-9), 0.03, 1e3  # walls, overlaps and lengths over the pin's radius
 _MATERIAL = {*Solid.model_fields}
@@ -148,7 +158,7 @@ class Preset(Checked):
     units: Units = Field(default_factory=Units, description="names of the units")
     pin: Pin = Field(description="material of the pin")
     load: PinLoad = Field(description="loading")
-    analysis: Modelling = Field(default_factory=Modelling, description="model and solver")
+    analysis: PresetAnalysis = Field(default_factory=PresetAnalysis, description="model and solver")
     stepping: Stepping = Field(default_factory=Stepping, description="control of the steps between outputs")
     output: ProblemOutput = Field(default_factory=ProblemOutput, description="what is written")
 
@@ -230,8 +240,10 @@ def _general(
     """The general scene of a pin in ``solids``, with its other ``parts``. Of the sections that ``scene`` has, too, the
     keys that were given, as an accuracy chooses some others."""
     pin, said = scene.pin, {name: plain(getattr(scene, name)) for name in ("units", "analysis", "stepping", "output")}
-    for name in ("integration", "coarse_start"):  # of joints alone
+    for name in ("integration", "coarse_start", "friction"):  # of presets alone
         said["analysis"].pop(name, None)
+    if friction := scene.analysis.friction:
+        parts["interaction"] = [interaction | {"friction": friction} for interaction in parts["interaction"]]
     bodies = solids if pin.rigid else {"pin": pin, **solids}
     parts |= {
         "mesh": {"shape": shape | {"pin": "none" if pin.rigid else "whole" if pin.whole else "half"}},

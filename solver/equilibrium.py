@@ -19,7 +19,6 @@ from archord.materials.material import Points
 from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
-from archord.solver.contact.law import Frictionless
 from archord.solver.drives import Drives
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.linear.bordered import Bordered
@@ -52,9 +51,9 @@ class Equilibrium:
         self._reaction = np.zeros((self.n_owned, 2))
         self.changes = 0
         self.reaction_norm = self.noise = self.largest_reaction = 0.0
-        frictionless = contact.pairs and all(isinstance(pair.law, Frictionless) for pair in contact.pairs)
+        closing = contact.pairs and all(pair.law.closes for pair in contact.pairs)
         dofs, by_force = 2 * index_map.size_global, len(drives.unknown) > 0
-        gamma = contact.gamma_factor if frictionless else None
+        gamma = contact.gamma_factor if closing else None
         facts = Facts(self.comm, dofs, bulk.plastic, by_force, gamma, lambda: all(map(drives.held, problem.bodies)))
         self.choice = choose(facts)
         self._factoriser = partial(self.choice.factoriser, V)  # of tangents of all displacements

@@ -104,6 +104,10 @@ class System:
         """Force ``(2,)`` of the interaction ``name``, the first without, on its second surface."""
         return self.problem.symmetry * self.contact.resultant(name)
 
+    def contact_moment(self, name: str, point: Sequence[float]) -> float:
+        """Moment of that force about ``point``, anticlockwise, on the deformed whole."""
+        return self.problem.symmetry * self.contact.moment(name, point)
+
     def driven(self) -> tuple[Array, Array]:
         """Displacements and forces ``(d,)`` of the ``drive_names`` on the whole, which do the work: of what a drive
         moves, or the mean displacement along its loads and their force."""
@@ -130,6 +134,10 @@ class System:
         parts = np.array(self.bulk.energies(self.equilibrium.displacement()))
         stored, dissipated = self.problem.symmetry * self.comm.allreduce(parts)
         return float(stored), float(dissipated)
+
+    def rubbed(self) -> float:
+        """Work done against friction so far, on the whole."""
+        return self.problem.symmetry * self.comm.allreduce(self.contact.dissipated())
 
     def peeq(self) -> tuple[float, float]:
         """Largest PEEQ at a quadrature point, and the integral of PEEQ over the whole."""

@@ -2,8 +2,9 @@
 
 At a point ``x`` of a side, with closest point ``y`` on the opposite surface, ``n`` the opposite's outward normal there
 and ``g = (x - y) . n`` the gap, the trial pressure is ``t . n - gamma g`` with ``t = sigma(u) N`` the traction of the
-own body. The law makes a traction ``f`` of it, ``[t . n - gamma g]_+ n`` without friction, and the virtual work of the
-contact forces is ``sum over sides of share * integral of f . (v(x) - v(y))``. Linearised are ``n`` and ``y``, too.
+own body. The law makes a traction ``f`` of it, ``[t . n - gamma g]_+ n`` without friction, of which law.py has the
+shear, and the virtual work of the contact forces is ``sum over sides of share * integral of f . (v(x) - v(y))``.
+Linearised are ``n`` and ``y``, too.
 
 Opposite surfaces may lie on other ranks: displacements are exchanged, and forces summed over the ranks.
 """
@@ -26,7 +27,8 @@ from archord.solver.contact.tangent import ContactTangent, trial_rate
 
 
 class Contact:
-    """All ``interfaces``, if any, in the displacement space ``V``: ``surfaces`` of bodies, ``rigid`` ones, ``pairs``.
+    """All ``interfaces``, if any, in the displacement space ``V``: ``surfaces`` of bodies, ``rigid`` ones, ``pairs``,
+    and whether any of them ``rubs``.
 
     A surface belongs to one interface. ``active_set_changes`` counts this rank's points that opened or closed at the
     last evaluation; ``tangent`` is the derivative of what `add_force` adds, renewed as the pattern grows. Collective.
@@ -38,6 +40,7 @@ class Contact:
         self.surfaces = [surface for surface in self._all if isinstance(surface, Surface)]
         self.rigid = [surface for surface in self._all if isinstance(surface, RigidSurface)]
         self.pairs = [pair for i in interfaces for pair in i.pairs]
+        self.rubs = any(pair.law.rubs for pair in self.pairs)
         self._n_dofs = V.dofmap.index_map.size_global
         for number, surface in enumerate(self.rigid):
             surface.curve_dofs[:] = self._n_dofs + number
@@ -116,6 +119,10 @@ class Contact:
         """Force ``(2,)`` on the second surface of the interaction ``name``, the first without, over all ranks."""
         return next(i for i in self.interfaces if name in ("", i.interaction.name)).resultant()
 
+    def moment(self, name: str, point: Sequence[float]) -> float:
+        """Moment of that force about ``point``, anticlockwise, over all ranks."""
+        return next(i for i in self.interfaces if name in ("", i.interaction.name)).moment(np.asarray(point))
+
     def force_on_drives(self) -> Array:
         """Contact force ``(d,)`` along the rates of rigid surfaces, over all ranks; a single zero without any."""
         first = [(i.surfaces[0], i) for i in self.interfaces]
@@ -128,6 +135,10 @@ class Contact:
             found[f"contact {pair.surface.name}"] = pair.surface.facet, pair.surface.points
             found[f"law {pair.surface.name}"] = pair.surface.facet, pair.points
         return found
+
+    def dissipated(self) -> float:
+        """Energy that the laws dissipated so far, this rank's part."""
+        return sum((pair.dissipated() for pair in self.pairs), 0.0)
 
     def n_active(self) -> int:
         """Number of points under pressure, over all ranks."""

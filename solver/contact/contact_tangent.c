@@ -4,7 +4,7 @@
  * With jump = v(x) - v(y), the variation of the closest point is d xi = (jump . tau + d . v'(y)) / (|tau|^2 - g b),
  * where tau and b are the opposite curve's tangent and n . y'' and d = x - y; the normal turns by
  * -(v'(y) . n + b d xi) / |tau| about the unit tangent. At a vertex of the curve xi stands still. The law's derivative
- * takes the trial traction's variation to that of pressure and shear. */
+ * takes the trial traction's variation to that of pressure and shear; where points rub, the slip grows by pace d xi. */
 
 #include <math.h>
 
@@ -58,6 +58,10 @@ static void linearise(const Side *s, int32_t i, Rates *d)
             d->xi[c][j] = slide * (jump[c] * tau[j] + slope[c] * x_y[j]);
             d->turn[c][j] = (slope[c] * n[j] + b * d->xi[c][j]) / speed;
             d->pressure[c][j] += lever * d->turn[c][j];
+            /* the slip is counted along the facet, not across the gap */
+            const double across = j ? n[0] : -n[1];
+            d->shear[c][j] += g * (jump[c] * across - s->pace[i] * d->xi[c][j])
+                              + (t[0] * n[0] + t[1] * n[1]) * d->turn[c][j];
         }
 }
 

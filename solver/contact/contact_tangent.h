@@ -11,7 +11,7 @@ typedef struct {
     const double *gamma;
     const uint8_t *active;
     const double *traction, *derivative, *stress_vector, *separation, *moduli;
-    const double *shape, *slope, *normal, *tangent, *bend;
+    const double *shape, *slope, *normal, *tangent, *bend, *pace;
     const uint8_t *slides;
 } Side;
 
@@ -21,5 +21,5 @@ typedef struct {
 void contact_tangent(const Side *s, const int32_t *place, const int32_t *slots, double *values);
 
 /* What displacements of the own cells' nodes (n, a, 2) and of the opposite's nodes at each point (n q, o, 2) add to the
- * trial tractions (n q, 2); of points that slide the shear's is that of a normal that does not turn. */
+ * trial tractions (n q, 2). */
 void trial_rate(const Side *s, const double *own, const double *opposite, double *rate);

@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError, RigidCircle
-from archord.solver.contact.law import LAWS, ContactLaw
+from archord.solver.contact.law import ContactLaw, contact_law
 from archord.solver.contact.pair import Pair
 from archord.solver.contact.quadrature import segment_rule
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -48,11 +48,12 @@ class Rigid:
 class Interaction:
     """Contact of two ``surfaces``, facet sets of one body each, of which the first may be a rigid disc.
 
-    ``law`` is "frictionless", "tied" or a `ContactLaw`. Under ``kinematics`` "current" the closest points are those of
-    the deformed curves, under "reference" those of the undeformed ones, with the normal of the first surface for both,
-    and the gap is linear in the displacement; a law whose points do not slide has no other. ``gamma_factor`` is
-    Nitsche's gamma over the trace constant of each contact cell. ``integrated`` names the one facet set whose points
-    carry the contact, both do if empty. The matrix gets room from the start for pairs that ``slide`` as far as this.
+    ``law`` is "frictionless", "tied" or a `ContactLaw`; ``friction`` is Coulomb's coefficient. Under ``kinematics``
+    "current" the closest points are those of the deformed curves, under "reference" those of the undeformed ones, with
+    the normal of the first surface for both, and the gap is linear in the displacement; a law whose points do not slide
+    has no other. ``gamma_factor`` is Nitsche's gamma over the trace constant of each contact cell. ``integrated`` names
+    the one facet set whose points carry the contact, both do if empty. The matrix gets room from the start for pairs
+    that ``slide`` as far as this.
 
     The gap of the law is that between the surfaces, less ``interference``, which their mesh does not show; ``overlap``
     is what it shows. Both grow in a stage of the fit, to ``s``: the gap gets ``overlap (1 - s) - interference s``.
@@ -61,6 +62,7 @@ class Interaction:
     name: str
     surfaces: tuple[str | Rigid, str]
     law: str | ContactLaw = "frictionless"
+    friction: float = 0.0
     kinematics: Literal["current", "reference"] = "current"
     gamma_factor: float = GAMMA_FACTOR
     integrated: str = ""
@@ -75,7 +77,7 @@ class Interface:
 
     def __init__(self, interaction: Interaction, surfaces: Sequence[Surface | RigidSurface]) -> None:
         self.interaction, self.surfaces = interaction, list(surfaces)
-        law = LAWS[interaction.law] if isinstance(interaction.law, str) else interaction.law
+        law = contact_law(interaction.law, interaction.friction)
         moves = law.slides and interaction.kinematics == "current"
         self.slide = interaction.slide if moves else 0.0
         given = zip(surfaces, interaction.surfaces, strict=True)
@@ -103,8 +105,21 @@ class Interface:
 
     def resultant(self) -> Array:
         """Contact force ``(2,)`` on the second surface, over all ranks."""
-        forces = (pair.forces.sum(0) * (1 if pair.surface is self.surfaces[1] else -1) for pair in self.pairs)
-        return self.pairs[0].surface.sum_over_ranks(sum(forces, np.zeros(2)))
+        return self._summed([pair.forces for pair in self.pairs])
+
+    def moment(self, point: Array) -> float:
+        """Moment of that force about ``point`` ``(2,)``, anticlockwise, over all ranks."""
+        arms = [pair.place - point for pair in self.pairs]
+        crossed = [
+            a[:, :1] * f[:, 1:] - a[:, 1:] * f[:, :1] for a, f in zip(arms, (p.forces for p in self.pairs), strict=True)
+        ]
+        return float(self._summed(crossed)[0])
+
+    def _summed(self, on_own: list[Array]) -> Array:
+        """What the points of each pair get from the other surface ``(m, k)``, summed over those of the second."""
+        signs = [1 if pair.surface is self.surfaces[1] else -1 for pair in self.pairs]
+        total = sum(sign * values.sum(0) for sign, values in zip(signs, on_own, strict=True))
+        return self.pairs[0].surface.sum_over_ranks(np.asarray(total))
 
 
 @contextmanager

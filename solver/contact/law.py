@@ -3,12 +3,13 @@
 All are arrays of ``m`` points in the frame of the opposite surface: its outward normal ``n`` and, turned from it by a
 quarter anticlockwise, its tangent. A traction ``(m, 2)`` is a pressure, positive in compression, and a shear.
 
-Closest points leave a law of sliding points no slip: friction has to accumulate it in its state, and add its derivative
-where the normal turns to contact_tangent.c.
+The slip is how far a point has come along the opposite surface: what moves with that surface, and turns with it, slips
+by nothing. A law that ``rubs`` gets it; to others it is the opening across the gap.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -22,9 +23,12 @@ class ContactLaw(Protocol):
     """A law by its `update`, a pure function; without a history and without friction as it stands.
 
     Points of a law that ``slides`` move along the opposite surface; others keep partners, and undeformed gaps as zero.
+    ``closes`` tells that points which do not touch carry nothing.
     """
 
     slides: ClassVar[bool] = True
+    rubs: ClassVar[bool] = False
+    closes: ClassVar[bool] = False
 
     def state(self, n: int) -> State:
         """History of ``n`` points at the beginning: None, or a dataclass of arrays, as that of a material."""
@@ -39,15 +43,70 @@ class ContactLaw(Protocol):
         """
         ...
 
+    def dissipation(self, state: State) -> Array | float:
+        """Energy dissipated so far per area ``(m,)``."""
+        return 0.0
+
 
 class Frictionless(ContactLaw):
     """``p = [trial]_+`` and no shear."""
+
+    closes = True
 
     def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
         """Pressure where the trial pressure is positive."""
         touches, derivative = ~(trial[:, 0] <= 0), np.zeros((len(trial), 2, 2))
         derivative[:, 0, 0] = touches
         return np.where(touches[:, None], trial * [1.0, 0.0], 0.0), derivative, state
+
+
+@dataclass(frozen=True)
+class Slid:
+    """History of ``m`` points: ``anchor``, the slip at which each sticks without a shear of its own, not a number where
+    it had no partner, ``pressure``, and the energy ``dissipated`` per area."""
+
+    anchor: Array
+    pressure: Array
+    dissipated: Array
+
+
+@dataclass(frozen=True)
+class Coulomb(ContactLaw):
+    """Shear within the cone ``|q| <= friction p`` (Chouly, Mlika and Renard 2018; in time backward Euler).
+
+    A point that sticks has the whole trial shear, with its slip from the ``anchor`` on. Where that leaves the cone it
+    comes back at the same pressure, and the anchor moves until the trial shear is that: a return map with Nitsche's
+    gamma for its stiffness. Points that do not touch take their anchor along; one that had no partner has no shear.
+    """
+
+    friction: float
+    rubs = True
+    closes = True
+
+    def state(self, n: int) -> Slid:
+        """Points at rest."""
+        return Slid(*np.zeros((3, n)))
+
+    def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
+        """Pressure as without friction, and the shear returned to the cone."""
+        touches = ~(trial[:, 0] <= 0)
+        pressure = np.where(touches, trial[:, 0], 0.0)
+        held = touches & ~np.isnan(state.anchor + slip)
+        sticking = np.where(held, trial[:, 1] + gamma * state.anchor, 0.0)
+        sign, beyond = np.sign(sticking), np.abs(sticking) - self.friction * pressure
+        slides = beyond > 0
+        shear = np.where(slides, sign * self.friction * pressure, sticking)
+        moved = np.where(slides, sign * beyond / gamma, 0.0)
+        derivative = np.zeros((len(trial), 2, 2))
+        derivative[:, 0, 0], derivative[:, 1, 1] = touches, held & ~slides
+        derivative[:, 1, 0] = np.where(slides, sign * self.friction, 0.0)
+        lost = 0.5 * self.friction * (state.pressure + pressure) * np.abs(moved)
+        new = Slid(np.where(held, state.anchor - moved, slip), pressure, state.dissipated + lost)
+        return np.stack([pressure, shear], axis=1), derivative, new
+
+    def dissipation(self, state: State) -> Array:
+        """Work done against friction so far per area ``(m,)``."""
+        return state.dissipated
 
 
 class Tied(ContactLaw):
@@ -58,6 +117,16 @@ class Tied(ContactLaw):
     def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
         """The trial traction."""
         return trial, np.tile(np.eye(2), (len(trial), 1, 1)), state
+
+
+def contact_law(law: str | ContactLaw, friction: float = 0.0) -> ContactLaw:
+    """The law of a name, with Coulomb's ``friction`` if there is any. Raises ValueError for friction that is negative,
+    or of another law than that without friction."""
+    if friction and (law != "frictionless" or not friction > 0):
+        raise ValueError(
+            f"friction must be positive, of a law that is frictionless without it: {friction:g} of {law!r}"
+        )
+    return Coulomb(friction) if friction else LAWS[law] if isinstance(law, str) else law
 
 
 LAWS: dict[str, ContactLaw] = {"frictionless": Frictionless(), "tied": Tied()}

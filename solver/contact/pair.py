@@ -21,11 +21,13 @@ class Pair:
     ``share`` of the contact's virtual work is integrated here. Unless the pair ``moves``, points keep the partners of
     the undeformed surfaces. Tractions are in the frame of the ``law``. Raises `ProjectionError`.
 
-    ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)`` normal and tangent
-    and ``opening`` ``(m, 2)`` gap and slip; ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` are those of the
-    own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active``
-    ``(m,)`` points touch, and ``changes`` opened or closed. ``offset`` is added to the gap. The next evaluation
-    searches partners from ``start`` on: anywhere, near the last ones, or, until it is set again, on their facets.
+    ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)`` normal and tangent,
+    ``opening`` ``(m, 2)`` gap and slip, and ``pace`` ``(m,)`` the derivative of the slip along the opposite facet where
+    points move and rub, zero elsewhere; ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` are those of the own
+    material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active`` ``(m,)``
+    points touch, ``sticks`` those that also stick, and ``changes`` went over. ``offset`` is added to the gap. The next
+    evaluation searches partners from ``start`` on: anywhere, near the last ones, or, until it is set again, on their
+    facets.
     """
 
     def __init__(
@@ -35,9 +37,15 @@ class Pair:
         x, self._outward = surface.point.reshape(-1, 2), surface.outward.reshape(-1, 2)
         self.projection = opposite.curve.closest_point(x, self._outward, np.zeros_like(opposite.curve.X))
         self.separation = x - self.projection.point
-        self.points = Points(law, len(x))
+        self.points, self.pace = Points(law, len(x)), np.zeros(len(x))
+        self._rubs = moves and law.rubs
+        if self._rubs and opposite.curve.n_pieces > 1:
+            raise ValueError("friction takes a surface of one piece: give each piece an interaction of its own")
+        if self._rubs:
+            self._period, (self._start, _) = opposite.curve.period, opposite.curve.travelled(self.projection)
+            self.points.state.anchor[~self.projection.found] = np.nan
         self.traction: Array = np.zeros((len(x), 2))
-        self.active = np.zeros(len(x), dtype=bool)
+        self.active, self.sticks = np.zeros((2, len(x)), dtype=bool)
         self.start: Start = "anywhere"
         self.offset = 0.0
 
@@ -69,15 +77,26 @@ class Pair:
         else:
             P = self.projection
             opening = displacement - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
-            if self.law.slides:
-                opening += self.separation
         (xx, yy, _, xy), (N_x, N_y), n = stress.T, self._outward.T, self.projection.normal
         self.stress_vector = np.stack([xx * N_x + xy * N_y, xy * N_x + yy * N_y], axis=1)
         self.frame = np.stack([n[:, 0], n[:, 1], -n[:, 1], n[:, 0]], axis=1).reshape(-1, 2, 2)
         self.opening = np.einsum("mij,mj->mi", self.frame, opening)
         self.opening[:, 0] += self.offset
+        if self.law.slides and not self.moves:
+            self.opening[:, 0] += (self.separation * n).sum(1)
+        if self._rubs:
+            self.opening[:, 1], self.pace = self._slipped()
         self.trial = np.einsum("mij,mj->mi", self.frame, self.stress_vector) - self.gamma[:, None] * self.opening
         self.traction = self._answer(self.trial)
+
+    def _slipped(self) -> tuple[Array, Array]:
+        """Slip ``(m,)`` along the opposite surface, on closed ones the one nearest to the anchor, and `pace`; not a
+        number without a partner, so that a point that finds one begins there."""
+        slip, pace = self.opposite.curve.travelled(self.projection)
+        slip -= self._start
+        if self._period < np.inf:
+            slip += self._period * np.round(np.nan_to_num(self.points.state.anchor - slip) / self._period)
+        return np.where(self.projection.found, slip, np.nan), pace
 
     def _answer(self, trial: Array) -> Array:
         """Traction of the law, none at points without a partner; its derivative and the active points are kept."""
@@ -86,8 +105,9 @@ class Pair:
         if lone.any():
             traction = np.where(lone[:, None], 0.0, traction)
             self.derivative = np.where(lone[:, None, None], 0.0, self.derivative)
-        before, self.active = self.active, self.derivative[:, 0, 0] != 0
-        self.changes = int((before != self.active).sum())
+        before, self.active = (self.active, self.sticks), self.derivative[:, 0, 0] != 0
+        self.sticks = self.derivative[:, 1, 1] != 0
+        self.changes = int(((before[0] != self.active) | (before[1] != self.sticks)).sum())
         return traction
 
     def expect(self, rate: Array) -> None:
@@ -108,9 +128,25 @@ class Pair:
         return (self.frame[:, 1] * relative).sum(axis=1).reshape(self.surface.weight.shape)
 
     @property
+    def place(self) -> Array:
+        """Where the points' forces act ``(m, 2)``: on the deformed surface, if they move."""
+        return self.surface.point.reshape(-1, 2) + self._moved[0] * self.moves
+
+    @property
     def pressure(self) -> Array:
         """Pressure ``(n, q)`` at the points of this rank's facets."""
         return self.traction[:, 0].reshape(self.surface.weight.shape)
+
+    @property
+    def shear(self) -> Array:
+        """Shear ``(n, q)`` on the own surface, positive along the tangent of the frame."""
+        return self.traction[:, 1].reshape(self.surface.weight.shape)
+
+    def dissipated(self) -> float:
+        """Energy that the law dissipated on this rank so far."""
+        return float(
+            (self.share * self.surface.weight.ravel() * self.points.material.dissipation(self.points.trial)).sum()
+        )
 
     @property
     def forces(self) -> Array:

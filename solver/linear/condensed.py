@@ -39,7 +39,7 @@ def why_not(facts: Facts) -> str | None:
     if facts.dofs >= _MOST_DOFS:
         return f"{_MOST_DOFS} dofs or more"
     if facts.gamma_factor is None:
-        return "there is no contact, or one with another law than frictionless"
+        return "there is no contact, or one with a law that never opens"
     if facts.gamma_factor > _LARGE_GAMMA:
         return f"gamma_factor is above {_LARGE_GAMMA:g}"
     return None if facts.held() else "supports alone do not hold every body"

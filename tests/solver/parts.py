@@ -32,6 +32,7 @@ from archord.solver.system import System
 from tests.geometry.shapes.measures import Cells
 
 E, NU = 1.82, 0.3
+FRICTION = 0.3
 YIELD_STRESS = 0.01
 ELASTIC = Elastic(E, NU, "strain")
 PERFECT = J2Material(E, NU, "strain", LinearHardening(YIELD_STRESS))
@@ -150,8 +151,11 @@ def joint_parts(
 
 
 def interact(surfaces, *, kinematics="current", integrated=None, **options) -> Contact:
-    """The contact of two surfaces, of which one or both are integrated; "tied" is a law that has no kinematics."""
+    """The contact of two surfaces, of which one or both are integrated; "tied" is a law that has no kinematics, and
+    "rubbing" ones have friction."""
+    kinematics, *rubbing = kinematics.split(", ")
     options |= {"law": "tied"} if kinematics == "tied" else {"kinematics": kinematics}
+    options |= {"friction": FRICTION} if rubbing else {}
     chosen = "" if integrated is None else str(integrated)
     return Contact(
         surfaces[1].V, [Interface(Interaction("contact", ("0", "1"), integrated=chosen, **options), surfaces)]
