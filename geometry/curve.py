@@ -8,7 +8,6 @@ the tangent turned clockwise.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -109,23 +108,6 @@ class Curve:
         outward = np.stack([step[:, 1], -step[:, 0]], axis=1)
         return x, outward / np.linalg.norm(outward, axis=1)[:, None]
 
-    @property
-    def period(self) -> float:
-        """Length of a closed curve, infinite of an open one."""
-        return float(self.arc_length(np.ones(1))[-1, 0]) if (self.before >= 0).all() else np.inf
-
-    def travelled(self, at: Projection) -> tuple[Array, Array]:
-        """Length ``(m,)`` of the undisplaced curve up to the points ``at``, and its derivative by xi."""
-        q, w = np.polynomial.legendre.leggauss(4)
-        within = np.column_stack([at.xi[:, None] * (q + 1) / 2, at.xi])
-        tangent = np.einsum("mqa,mai->mqi", self.shapes(within)[1], self.X[at.nodes])
-        speed = np.linalg.norm(tangent, axis=-1)
-        return self._starts[at.facet] + 0.5 * at.xi * (speed[:, :-1] @ w), speed[:, -1].copy()
-
-    @cached_property
-    def _starts(self) -> Array:
-        return self.arc_length(np.zeros(1))[:, 0]
-
     def arc_length(self, xi: Array) -> Array:
         """Length ``(n, m)`` along each piece from its start to ``xi`` ``(m,)``, or ``(n, m)``, of each facet."""
         xi = np.broadcast_to(xi, (self.n_facets, np.shape(xi)[-1]))
@@ -219,7 +201,7 @@ def circle_through(x: Array) -> tuple[Array, float] | None:
 class RigidCircle:
     """A rigid disc of the given centre and radius, as an opposite curve of one facet with one node, which moves it."""
 
-    n_facets = n_pieces = 1
+    n_facets = 1
     before = after = np.full(1, -1, dtype=np.int32)
 
     def __init__(self, centre: Array, radius: float) -> None:
@@ -247,12 +229,3 @@ class RigidCircle:
         )
 
     continued = closest_point
-
-    @property
-    def period(self) -> float:
-        """The circumference."""
-        return 2 * np.pi * self.radius
-
-    def travelled(self, at: Projection) -> tuple[Array, Array]:
-        """See `Curve.travelled`; xi is the length."""
-        return self.radius * np.arctan2(at.normal[:, 1], at.normal[:, 0]), np.ones(len(at.xi))

@@ -216,6 +216,7 @@ class Equilibrium:
         self.restore(load, state)
         self.largest_reaction = largest_reaction
         self.contact.search()
+        self.contact.begin(self.displacement())
         self.evaluate()
         self._follow_pattern()
         if self.springs:
@@ -228,3 +229,4 @@ class Equilibrium:
             self.springs.commit()
         for points in self.points():
             points.commit()
+        self.contact.begin(self.displacement())

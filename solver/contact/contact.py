@@ -57,6 +57,11 @@ class Contact:
         for interface in self.interfaces:
             interface.fit(fitted)
 
+    def begin(self, u: Array) -> None:
+        """Begin a step at this rank's accepted displacements ``u`` ``(n, 2)``. Collective."""
+        for pair in self.pairs if self.rubs else []:
+            pair.begin(u, pair.opposite.curve_displacement(u))
+
     def search(self) -> None:
         """Forget where the pairs were: the next evaluation searches them over whole surfaces."""
         for pair in self.pairs:

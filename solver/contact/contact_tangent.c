@@ -4,7 +4,8 @@
  * With jump = v(x) - v(y), the variation of the closest point is d xi = (jump . tau + d . v'(y)) / (|tau|^2 - g b),
  * where tau and b are the opposite curve's tangent and n . y'' and d = x - y; the normal turns by
  * -(v'(y) . n + b d xi) / |tau| about the unit tangent. At a vertex of the curve xi stands still. The law's derivative
- * takes the trial traction's variation to that of pressure and shear; where points rub, the slip grows by pace d xi. */
+ * takes the trial traction's variation to that of pressure and shear; that of the
+ * step's slip (u(x) - u(y)) . tau is jump . tau + (u(x) - u(y)) . n d turn - u'(y) . tau d xi. */
 
 #include <math.h>
 
@@ -53,15 +54,13 @@ static void linearise(const Side *s, int32_t i, Rates *d)
     const double slide = s->slides[i] ? 1 / (speed * speed - (x_y[0] * n[0] + x_y[1] * n[1]) * b) : 0;
     /* the trial pressure follows the turning normal through t . n and, where y is a vertex, through the gap */
     const double lever = (g * (x_y[0] * tau[0] + x_y[1] * tau[1]) - (t[0] * tau[0] + t[1] * tau[1])) / speed;
+    const double *strayed = s->strayed + 2 * i, across = t[0] * n[0] + t[1] * n[1] - g * strayed[0];
     for (int c = 0; c < columns; c++)
         for (int j = 0; j < 2; j++) {
             d->xi[c][j] = slide * (jump[c] * tau[j] + slope[c] * x_y[j]);
             d->turn[c][j] = (slope[c] * n[j] + b * d->xi[c][j]) / speed;
             d->pressure[c][j] += lever * d->turn[c][j];
-            /* the slip is counted along the facet, not across the gap */
-            const double across = j ? n[0] : -n[1];
-            d->shear[c][j] += g * (jump[c] * across - s->pace[i] * d->xi[c][j])
-                              + (t[0] * n[0] + t[1] * n[1]) * d->turn[c][j];
+            d->shear[c][j] += g * strayed[1] * d->xi[c][j] + across * d->turn[c][j];
         }
 }
 

@@ -11,7 +11,7 @@ typedef struct {
     const double *gamma;
     const uint8_t *active;
     const double *traction, *derivative, *stress_vector, *separation, *moduli;
-    const double *shape, *slope, *normal, *tangent, *bend, *pace;
+    const double *shape, *slope, *normal, *tangent, *bend, *strayed;
     const uint8_t *slides;
 } Side;
 

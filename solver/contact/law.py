@@ -3,8 +3,8 @@
 All are arrays of ``m`` points in the frame of the opposite surface: its outward normal ``n`` and, turned from it by a
 quarter anticlockwise, its tangent. A traction ``(m, 2)`` is a pressure, positive in compression, and a shear.
 
-The slip is how far a point has come along the opposite surface: what moves with that surface, and turns with it, slips
-by nothing. A law that ``rubs`` gets it; to others it is the opening across the gap.
+The slip is that since the last accepted state, along the tangent, of the points that are partners now: in contact both
+sides agree on it, whatever the angle at which they met, and what turns with the surfaces slips by nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class ContactLaw(Protocol):
     """A law by its `update`, a pure function; without a history and without friction as it stands.
 
     Points of a law that ``slides`` move along the opposite surface; others keep partners, and undeformed gaps as zero.
-    ``closes`` tells that points which do not touch carry nothing.
+    One that ``rubs`` has shear; ``closes`` tells that points which do not touch carry nothing.
     """
 
     slides: ClassVar[bool] = True
@@ -62,10 +62,10 @@ class Frictionless(ContactLaw):
 
 @dataclass(frozen=True)
 class Slid:
-    """History of ``m`` points: ``anchor``, the slip at which each sticks without a shear of its own, not a number where
-    it had no partner, ``pressure``, and the energy ``dissipated`` per area."""
+    """History of ``m`` points: ``lag``, the slip over which the shear is less than that of the own body's stress by
+    Nitsche's gamma, ``pressure``, and the energy ``dissipated`` per area."""
 
-    anchor: Array
+    lag: Array
     pressure: Array
     dissipated: Array
 
@@ -74,9 +74,9 @@ class Slid:
 class Coulomb(ContactLaw):
     """Shear within the cone ``|q| <= friction p`` (Chouly, Mlika and Renard 2018; in time backward Euler).
 
-    A point that sticks has the whole trial shear, with its slip from the ``anchor`` on. Where that leaves the cone it
-    comes back at the same pressure, and the anchor moves until the trial shear is that: a return map with Nitsche's
-    gamma for its stiffness. Points that do not touch take their anchor along; one that had no partner has no shear.
+    A point that sticks has its trial shear, and the slip of the step is added to its ``lag``: what sticks for many
+    steps does not creep. Where that leaves the cone the shear comes back to it at the same pressure, and the lag
+    becomes what gives this shear: a return map with gamma for its stiffness. Points that do not touch have no lag.
     """
 
     friction: float
@@ -91,17 +91,16 @@ class Coulomb(ContactLaw):
         """Pressure as without friction, and the shear returned to the cone."""
         touches = ~(trial[:, 0] <= 0)
         pressure = np.where(touches, trial[:, 0], 0.0)
-        held = touches & ~np.isnan(state.anchor + slip)
-        sticking = np.where(held, trial[:, 1] + gamma * state.anchor, 0.0)
+        sticking = np.where(touches, trial[:, 1] - gamma * state.lag, 0.0)
         sign, beyond = np.sign(sticking), np.abs(sticking) - self.friction * pressure
         slides = beyond > 0
         shear = np.where(slides, sign * self.friction * pressure, sticking)
         moved = np.where(slides, sign * beyond / gamma, 0.0)
         derivative = np.zeros((len(trial), 2, 2))
-        derivative[:, 0, 0], derivative[:, 1, 1] = touches, held & ~slides
+        derivative[:, 0, 0], derivative[:, 1, 1] = touches, touches & ~slides
         derivative[:, 1, 0] = np.where(slides, sign * self.friction, 0.0)
         lost = 0.5 * self.friction * (state.pressure + pressure) * np.abs(moved)
-        new = Slid(np.where(held, state.anchor - moved, slip), pressure, state.dissipated + lost)
+        new = Slid(np.where(touches, state.lag + slip + moved, 0.0), pressure, state.dissipated + lost)
         return np.stack([pressure, shear], axis=1), derivative, new
 
     def dissipation(self, state: State) -> Array:

@@ -21,13 +21,13 @@ class Pair:
     ``share`` of the contact's virtual work is integrated here. Unless the pair ``moves``, points keep the partners of
     the undeformed surfaces. Tractions are in the frame of the ``law``. Raises `ProjectionError`.
 
-    ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)`` normal and tangent,
-    ``opening`` ``(m, 2)`` gap and slip, and ``pace`` ``(m,)`` the derivative of the slip along the opposite facet where
-    points move and rub, zero elsewhere; ``stress_vector`` ``(m, 2)`` and ``moduli`` ``(m, 3, 3)`` are those of the own
-    material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m, 2, 2)`` those of the law; ``active`` ``(m,)``
-    points touch, ``sticks`` those that also stick, and ``changes`` went over. ``offset`` is added to the gap. The next
-    evaluation searches partners from ``start`` on: anywhere, near the last ones, or, until it is set again, on their
-    facets.
+    ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)`` normal and tangent
+    and ``opening`` ``(m, 2)`` gap and slip; ``strayed`` ``(m, 2)`` is how far points that rub moved along the normal in
+    the step, and how much the opposite's part in the slip grows along its facet; ``stress_vector`` ``(m, 2)`` and
+    ``moduli`` ``(m, 3, 3)`` are those of the own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m,
+    2, 2)`` those of the law; ``active`` ``(m,)`` points touch, ``sticks`` those that also stick, and ``changes`` went
+    over. ``offset`` is added to the gap. The next evaluation searches partners from ``start`` on: anywhere, near the
+    last ones, or, until it is set again, on their facets.
     """
 
     def __init__(
@@ -37,17 +37,12 @@ class Pair:
         x, self._outward = surface.point.reshape(-1, 2), surface.outward.reshape(-1, 2)
         self.projection = opposite.curve.closest_point(x, self._outward, np.zeros_like(opposite.curve.X))
         self.separation = x - self.projection.point
-        self.points, self.pace = Points(law, len(x)), np.zeros(len(x))
-        self._rubs = moves and law.rubs
-        if self._rubs and opposite.curve.n_pieces > 1:
-            raise ValueError("friction takes a surface of one piece: give each piece an interaction of its own")
-        if self._rubs:
-            self._period, (self._start, _) = opposite.curve.period, opposite.curve.travelled(self.projection)
-            self.points.state.anchor[~self.projection.found] = np.nan
+        self.points = Points(law, len(x))
         self.traction: Array = np.zeros((len(x), 2))
         self.active, self.sticks = np.zeros((2, len(x)), dtype=bool)
         self.start: Start = "anywhere"
         self.offset = 0.0
+        self._begun, self.strayed = (np.zeros((len(x), 2)), np.zeros_like(opposite.curve.X)), np.zeros((len(x), 2))
 
     def use_gamma(self, factor: float) -> None:
         """Nitsche's gamma ``(m,)`` is ``factor`` times the share and the trace constant of the point's cell."""
@@ -73,30 +68,35 @@ class Pair:
             else:
                 known = None if self.start == "anywhere" else facet
                 self.projection, self.start = curve.closest_point(x, self._outward, motion, known), "near"
-            self.separation = opening = x - self.projection.point
-        else:
-            P = self.projection
-            opening = displacement - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
+            self.separation = x - self.projection.point
         (xx, yy, _, xy), (N_x, N_y), n = stress.T, self._outward.T, self.projection.normal
         self.stress_vector = np.stack([xx * N_x + xy * N_y, xy * N_x + yy * N_y], axis=1)
         self.frame = np.stack([n[:, 0], n[:, 1], -n[:, 1], n[:, 0]], axis=1).reshape(-1, 2, 2)
-        self.opening = np.einsum("mij,mj->mi", self.frame, opening)
+        self.opening = self._in_frame(self.separation if self.moves else self._relative(displacement, motion))
         self.opening[:, 0] += self.offset
         if self.law.slides and not self.moves:
             self.opening[:, 0] += (self.separation * n).sum(1)
-        if self._rubs:
-            self.opening[:, 1], self.pace = self._slipped()
-        self.trial = np.einsum("mij,mj->mi", self.frame, self.stress_vector) - self.gamma[:, None] * self.opening
+        if self.law.rubs:
+            own, before = self._begun
+            step = self._in_frame(self._relative(displacement - own, motion - before))
+            P, (rise, self.opening[:, 1]) = self.projection, step.T
+            drift = np.einsum("ma,mai->mi", P.slope, (motion - before)[P.nodes])
+            self.strayed = np.stack([rise, self._in_frame(drift)[:, 1]], axis=1)
+        self.trial = self._in_frame(self.stress_vector) - self.gamma[:, None] * self.opening
         self.traction = self._answer(self.trial)
 
-    def _slipped(self) -> tuple[Array, Array]:
-        """Slip ``(m,)`` along the opposite surface, on closed ones the one nearest to the anchor, and `pace`; not a
-        number without a partner, so that a point that finds one begins there."""
-        slip, pace = self.opposite.curve.travelled(self.projection)
-        slip -= self._start
-        if self._period < np.inf:
-            slip += self._period * np.round(np.nan_to_num(self.points.state.anchor - slip) / self._period)
-        return np.where(self.projection.found, slip, np.nan), pace
+    def begin(self, u: Array, motion: Array) -> None:
+        """Count the slip of laws that rub from ``u`` and ``motion`` on, as `evaluate` takes them."""
+        self._begun = self.surface.displacement(u), motion
+
+    def _in_frame(self, vectors: Array) -> Array:
+        """Components ``(m, 2)`` along normal and tangent."""
+        return np.einsum("mij,mj->mi", self.frame, vectors)
+
+    def _relative(self, own: Array, motion: Array) -> Array:
+        """What the points ``own`` ``(m, 2)`` and their partners have moved apart ``(m, 2)``."""
+        P = self.projection
+        return own - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
 
     def _answer(self, trial: Array) -> Array:
         """Traction of the law, none at points without a partner; its derivative and the active points are kept."""
@@ -123,9 +123,7 @@ class Pair:
     @property
     def slip(self) -> Array:
         """Displacement ``(n, q)`` of the points relative to the opposite surface, along the tangent of the frame."""
-        (own, motion), P = self._moved, self.projection
-        relative = own - np.einsum("ma,mai->mi", P.shape, motion[P.nodes])
-        return (self.frame[:, 1] * relative).sum(axis=1).reshape(self.surface.weight.shape)
+        return (self.frame[:, 1] * self._relative(*self._moved)).sum(axis=1).reshape(self.surface.weight.shape)
 
     @property
     def place(self) -> Array:

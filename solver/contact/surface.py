@@ -141,9 +141,12 @@ class Surface:
 
     def deform(self, u: Array) -> tuple[Array, Array, Array]:
         """Own displacement ``(n q, 2)``, stress ``(n q, 4)`` and tangent ``(n q, 3, 3)`` at the contact points."""
-        displacement = self.shape @ u[self.cell_dofs]
         stress, tangent = self.points.update(strain(self.gradient, self.cell_dofs, u).reshape(-1, 3))
-        return displacement.reshape(-1, 2), stress, tangent
+        return self.displacement(u), stress, tangent
+
+    def displacement(self, u: Array) -> Array:
+        """Own displacement ``(n q, 2)`` at the contact points."""
+        return (self.shape @ u[self.cell_dofs]).reshape(-1, 2)
 
 
 class RigidSurface:

@@ -60,5 +60,5 @@ def _points(pair: Pair) -> Any:
     sizes = *own.shape.shape, own.trace.shape[1], P.shape.shape[1]
     at_points = own.shape, own.gradient, own.trace, own.outward, own.weight, pair.share, pair.gamma, pair.active
     state = pair.traction, pair.derivative, pair.stress_vector, pair.separation, pair.moduli
-    opposite = P.shape, P.slope, P.normal, P.tangent, P.bend, pair.pace, P.slides
+    opposite = P.shape, P.slope, P.normal, P.tangent, P.bend, pair.strayed, P.slides
     return structure(_SOURCE, "Side", (int(pair.moves), *sizes, *at_points, *state, *opposite))

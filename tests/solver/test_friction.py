@@ -10,7 +10,6 @@ from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.materials.elasticity import Elastic
 from archord.solver.problem import Body, Drive, Interaction, Problem, Support
-from archord.solver.stepping import StepRules
 from archord.solver.system import System
 from tests.solver.parts import blocks, solve
 
@@ -20,7 +19,7 @@ MU = 0.3
 
 
 def lid(*names: str, control: str = "force", **paths) -> tuple[list[Support], list[Drive]]:
-    """The edge "lid" that drives of these ``names`` ("x", "y") move, straight, by ``paths`` of forces or displacements."""
+    """The edge "lid", moved straight by drives of these ``names`` ("x", "y"): ``paths`` of forces or displacements."""
     supports = [Support(name, "lid", "xy".index(name), 1.0, name) for name in names]
     return supports, [Drive(name, paths[name], control) for name in names]
 
@@ -150,3 +149,60 @@ def test_sliding_forth_and_back_loses_what_the_loads_put_in():
     assert (np.diff(lost) >= 0).all()
     assert work == pytest.approx(system.energies()[0] + lost[-1], rel=2e-3)
     assert abs(system.drive_force("x")) == pytest.approx(MU * 10, rel=1e-3)
+
+
+def cylinder_on_block(comm: MPI.Comm, R: float, size: float, near: float):
+    """Half a cylinder on a block; elements of ``size`` within ``near`` of first touch, and larger with the distance."""
+
+    def build(gmsh) -> None:
+        geo = gmsh.model.geo
+        points = [geo.addPoint(x, y, 0) for x, y in ((0, R), (-R, R), (0, 0), (R, R))]
+        arcs = [geo.addCircleArc(a, points[0], b) for a, b in ((points[1], points[2]), (points[2], points[3]))]
+        top = geo.addLine(points[3], points[1])
+        corners = [
+            geo.addPoint(x, y, 0) for x, y in ((-4 * R, -4 * R), (4 * R, -4 * R), (4 * R, 0), (0, 0), (-4 * R, 0))
+        ]
+        lines = [geo.addLine(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
+        sets = {"upper": [*arcs, top], "lower": lines}
+        faces = {name: geo.addPlaneSurface([geo.addCurveLoop(edges)]) for name, edges in sets.items()}
+        geo.synchronize()
+        for name, face in faces.items():
+            gmsh.model.addPhysicalGroup(2, [face], name=name)
+        for name, edges in {"arc": arcs, "lid": [top], "lower top": lines[2:4], "base": [lines[0]]}.items():
+            gmsh.model.addPhysicalGroup(1, edges, name=name)
+        field = gmsh.model.mesh.field
+        field.add("MathEval", 1)
+        beyond = f"(sqrt(x*x + y*y) - {near})"
+        field.setString(1, "F", f"{size} + 0.15*({beyond} + abs({beyond}))")
+        field.setAsBackgroundMesh(1)
+        for name in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints"):
+            gmsh.option.setNumber(f"Mesh.{name}", 0)
+
+    return gmsh_to_mesh(comm, build, [Circle("arc", (0.0, R), R)])
+
+
+def test_a_tangential_force_leaves_the_stick_zone_of_cattaneo_and_mindlin():
+    """c/a = sqrt(1 - Q/(mu P)) and the shear at the centre, mu p0 (1 - c/a) (Johnson 1985, section 7.2)."""
+    R, P = 10.0, 1000.0
+    modulus = E / (2 * (1 - NU**2))
+    a = np.sqrt(4 * P * R / (np.pi * modulus))
+    p0, shares = 2 * P / (np.pi * a), [0.25, 0.5, 0.75]
+    supports, drives = lid("x", "y", x=[0, 0, *(MU * P * q for q in shares)], y=[0, *4 * [-P]])
+    contact = Interaction("contact", ("arc", "lower top"), friction=MU, slide=a)
+    bodies = [Body(name, STEEL) for name in ("upper", "lower")]
+    mesh = cylinder_on_block(MPI.COMM_WORLD, R, a / 24, 1.2 * a)
+    problem = Problem(mesh, bodies, [contact], [*held("base"), *supports], drives=drives, stabilise=True)
+    system = System(problem)
+    system.solve([1.0])
+    for n, share in enumerate(shares, 1):
+        system.solve(np.linspace(n, n + 1, 5)[1:])
+        stick = np.sqrt(1 - share)
+        for pair in system.contact.pairs:
+            width = system.comm.allreduce((pair.surface.weight.ravel() * pair.sticks).sum()) / 2
+            assert width == pytest.approx(stick * a, rel=0.03)
+            x = pair.surface.point.reshape(-1, 2)[:, 0]
+            near = np.abs(x) < 0.2 * stick * a
+            q = system.comm.allreduce(np.abs(pair.traction[near, 1]).sum()) / system.comm.allreduce(near.sum())
+            x2 = system.comm.allreduce((x[near] ** 2).sum()) / system.comm.allreduce(near.sum())
+            flat = MU * p0 * (1 - stick - x2 / (2 * a**2) * (1 - 1 / stick))
+            assert q == pytest.approx(flat, rel=0.02)
