@@ -52,7 +52,11 @@ def _loaded(source: Path, libraries: tuple[str, ...]) -> tuple[cffi.FFI, Any]:
         _compile([*compiler, *_FLAGS], source, path, libraries)
     ffi = cffi.FFI()
     ffi.cdef("".join(line for line in header.splitlines(keepends=True) if not line.startswith("#")))
-    return ffi, ffi.dlopen(str(path))
+    try:
+        return ffi, ffi.dlopen(str(path))
+    except OSError:  # a library that it needs has another version by now
+        _compile([*compiler, *_FLAGS], source, path, libraries)
+        return ffi, ffi.dlopen(str(path))
 
 
 def pointer(array: npt.NDArray[Any]) -> Any:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from archord.geometry.basis import Array
+from archord.materials.material import Points
 from archord.solver.contact.interaction import GAMMA_FACTOR
 from archord.solver.newton import CIRCLING, Newton, NewtonSolver
 
@@ -58,18 +59,25 @@ class Recovery:
 
     def _solve_at_once(self, guess: Array, afar: bool) -> bool:
         """Solve from ``guess``; one from ``afar`` is too stiff for a line search, which creeps there, and may yield far
-        too much: full steps come first, to a rough equilibrium of points that cannot yield (further) where that is."""
-        points = self.equilibrium.plastic_points()
-        if not self.equilibrium.comm.allreduce(len(points)):
-            return self._solve_either_way(guess, full_steps=afar)
-        if afar:
-            for p in points:
-                p.elastic_only = True
-            if self._solve_either_way(guess, full_steps=True, goal=max(_ROUGH, self.newton.tolerance)):
-                guess = self.equilibrium.state()
-            for p in points:
-                p.elastic_only = False
-        return self._solve_either_way(guess)
+        too much: points come first that cannot yield (further). Where friction makes it fail, it is left out first."""
+        yielding = self.equilibrium.plastic_points()
+        rubbing = [pair.points for pair in self.equilibrium.contact.pairs if pair.law.rubs]
+        yields = self.equilibrium.comm.allreduce(len(yielding)) > 0
+        if yields and afar:
+            guess = self._simplified(yielding, guess)
+        return self._solve_either_way(guess, full_steps=afar and not yields) or (
+            bool(rubbing) and self._solve_either_way(self._simplified(yielding * afar + rubbing, guess))
+        )
+
+    def _simplified(self, points: list[Points], guess: Array) -> Array:
+        """A rough equilibrium where these ``points`` answer by `elastic`, by full steps; the ``guess`` without one."""
+        for p in points:
+            p.elastic_only = True
+        if self._solve_either_way(guess, full_steps=True, goal=max(_ROUGH, self.newton.tolerance)):
+            guess = self.equilibrium.state()
+        for p in points:
+            p.elastic_only = False
+        return guess
 
     def _solve_either_way(self, guess: Array, *, full_steps: bool = False, goal: float = 0.0) -> bool:
         """With a line search, then without, or the other way round with ``full_steps``, which find the right piece of a

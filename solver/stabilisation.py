@@ -103,12 +103,12 @@ class RigidMotions:
         r, pressed, openings = len(self.free), 0.0, []
         force, stiffness = np.zeros(r), np.zeros((r, r))
         for pair in self.contact.pairs:
-            opening = np.stack([-trial_rate(pair, motion) / pair.gamma[:, None] for motion in self.free], axis=2)
+            opening = np.stack([-trial_rate(pair, motion) / pair.gamma for motion in self.free], axis=2)
             if isinstance(pair.opposite, RigidSurface):
                 opening -= pair.frame @ (self.levels @ pair.opposite.rate).T
             weight = pair.share * pair.surface.weight.ravel()
             force += np.einsum("m,mi,mik->k", weight, pair.traction, opening)
-            stiff = (weight * pair.gamma)[:, None, None] * pair.derivative
+            stiff = (weight[:, None] * pair.gamma)[:, None] * pair.derivative
             stiffness += np.tensordot(opening, stiff @ opening, ((0, 1), (0, 1)))
             pressed += float(np.abs(pair.forces).sum())
             openings.append(opening)

@@ -20,7 +20,7 @@ from archord.materials.j2 import J2Material
 from archord.postprocess.decks.mesh import DeckMesh, Ints, label, surface_name
 from archord.presets.account import account_of
 from archord.scene.file import AnyScene
-from archord.solver.contact.law import LAWS, Frictionless, Tied
+from archord.solver.contact.law import Coulomb, Frictionless, Tied, contact_law
 from archord.solver.problem import Interaction, Problem, Rigid
 from archord.solver.system import System
 
@@ -175,15 +175,18 @@ class _Writer:
             yield from _material(name, material)
             yield from (f"*SOLID SECTION, ELSET={label(name)}, MATERIAL={label(name)}", number(self.thick))
         for i in problem.interactions:
-            law, name = LAWS[i.law] if isinstance(i.law, str) else i.law, label(i.name)
+            law, name = contact_law(i.law, i.friction), label(i.name)
             if isinstance(law, Tied):
                 yield from (f"*TIE, NAME={name}, ADJUST=NO", _pair(i))
-            elif isinstance(law, Frictionless):
+            elif isinstance(law, Frictionless | Coulomb):
                 yield from (f"*SURFACE INTERACTION, NAME={name}_LAW", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR")
-                yield number(contact_stiffness(problem, self.mesh, i))
+                stiffness = number(contact_stiffness(problem, self.mesh, i))
+                yield stiffness
+                if isinstance(law, Coulomb):  # with the stiffness of sticking, which Abaqus does not ask for
+                    yield from ("*FRICTION", f"{number(law.friction)}, {stiffness}")
                 yield from (f"*CONTACT PAIR, INTERACTION={name}_LAW, TYPE=SURFACE TO SURFACE", _pair(i))
             else:
-                raise ValueError(f"the law of {i.name!r} cannot be exported; frictionless and tied contact can")
+                raise ValueError(f"the law of {i.name!r} cannot be exported; contact with and without friction, and tied, can")
         yield from self._spring_lines()
         for m in self.hung:
             for k, node in enumerate(m.nodes):

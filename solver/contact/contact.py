@@ -101,7 +101,7 @@ class Contact:
         """Size of the force that rounding of this rank's contact points leaves: positions times gamma."""
         squares = 0.0
         for pair in self.pairs:
-            spring = (pair.share * pair.gamma * pair.surface.weight.ravel())[pair.active]
+            spring = (pair.share * pair.gamma[:, 0] * pair.surface.weight.ravel())[pair.active]
             squares += (spring**2).sum() * np.abs(pair.surface.point).max(initial=0.0) ** 2
         return float(2 * np.finfo(float).eps * np.sqrt(squares))
 

@@ -22,7 +22,7 @@ typedef struct {
 static void linearise(const Side *s, int32_t i, Rates *d)
 {
     const int32_t a = s->a, o = s->o, columns = a + o;
-    const double *N = s->outward + 2 * i, *C = s->moduli + 9 * i, *n = s->normal + 2 * i, g = s->gamma[i];
+    const double *N = s->outward + 2 * i, *C = s->moduli + 9 * i, *n = s->normal + 2 * i, g = s->gamma[2 * i], h = s->gamma[2 * i + 1];
     double jump[MOST], slope[MOST], stress[MOST][2][2]; /* of the stress vector sigma N: component, then displacement */
     for (int c = 0; c < a; c++) {
         jump[c] = s->own_shape[i * a + c], slope[c] = 0;
@@ -45,7 +45,7 @@ static void linearise(const Side *s, int32_t i, Rates *d)
         for (int j = 0; j < 2; j++) {
             const double *t[2] = {stress[c][0], stress[c][1]}, across = j ? n[0] : -n[1];
             d->pressure[c][j] = n[0] * t[0][j] + n[1] * t[1][j] - g * jump[c] * n[j];
-            d->shear[c][j] = n[0] * t[1][j] - n[1] * t[0][j] - g * jump[c] * across;
+            d->shear[c][j] = n[0] * t[1][j] - n[1] * t[0][j] - h * jump[c] * across;
             d->turn[c][j] = d->xi[c][j] = 0;
         }
     if (!s->moves) return;
@@ -54,13 +54,13 @@ static void linearise(const Side *s, int32_t i, Rates *d)
     const double slide = s->slides[i] ? 1 / (speed * speed - (x_y[0] * n[0] + x_y[1] * n[1]) * b) : 0;
     /* the trial pressure follows the turning normal through t . n and, where y is a vertex, through the gap */
     const double lever = (g * (x_y[0] * tau[0] + x_y[1] * tau[1]) - (t[0] * tau[0] + t[1] * tau[1])) / speed;
-    const double *strayed = s->strayed + 2 * i, across = t[0] * n[0] + t[1] * n[1] - g * strayed[0];
+    const double *strayed = s->strayed + 2 * i, across = t[0] * n[0] + t[1] * n[1] - s->gamma[2 * i + 1] * strayed[0];
     for (int c = 0; c < columns; c++)
         for (int j = 0; j < 2; j++) {
             d->xi[c][j] = slide * (jump[c] * tau[j] + slope[c] * x_y[j]);
             d->turn[c][j] = (slope[c] * n[j] + b * d->xi[c][j]) / speed;
             d->pressure[c][j] += lever * d->turn[c][j];
-            d->shear[c][j] += g * strayed[1] * d->xi[c][j] + across * d->turn[c][j];
+            d->shear[c][j] += s->gamma[2 * i + 1] * strayed[1] * d->xi[c][j] + across * d->turn[c][j];
         }
 }
 

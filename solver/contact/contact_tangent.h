@@ -1,7 +1,7 @@
 #include <stdint.h>
 
 /* One side of a contact: n facets of q points; a nodes a cell, k of them on the facet (trace), o nodes of the opposite.
- * traction (pressure, shear) and its derivative are in the frame of the normal. */
+ * gamma (of gap and slip), traction (pressure, shear) and its derivative are in the frame of the normal. */
 typedef struct {
     int32_t moves, n, q, a, k, o;
     const double *own_shape, *gradient;

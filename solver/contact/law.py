@@ -38,10 +38,14 @@ class ContactLaw(Protocol):
         """Traction ``(m, 2)``, its derivative ``(m, 2, 2)`` with respect to ``trial``, and the new state.
 
         ``trial`` ``(m, 2)`` is Nitsche's traction of points that touch and stick: that of the own body's stress minus
-        ``gamma`` times ``gap`` and ``slip``, ``(m,)`` each. Traction and derivative are zero at points that do not
-        touch; where they touch, the pressure follows its trial value. What is not a number stays that.
+        ``gamma`` ``(m, 2)`` times ``gap`` and ``slip``, ``(m,)`` each. Traction and derivative are zero at points that
+        do not touch; where they touch, the pressure follows its trial value. What is not a number stays that.
         """
         ...
+
+    def elastic(self) -> ContactLaw:
+        """A law with the same states that answers from each without friction."""
+        return self
 
     def dissipation(self, state: State) -> Array | float:
         """Energy dissipated so far per area ``(m,)``."""
@@ -91,17 +95,21 @@ class Coulomb(ContactLaw):
         """Pressure as without friction, and the shear returned to the cone."""
         touches = ~(trial[:, 0] <= 0)
         pressure = np.where(touches, trial[:, 0], 0.0)
-        sticking = np.where(touches, trial[:, 1] - gamma * state.lag, 0.0)
+        sticking = np.where(touches, trial[:, 1] - gamma[:, 1] * state.lag, 0.0)
         sign, beyond = np.sign(sticking), np.abs(sticking) - self.friction * pressure
         slides = beyond > 0
         shear = np.where(slides, sign * self.friction * pressure, sticking)
-        moved = np.where(slides, sign * beyond / gamma, 0.0)
+        moved = np.where(slides, sign * beyond / gamma[:, 1], 0.0)
         derivative = np.zeros((len(trial), 2, 2))
         derivative[:, 0, 0], derivative[:, 1, 1] = touches, touches & ~slides
         derivative[:, 1, 0] = np.where(slides, sign * self.friction, 0.0)
         lost = 0.5 * self.friction * (state.pressure + pressure) * np.abs(moved)
         new = Slid(np.where(touches, state.lag + slip + moved, 0.0), pressure, state.dissipated + lost)
         return np.stack([pressure, shear], axis=1), derivative, new
+
+    def elastic(self) -> Coulomb:
+        """The law without friction."""
+        return Coulomb(0.0)
 
     def dissipation(self, state: State) -> Array:
         """Work done against friction so far per area ``(m,)``."""

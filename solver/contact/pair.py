@@ -39,14 +39,17 @@ class Pair:
         self.separation = x - self.projection.point
         self.points = Points(law, len(x))
         self.traction: Array = np.zeros((len(x), 2))
+        self._branch: Array = np.zeros(len(x))
         self.active, self.sticks = np.zeros((2, len(x)), dtype=bool)
         self.start: Start = "anywhere"
         self.offset = 0.0
         self._begun, self.strayed = (np.zeros((len(x), 2)), np.zeros_like(opposite.curve.X)), np.zeros((len(x), 2))
 
     def use_gamma(self, factor: float) -> None:
-        """Nitsche's gamma ``(m,)`` is ``factor`` times the share and the trace constant of the point's cell."""
-        self.gamma = factor * np.repeat(self.share * self.surface.gamma, self.surface.weight.shape[1])
+        """Nitsche's gamma ``(m, 2)``, of gap and slip, is ``factor`` times the share and the trace constants of the
+        point's cell."""
+        each = np.stack([self.surface.gamma, self.surface.gamma_shear], axis=1)
+        self.gamma = factor * self.share * np.repeat(each, self.surface.weight.shape[1], axis=0)
 
     def use_own_normals(self) -> None:
         """Measure the gap along this surface's normals, reversed, for good."""
@@ -82,7 +85,7 @@ class Pair:
             P, (rise, self.opening[:, 1]) = self.projection, step.T
             drift = np.einsum("ma,mai->mi", P.slope, (motion - before)[P.nodes])
             self.strayed = np.stack([rise, self._in_frame(drift)[:, 1]], axis=1)
-        self.trial = self._in_frame(self.stress_vector) - self.gamma[:, None] * self.opening
+        self.trial = self._in_frame(self.stress_vector) - self.gamma * self.opening
         self.traction = self._answer(self.trial)
 
     def begin(self, u: Array, motion: Array) -> None:
@@ -105,9 +108,10 @@ class Pair:
         if lone.any():
             traction = np.where(lone[:, None], 0.0, traction)
             self.derivative = np.where(lone[:, None, None], 0.0, self.derivative)
-        before, self.active = (self.active, self.sticks), self.derivative[:, 0, 0] != 0
-        self.sticks = self.derivative[:, 1, 1] != 0
-        self.changes = int(((before[0] != self.active) | (before[1] != self.sticks)).sum())
+        before, D = self._branch, self.derivative
+        self._branch = D[:, 0, 0] + 2 * D[:, 1, 1] + 4 * np.sign(D[:, 1, 0])
+        self.active, self.sticks = D[:, 0, 0] != 0, D[:, 1, 1] != 0
+        self.changes = int((before != self._branch).sum())
         return traction
 
     def expect(self, rate: Array) -> None:

@@ -25,9 +25,9 @@ class Surface:
     Arrays of this rank's ``n`` facets with ``q`` points each, in the order in which the curve runs: ``weight`` ``(n,
     q)`` (measure of the curved edge), ``point`` and ``outward`` ``(n, q, 2)``, ``gradient`` ``(n, q, a, 2)`` of the own
     cell's basis, ``shape`` ``(n, q, a)`` and of it ``trace_shape`` ``(n, q, k)`` of the nodes on the facet, ``gamma``
-    ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve, ``trace`` their nodes within the cell. The
-    ``curve``, its ``n_facets`` and ``curve_dofs``, the global dofs of its nodes, are those of all ranks. Collective;
-    raises ValueError for facets that are no boundary of the body, or branch.
+    and ``gamma_shear`` ``(n,)``. ``facet`` ``(n,)`` numbers the facets along the curve, ``trace`` their nodes within
+    the cell. The ``curve``, its ``n_facets`` and ``curve_dofs``, the global dofs of its nodes, are those of all ranks.
+    Collective; raises ValueError for facets that are no boundary of the body, or branch.
     """
 
     def __init__(self, V: fem.FunctionSpace, facets: np.ndarray, material: Material, name: str = "") -> None:
@@ -71,7 +71,7 @@ class Surface:
         self._owned_local = owned[self._owned]
         xi, w = basix.make_quadrature(basix.CellType.interval, 2 * CONTACT_POINTS - 1)
         self.place_points(np.tile(xi[:, 0], (self.n_facets, 1)), np.tile(w, (self.n_facets, 1)))
-        self.gamma = self._trace_inequality()
+        self.gamma, self.gamma_shear = self._trace_inequality()
 
     def facet_lengths(self) -> Array:
         """Arc length ``(n_facets,)`` of every facet, over all ranks."""
@@ -95,7 +95,8 @@ class Surface:
         self.points = Points(self.material, self.weight.size)
 
     def _trace_inequality(self) -> Array:
-        """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over a facet <= gamma a(v, v) over its cell``, any ``v``.
+        """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over a facet <= gamma a(v, v) over its cell``, any ``v``;
+        and the same of the shear: ``(2, n)``.
 
         Warburton and Hesthaven (2003) give the constant for polynomials; here the generalised eigenvalue problem of
         each contact cell is solved, with its curved geometry and its elastic moduli. Unit: stress / length.
@@ -105,13 +106,15 @@ class Surface:
         basis = cell_basis(self.V.mesh, self.degree, self.cells, X)
         B = strain_matrix(basis.gradient)
         energy = np.einsum("nq,nqia,ij,nqjb->nab", basis.measure * w, B, C, B, optimize=True)
-        n = self.outward
-        traction = np.stack([n[..., 0] ** 2, n[..., 1] ** 2, 2 * n[..., 0] * n[..., 1]], axis=-1) @ C
-        row = np.einsum("nqi,nqia->nqa", traction, strain_matrix(self.gradient))
-        trace = np.einsum("nq,nqa,nqb->nab", self.weight, row, row)
+        x, y = np.moveaxis(self.outward, -1, 0)
+        normal, shear = [x**2, y**2, 2 * x * y], [-x * y, x * y, x**2 - y**2]
+        rows = np.einsum(
+            "inqk,nqka->inqa", np.stack([normal, shear]).transpose(0, 2, 3, 1) @ C, strain_matrix(self.gradient)
+        )
+        traces = np.einsum("nq,inqa,inqb->inab", self.weight, rows, rows)
         value, vector = np.linalg.eigh(energy)
         scaled = vector[..., 3:] / np.sqrt(value[:, None, 3:])
-        return np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ trace @ scaled)[:, -1]
+        return np.linalg.eigvalsh(np.swapaxes(scaled, 1, 2) @ traces @ scaled)[..., -1]
 
     def arc_position(self, origin: Array) -> Array:
         """Arc length ``(n_facets, q)`` of all points, from the end of an open curve nearest to ``origin`` ``(2,)``; on

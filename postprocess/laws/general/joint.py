@@ -30,8 +30,8 @@ class LawJoint:
     the axis. ``plane`` is "strain" or "stress", ``nu`` Poisson's ratio of the block, ``pin_nu`` that of the pin (None:
     the block's, or rigid). ``pin_hardening`` and ``block_hardening`` are d(yield stress)/d(PEEQ) over Young's modulus
     of the body (0: perfect plasticity, None: no straight line). Laws of P(delta) are for a pin in a wide block, and say
-    so of a ``ring``, where ``block_size`` (None: wide) is small, or the pin is ``whole``, not cut at the pressed
-    diameter. Raises ValueError for values that make no joint.
+    so of a ``ring``, where ``block_size`` (None: wide) is small, the pin is ``whole``, not cut at the pressed
+    diameter, or there is ``friction``, which no law knows. Raises ValueError for values that make no joint.
     """
 
     radius: float
@@ -51,6 +51,7 @@ class LawJoint:
     ring: bool = False
     block_size: float | None = None
     whole: bool = False
+    friction: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -90,6 +91,7 @@ class LawJoint:
             ring=not scene.joint.is_block,
             block_size=scene.joint.W,
             whole=scene.pin.whole,
+            friction=scene.analysis.friction,
             **given,
         )
 
