@@ -277,11 +277,16 @@ def _checked_keys(found: list[Factor]) -> list[str]:
     return keys
 
 
+_LATER = {"friction": 0.0}  # keys of analysis that the first version did not have, and what it did
+
+
 def run_name(scene: Scene) -> str:
     """Twelve hexadecimal digits that stand for the resolved scene, its output in the words of the first version that
     solved it so, and how archord solves it."""
     data, fields = tomllib.loads(resolved(scene)), scene.output.fields
     data["output"] = {"fields": bool(fields), "stress": fields in ("nodes", "points"), "points": fields == "points"}
+    for name in [name for name, default in _LATER.items() if data["analysis"].get(name) == default]:
+        del data["analysis"][name]
     return hashlib.sha256(f"archord {_SOLVED_ALIKE_SINCE}\n{tomli_w.dumps(data)}".encode()).hexdigest()[:12]
 
 

@@ -186,7 +186,9 @@ class _Writer:
                     yield from ("*FRICTION", f"{number(law.friction)}, {stiffness}")
                 yield from (f"*CONTACT PAIR, INTERACTION={name}_LAW, TYPE=SURFACE TO SURFACE", _pair(i))
             else:
-                raise ValueError(f"the law of {i.name!r} cannot be exported; contact with and without friction, and tied, can")
+                raise ValueError(
+                    f"the law of {i.name!r} cannot be exported; contact with and without friction, and tied, can"
+                )
         yield from self._spring_lines()
         for m in self.hung:
             for k, node in enumerate(m.nodes):
