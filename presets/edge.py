@@ -97,8 +97,8 @@ def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
         displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
         local = np.zeros((side.n_facets, side.weight.shape[1], 10))
         # the frame's tangent runs along the opposite surface, which this one meets the other way round
-        rubbing = -pair.shear, pair.sticks.reshape(pair.shear.shape)
-        values = np.stack([side.weight, pair.pressure, pair.distance, pair.slip, *rubbing], axis=-1)
+        shear, sticks = -pair.shear, pair.sticks.reshape(pair.shear.shape)
+        values = np.stack([side.weight, pair.pressure, pair.distance, pair.slip, shear, sticks], axis=-1)
         local[side.facet] = np.concatenate([values, displaced, side.point], axis=-1)
         whole = side.sum_over_ranks(local)
         weight, raw, gap, slip, *rubbing = np.moveaxis(whole[..., :6], -1, 0)

@@ -158,11 +158,12 @@ class System:
         return max(self.comm.allgather(max(found)))
 
     def force_balance(self) -> float:
-        """Largest resultant on a body over the largest force of an interaction or a support; 0 if all are round-off."""
+        """Largest resultant on a body over the largest force of an interaction or a support, or over the norm of nodal
+        ones, as of a pure moment; 0 if all are round-off."""
         left = [self.equilibrium.residual_on(self.nodes_of(body)) for body in self.problem.bodies]
         forces = [np.zeros(2), *(self.contact_force(interaction.name) for interaction in self.problem.interactions)]
         forces += [self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)]
-        largest = np.linalg.norm(forces, axis=1).max()
+        largest = max(np.linalg.norm(forces, axis=1).max(), self.problem.symmetry * self.equilibrium.reaction_norm)
         if largest <= _AT_REST * self.problem.symmetry * self.equilibrium.noise:
             return 0.0
         return float(self.problem.symmetry * np.linalg.norm(left, axis=1).max() / largest)

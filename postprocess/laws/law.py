@@ -137,8 +137,8 @@ class Law:
             said.append("of perfect plasticity; of bodies that harden its P is too low beyond yield")
         if joint.friction:
             said.append(
-                f"without friction; with the coefficient {joint.friction:g} P is higher: in the paper's elastic joint at 2 "
-                "dR by 3.6 % with 0.1, by 10.6 % with 0.3"
+                f"without friction; with the coefficient {joint.friction:g} P is higher: in the paper's elastic joint "
+                "at 2 dR by 3.6 % with 0.1, by 10.6 % with 0.3"
             )
         for kind in said:
             warnings.warn(LawRangeWarning(f"{self.name}: is a law {kind}"), stacklevel=4)

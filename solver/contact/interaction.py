@@ -110,12 +110,11 @@ class Interface:
     def moment(self, point: Array) -> float:
         """Moment of that force about ``point`` ``(2,)``, anticlockwise, over all ranks."""
         arms = [pair.place - point for pair in self.pairs]
-        crossed = [
-            a[:, :1] * f[:, 1:] - a[:, 1:] * f[:, :1] for a, f in zip(arms, (p.forces for p in self.pairs), strict=True)
-        ]
+        forces = [pair.forces for pair in self.pairs]
+        crossed = [a[:, :1] * f[:, 1:] - a[:, 1:] * f[:, :1] for a, f in zip(arms, forces, strict=True)]
         return float(self._summed(crossed)[0])
 
-    def _summed(self, on_own: list[Array]) -> Array:
+    def _summed(self, on_own: Sequence[Array]) -> Array:
         """What the points of each pair get from the other surface ``(m, k)``, summed over those of the second."""
         signs = [1 if pair.surface is self.surfaces[1] else -1 for pair in self.pairs]
         total = sum(sign * values.sum(0) for sign, values in zip(signs, on_own, strict=True))

@@ -43,7 +43,8 @@ class Pair:
         self.active, self.sticks = np.zeros((2, len(x)), dtype=bool)
         self.start: Start = "anywhere"
         self.offset = 0.0
-        self._begun, self.strayed = (np.zeros((len(x), 2)), np.zeros_like(opposite.curve.X)), np.zeros((len(x), 2))
+        self._begun: tuple[Array, Array] = np.zeros((len(x), 2)), np.zeros_like(opposite.curve.X)
+        self.strayed: Array = np.zeros((len(x), 2))
 
     def use_gamma(self, factor: float) -> None:
         """Nitsche's gamma ``(m, 2)``, of gap and slip, is ``factor`` times the share and the trace constants of the
@@ -86,6 +87,8 @@ class Pair:
             drift = np.einsum("ma,mai->mi", P.slope, (motion - before)[P.nodes])
             self.strayed = np.stack([rise, self._in_frame(drift)[:, 1]], axis=1)
         self.trial = self._in_frame(self.stress_vector) - self.gamma * self.opening
+        if self.law.rubs:  # what has no partner has no history
+            self.trial[~self.projection.found, 0] = -1.0
         self.traction = self._answer(self.trial)
 
     def begin(self, u: Array, motion: Array) -> None:

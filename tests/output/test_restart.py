@@ -37,6 +37,7 @@ CASES = {
     "one side": (scene(0.2, 3, **PLASTIC, analysis={"integration": "block"}), 2),
     "back stresses": (scene(0.2, **PLASTIC, block={"back_stresses": [[0.5, 100.0], [0.01, 0.0]]}, load=UP_DOWN_UP), 4),
     "unloading": (scene(0.2, **PLASTIC, load=UP_DOWN_UP), 4),
+    "friction, unloading": (scene(0.2, **PLASTIC, load=UP_DOWN_UP, analysis={"friction": 0.3}), 4),
     "turning": (scene(0.2, **PLASTIC, load=UP_DOWN_UP), 3),
     "force": (loaded({"relative_force": [0.004, 0.002], "steps": 3}, element_size=0.2, **PLASTIC), 4),
     "ring": (persson_joint(0.5, 0.2, 4, block={"yield_stress": 0.002}), 2),

@@ -9,9 +9,13 @@ from mpi4py import MPI
 from archord.geometry.meshes.fenicsx import gmsh_to_mesh
 from archord.geometry.meshes.refine import Circle
 from archord.materials.elasticity import Elastic
+from archord.presets.joint import Joint
+from archord.scene.scene import Scene
 from archord.solver.problem import Body, Drive, Interaction, Problem, Support
 from archord.solver.system import System
 from tests.solver.parts import blocks, solve
+
+pytestmark = pytest.mark.mpi
 
 E, NU = 210000.0, 0.3
 STEEL = Elastic(E, NU, "strain")
@@ -206,3 +210,27 @@ def test_a_tangential_force_leaves_the_stick_zone_of_cattaneo_and_mindlin():
             x2 = system.comm.allreduce((x[near] ** 2).sum()) / system.comm.allreduce(near.sum())
             flat = MU * p0 * (1 - stick - x2 / (2 * a**2) * (1 - 1 / stick))
             assert q == pytest.approx(flat, rel=0.02)
+
+
+def test_the_joint_of_the_paper_with_friction():
+    """P, p0 and the energy lost, from GetFEM and a code of our own that agree to the digits given (P) and about; the
+    dissipation closes the balance of energy."""
+    scene = Scene(
+        joint={"radius": 1.0, "relative_clearance": 0.005},
+        pin={"E": 1.82, "nu": 0.3},
+        block={"E": 1.82, "nu": 0.3},
+        analysis={"friction": 0.1},
+        load={"displacement": 2.0, "steps": 20},
+    )
+    joint = Joint(scene, MPI.COMM_WORLD)
+    work, last = 0.0, (0.0, 0.0)
+    for load in scene.targets:
+        joint.solve([load])
+        delta, P = joint.delta(), joint.drive_force("")
+        work += (delta - last[0]) * (P + last[1]) / 2
+        last = delta, P
+        if load == pytest.approx(0.005):
+            assert pytest.approx(5.6493e-3, rel=1e-3) == P
+    assert last[1] == pytest.approx(1.32327e-2, rel=1e-3)
+    assert joint.rubbed() == pytest.approx(1.27e-6, rel=0.05)
+    assert work - joint.energies()[0] == pytest.approx(joint.rubbed(), rel=0.05)
