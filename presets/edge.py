@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solve
     from archord.solver.system import System
 
 PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
+_ON_CONE = 1e-6  # of the largest shear: what comes as close slides
 RUBBING = ("shear", "sticks")  # of one with friction, too
 
 
@@ -97,7 +98,8 @@ def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
         displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
         local = np.zeros((side.n_facets, side.weight.shape[1], 10))
         # the frame's tangent runs along the opposite surface, which this one meets the other way round
-        shear, sticks = -pair.shear, pair.sticks.reshape(pair.shear.shape)
+        shear = -pair.shear
+        sticks = np.abs(shear) < (1 - _ON_CONE) * getattr(pair.law, "friction", 0.0) * pair.pressure
         values = np.stack([side.weight, pair.pressure, pair.distance, pair.slip, shear, sticks], axis=-1)
         local[side.facet] = np.concatenate([values, displaced, side.point], axis=-1)
         whole = side.sum_over_ranks(local)

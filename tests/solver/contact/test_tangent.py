@@ -172,7 +172,9 @@ def test_trial_tractions_follow_the_displacements(bodies, kinematics):
         difference = (ahead - behind) / (2 * h)
         assert 0.1 < pair.active.mean() < 0.95
         components = slice(0, 1 if kinematics == "current" else 2)
-        assert rate[:, components] == pytest.approx(difference[:, components], abs=1e-6 * np.abs(difference).max())
+        found = pair.projection.found | ("rubbing" not in kinematics)  # the others are told to carry nothing
+        off = (rate - difference)[found, components]
+        assert np.abs(off).max() < 1e-6 * np.abs(difference).max()
 
 
 def test_the_points_that_are_expected_to_close_do():
