@@ -101,6 +101,12 @@ def strain_matrix(gradient: Array) -> Array:
     return B
 
 
+def displacement_gradient(gradient: Array, dofs: npt.NDArray[np.int32], u: Array) -> Array:
+    """Displacement gradient ``(n, q, 4)``, ``[xx, yy, xy, yx]`` with xy that of the displacement along x by y."""
+    (xx, yx), (xy, yy) = np.moveaxis(np.swapaxes(gradient, 2, 3) @ u[dofs][:, None], (2, 3), (0, 1))
+    return np.stack([xx, yy, xy, yx], axis=-1)
+
+
 def strain(gradient: Array, dofs: npt.NDArray[np.int32], u: Array) -> Array:
     """Strain ``(n, q, 3)`` from gradients ``(n, q, a, 2)``, nodes ``(n, a)`` and nodal displacements ``(nodes, 2)``."""
     n, q, a, _ = gradient.shape

@@ -35,6 +35,34 @@ class Hardening(Protocol):
         """Plastic work density: the integral of `stress` from 0."""
         ...
 
+    def at(self, points: Array) -> Hardening:
+        """The law of these ``points`` of an array, where each has its own."""
+        return self
+
+
+@dataclass(frozen=True)
+class Scaled(Hardening):
+    """A ``law`` times a ``factor`` ``(n,)`` of each point."""
+
+    law: Hardening
+    factor: Array
+
+    def stress(self, peeq: Array) -> Array:
+        """Yield stress."""
+        return self.factor * self.law.stress(peeq)
+
+    def slope(self, peeq: Array) -> Array:
+        """Its slope."""
+        return self.factor * self.law.slope(peeq)
+
+    def work(self, peeq: Array) -> Array:
+        """Plastic work density."""
+        return self.factor * self.law.work(peeq)
+
+    def at(self, points: Array) -> Scaled:
+        """Of these points."""
+        return Scaled(self.law, self.factor[points])
+
 
 @dataclass(frozen=True)
 class LinearHardening(Hardening):

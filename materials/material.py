@@ -24,10 +24,11 @@ class Material(Protocol):
     without history, to inherit.
 
     One that ``yields`` can leave its `elastic_tangent`, by yielding or otherwise; a body that cannot is assembled once,
-    from that tangent alone.
+    from that tangent alone. One that is ``finite`` gets displacement gradients for strains (see finite.py).
     """
 
     yields: ClassVar[bool] = False
+    finite: ClassVar[bool] = False
 
     @property
     def elastic_tangent(self) -> Array:
@@ -46,6 +47,14 @@ class Material(Protocol):
     def energy(self, stress: Array) -> Array:
         """Elastic energy density ``(n,)`` of stresses ``(n, 4)``."""
         ...
+
+    def stored(self, strain: Array, stress: Array, state: State) -> Array:
+        """Elastic energy density ``(n,)`` after an update to ``stress`` and ``state``, per undeformed volume."""
+        return self.energy(stress)
+
+    def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
+        """Cauchy's stress ``(n, 4)`` after an update to ``stress`` and ``state``."""
+        return stress
 
     def elastic(self) -> Material:
         """A material with the same states that answers from each as if it could not yield (further)."""

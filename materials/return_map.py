@@ -64,6 +64,7 @@ def return_map(strain: Array, old: PlasticState, m: Elastic, hardening: Hardenin
     p = np.flatnonzero(np.sqrt(1.5 * a**2 @ deviator) > hardening.stress(old.peeq))
     if not len(p):
         return stress, tangent, old
+    hardening = hardening.at(p)
     zeta, q = plastic_multiplier(a[p], 1.5 * deviator, moduli * deviator, hardening, old.peeq[p])
     shrink = 1 + zeta[:, None] * (moduli * deviator)
     sigma = (a[p] / shrink) @ Q

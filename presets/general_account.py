@@ -150,8 +150,10 @@ class GeneralAccount:
             if 0 < touching < _FEW_FACETS:
                 said.append(f"only {touching} facets of {name!r} in contact; smaller elements would resolve it")
         largest = max((v for k, v in m.values.items() if k.endswith(" peeq_max")), default=0.0)
-        if largest > _LARGE_STRAIN:
-            said.append(f"PEEQ reaches {largest:.2g}, too much for small-strain theory")
+        if largest > _LARGE_STRAIN and self.scene.analysis.strain == "small":
+            said.append(
+                f'PEEQ reaches {largest:.2g}, too much for small-strain theory; analysis.strain = "large" is for that'
+            )
         if residual > 1e-8 and m.force_balance:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
         if m.force_balance > 1e-8:

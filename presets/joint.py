@@ -63,7 +63,7 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
 
     return Problem(
         joint_mesh(comm, g, part, scene.load.core_radius, analysis.degree, partitioner),
-        [Body(name, solid.constitutive(analysis.plane)) for name, solid in scene.solids.items()],
+        [Body(name, solid.constitutive(analysis.plane, analysis.strain)) for name, solid in scene.solids.items()],
         [contact],
         supports,
         [Load("pin", (0.0, -1.0), core)] if ring else [],

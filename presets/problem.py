@@ -118,7 +118,10 @@ class _Builder:
         by_force = any(load.kind != "displacement" for load in scene.load)
         problem = Problem(
             self.mesh,
-            [Body(body.name, body.constitutive(analysis.plane), body.cells or body.name) for body in scene.body],
+            [
+                Body(body.name, body.constitutive(analysis.plane, analysis.strain), body.cells or body.name)
+                for body in scene.body
+            ],
             [self._interaction(part, 0.0 if by_force else travel) for part in scene.interaction],
             self.supports,
             self.loads,

@@ -116,10 +116,10 @@ class Scene(Checked):
     def doubts(self) -> list[str]:
         """What to warn of before anything is solved."""
         farthest = 0.0 if self.force_controlled else max(map(abs, self.targets)) / self.joint.radius
-        if farthest <= _SMALL:
+        if farthest <= _SMALL or self.analysis.strain == "large":
             return []
         said = f"load.{self.load.kind} moves the pin by {farthest:.2g} R: beyond {_SMALL:g} R small-strain theory"
-        return [f"{said} does not hold, and P may fall where it should rise"]
+        return [f'{said} does not hold, and P may fall where it should rise; analysis.strain = "large" is for that']
 
     @property
     def load_unit(self) -> float:

@@ -96,8 +96,13 @@ class Solid(Section):
         """The isotropic hardening of a solid with a yield stress."""
         return hardening_law(self.yield_stress or 0.0, self.hardening, self.E)
 
-    def constitutive(self, plane: Plane) -> Material:
-        """The constitutive law: `Elastic`, `J2Material` with a yield stress, `KinematicMaterial` with back stresses."""
+    def constitutive(self, plane: Plane, strain: str = "small") -> Material:
+        """The constitutive law: `Elastic`, `J2Material` with a yield stress, `KinematicMaterial` with back stresses; at
+        "large" ``strain`` as a `LargeStrain`."""
+        if strain == "large":
+            from archord.materials.finite import LargeStrain
+
+            return LargeStrain(self.constitutive(plane))
         if self.yield_stress is None:
             return Elastic(self.E, self.nu, plane)
         if self.back_stresses:
@@ -187,6 +192,7 @@ class Modelling(Section):
     """How a problem is modelled and solved."""
 
     plane: Literal["strain", "stress"] = key("plane strain or plane stress", default="strain")
+    strain: Literal["small", "large"] = key("small strains, or large ones by logarithms", default="small")
     kinematics: Literal["current", "reference"] = key("closest points on deformed curves, or fixed", default="current")
     gamma_factor: float = key("Nitsche's gamma over trace constant; coercive above 0.25", default=0.5, ge=1e-3, le=1e6)
     accuracy: Accuracy | None = key("relative error of P (delta under a force) to reach by mesh and steps", other=0.001)
@@ -194,6 +200,13 @@ class Modelling(Section):
     thickness: Positive | None = key("thickness; forces and energies are per unit if absent", "length", other=10.0)
     tolerance: float = key("residual over reaction at which Newton stops", default=1e-10, ge=1e-12, le=1e-4)
     max_iterations: int = key("Newton iterations before a step is cut", default=25, ge=2, le=1000)
+
+    @model_validator(mode="after")
+    def _large(self):
+        require(
+            self.strain == "small" or self.kinematics == "current", "kinematics", 'must be "current" at large strain'
+        )
+        return self
 
 
 class PresetAnalysis(Modelling):

@@ -17,7 +17,14 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
-from archord.geometry.basis import Array, bulk_quadrature, bulk_quadrature_degree, cell_basis, strain
+from archord.geometry.basis import (
+    Array,
+    bulk_quadrature,
+    bulk_quadrature_degree,
+    cell_basis,
+    displacement_gradient,
+    strain,
+)
 from archord.materials.elasticity import mean_stress, von_mises
 from archord.materials.material import Material, Points
 
@@ -28,6 +35,14 @@ _NO_SLOTS = np.zeros((2, 0), dtype=np.int64)
 def _voigt(u):
     e = ufl.sym(ufl.grad(u))
     return ufl.as_vector([e[0, 0], e[1, 1], 2 * e[0, 1]])
+
+
+def _gradient(u):
+    g = ufl.grad(u)
+    return ufl.as_vector([g[0, 0], g[1, 1], g[0, 1], g[1, 0]])
+
+
+_SMALL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1]])  # the small strain of a displacement gradient
 
 
 def matrix(V: fem.FunctionSpace, forms: list[fem.Form], extra: Iterable[np.ndarray] = _NO_SLOTS) -> PETSc.Mat:
@@ -73,13 +88,24 @@ class _BodyPoints:
         self.cells, self.dofs = cells, V.dofmap.list[cells]
         self.gradient, self.point, self.weight = basis.gradient, basis.point, basis.measure * w
         self.points = Points(material, self.weight.size)
-        self.stress: Array = np.zeros((self.weight.size, 4))
+        self.strain, self.stress = np.zeros((2, self.weight.size, 4))
+        self.finite, C = material.finite, material.elastic_tangent
+        self.elastic = _SMALL.T @ C @ _SMALL if self.finite else C
         self.yielding = cells[:0]  # cells that had a point off its elastic tangent at the last update
 
     def update(self, u: Array) -> Array:
-        """Keep the stress at the nodal displacements ``u``; returns the tangent ``(n q, 3, 3)``."""
-        self.stress, tangent = self.points.update(strain(self.gradient, self.dofs, u).reshape(-1, 3))
+        """Keep the stress at the nodal displacements ``u``; returns the tangent ``(n q, k, k)``, k = 3 or 4."""
+        self.strain = self.measure(u).reshape(-1, len(self.elastic))
+        self.stress, tangent = self.points.update(self.strain)
         return tangent
+
+    def measure(self, u: Array) -> Array:
+        """Strain ``(n, q, 3)`` at the nodal displacements ``u``, or displacement gradient ``(n, q, 4)``."""
+        return (displacement_gradient if self.finite else strain)(self.gradient, self.dofs, u)
+
+    def forces(self) -> Array:
+        """What of the stress does work on the strain ``(n, q, k)``."""
+        return (self.stress if self.finite else self.stress[:, [0, 1, 3]]).reshape(*self.weight.shape, -1)
 
 
 class PointFields(NamedTuple):
@@ -97,6 +123,7 @@ class PointFields(NamedTuple):
 def _check_elastic_tangent(material: Material) -> None:
     """Raise ValueError for what would be assembled wrongly: an elastic tangent that is not symmetric, or a response
     that is not that tangent's though the material does not yield."""
+    material = material.inner if material.finite else material
     C, probe = material.elastic_tangent, 1e-3 * np.array([[3.0, -1.0, 2.0], [-20.0, 5.0, 10.0]])
     if not np.allclose(C, C.T, rtol=0, atol=1e-12 * C.max()):
         raise ValueError("elastic_tangent of a material must be symmetric")
@@ -128,9 +155,11 @@ class Bulk:
         self.elastic_forms = list(elastic.values())
         if self._plastic:
             cell, metadata = V.mesh.basix_cell(), {"quadrature_degree": rule, "quadrature_rule": "default"}
-            element = {shape: basix.ufl.quadrature_element(cell, shape, degree=rule) for shape in ((3,), (3, 3))}
-            self._sigma = fem.Function(fem.functionspace(V.mesh, element[(3,)]))
-            self._correction = fem.Function(fem.functionspace(V.mesh, element[(3, 3)]))
+            k = self._k = len(next(iter(self._plastic.values())).elastic)
+            element = [basix.ufl.quadrature_element(cell, shape, degree=rule) for shape in ((k,), (k, k))]
+            self._sigma, self._correction = (fem.Function(fem.functionspace(V.mesh, e)) for e in element)
+            if k == 4:
+                u, v = _gradient(ufl.TrialFunction(V)), _gradient(ufl.TestFunction(V))
             domain = [(1, np.sort(np.concatenate([p.cells for p in self._plastic.values()])))]
             dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
             self._plastic_force = fem.form(ufl.inner(self._sigma, v) * dx)
@@ -151,17 +180,15 @@ class Bulk:
     def update(self, u: Array) -> None:
         """Return-map the plastic bodies at the nodal displacements ``u`` ``(n_nodes, 2)`` of this rank."""
         for body in self._plastic.values():
-            tangent, (n, q) = body.update(u), body.weight.shape
-            sigma = self._sigma.x.array.reshape(-1, q, 3)
-            sigma[body.cells] = body.stress[:, [0, 1, 3]].reshape(n, q, 3)
-            elastic = body.points.material.elastic_tangent
+            tangent, (n, q), k = body.update(u), body.weight.shape, self._k
+            self._sigma.x.array.reshape(-1, q, k)[body.cells] = body.forces()
             # points that do not flow have its diagonal
-            a, b, c = (tangent[:, i, i] != elastic[i, i] for i in range(3))
+            a, b, c = (tangent[:, i, i] != body.elastic[i, i] for i in range(3))
             flows = (a | b | c).reshape(n, q).any(axis=1)
-            correction = self._correction.x.array.reshape(-1, 9 * q)
+            correction = self._correction.x.array.reshape(-1, k * k * q)
             correction[body.yielding] = 0.0
             body.yielding = body.cells[flows]
-            correction[body.yielding] = (tangent.reshape(n, q, 3, 3)[flows] - elastic).reshape(-1, 9 * q)
+            correction[body.yielding] = (tangent.reshape(n, q, k, k)[flows] - body.elastic).reshape(-1, k * k * q)
 
     def add_force(self, u: PETSc.Vec, force: PETSc.Vec) -> None:
         """Add the internal force of the displacement ``u`` (last passed to `update`) to ``force``."""
@@ -175,10 +202,10 @@ class Bulk:
     def add_action(self, direction: fem.Function, out: PETSc.Vec) -> None:
         """Add the last tangent, applied to ``direction``, to ``out``; `add_force` then needs another `update`."""
         for body in self._plastic.values():
-            eps = strain(body.gradient, body.dofs, direction.x.array.reshape(-1, 2))
+            eps, k = body.measure(direction.x.array.reshape(-1, 2)), self._k
             q = eps.shape[1]
-            moduli = self._correction.x.array.reshape(-1, q, 3, 3)[body.cells] + body.points.material.elastic_tangent
-            self._sigma.x.array.reshape(-1, q, 3)[body.cells] = np.einsum("nqij,nqj->nqi", moduli, eps)
+            moduli = self._correction.x.array.reshape(-1, q, k, k)[body.cells] + body.elastic
+            self._sigma.x.array.reshape(-1, q, k)[body.cells] = np.einsum("nqij,nqj->nqi", moduli, eps)
         self.add_force(direction.x.petsc_vec, out)
 
     def assemble_correction(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
@@ -198,7 +225,7 @@ class Bulk:
         stored = dissipated = 0.0
         for data in self._plastic.values():
             w, points = data.weight.ravel(), data.points
-            stored += float(w @ points.material.energy(data.stress))
+            stored += float(w @ points.material.stored(data.strain, data.stress, points.trial))
             dissipated += float(w @ np.broadcast_to(points.material.dissipation(points.trial), w.shape))
         if self.stiffness is not None:
             x, force = self.stiffness.createVecs()
@@ -231,9 +258,10 @@ class Bulk:
                 body = _BodyPoints(self.V, cells, self.materials[tag])
                 body.update(u)
             shape, points = (*body.weight.shape, 4), body.points
-            plastic_strain = getattr(points.trial, "plastic_strain", np.zeros_like(body.stress)).reshape(shape)
+            stress = points.material.true_stress(body.strain, body.stress, points.trial).reshape(shape)
+            plastic_strain = getattr(points.trial, "plastic_strain", np.zeros_like(stress)).reshape(shape)
             peeq = points.peeq.reshape(body.weight.shape)
-            yield PointFields(cells, body.point, body.weight, body.stress.reshape(shape), plastic_strain, peeq)
+            yield PointFields(cells, body.point, body.weight, stress, plastic_strain, peeq)
 
     def cell_fields(self, parts: Iterable[PointFields]) -> dict[str, Array]:
         """Cell means of `at_points`: "von_mises" and "mean_stress" ``(n_cells,)``, "stress" ``(n_cells, 4)``; where a

@@ -277,7 +277,7 @@ def _checked_keys(found: list[Factor]) -> list[str]:
     return keys
 
 
-_LATER = {"friction": 0.0}  # keys of analysis that the first version did not have, and what it did
+_LATER = {"friction": 0.0, "strain": "small"}  # keys of analysis that the first version did not have, and what it did
 
 
 def run_name(scene: Scene) -> str:

@@ -22,19 +22,14 @@ typedef struct {
 static void linearise(const Side *s, int32_t i, Rates *d)
 {
     const int32_t a = s->a, o = s->o, columns = a + o;
-    const double *N = s->outward + 2 * i, *C = s->moduli + 9 * i, *n = s->normal + 2 * i, g = s->gamma[2 * i], h = s->gamma[2 * i + 1];
-    double jump[MOST], slope[MOST], stress[MOST][2][2]; /* of the stress vector sigma N: component, then displacement */
+    const double *C = s->moduli + 8 * i, *n = s->normal + 2 * i, g = s->gamma[2 * i], h = s->gamma[2 * i + 1];
+    double jump[MOST], slope[MOST], stress[MOST][2][2]; /* of the stress vector: component, then displacement */
     for (int c = 0; c < a; c++) {
         jump[c] = s->own_shape[i * a + c], slope[c] = 0;
         const double gx = s->gradient[2 * (i * a + c)], gy = s->gradient[2 * (i * a + c) + 1];
-        double sigma[3][2]; /* xx, yy, xy from a displacement of this node in x and y */
-        for (int r = 0; r < 3; r++) {
-            sigma[r][0] = C[3 * r] * gx + C[3 * r + 2] * gy;
-            sigma[r][1] = C[3 * r + 1] * gy + C[3 * r + 2] * gx;
-        }
-        for (int j = 0; j < 2; j++) {
-            stress[c][0][j] = N[0] * sigma[0][j] + N[1] * sigma[2][j];
-            stress[c][1][j] = N[0] * sigma[2][j] + N[1] * sigma[1][j];
+        for (int r = 0; r < 2; r++) {
+            stress[c][r][0] = C[4 * r] * gx + C[4 * r + 2] * gy;
+            stress[c][r][1] = C[4 * r + 1] * gy + C[4 * r + 3] * gx;
         }
     }
     for (int c = 0; c < o; c++) {

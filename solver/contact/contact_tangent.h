@@ -6,7 +6,7 @@ typedef struct {
     int32_t moves, n, q, a, k, o;
     const double *own_shape, *gradient;
     const int32_t *trace;
-    const double *outward, *weight;
+    const double *weight;
     double share;
     const double *gamma;
     const uint8_t *active;

@@ -24,7 +24,7 @@ class Pair:
     ``projection`` are the partners, ``separation`` is ``x - y`` ``(m, 2)``, ``frame`` ``(m, 2, 2)`` normal and tangent
     and ``opening`` ``(m, 2)`` gap and slip; ``strayed`` ``(m, 2)`` is how far points that rub moved along the normal in
     the step, and how much the opposite's part in the slip grows along its facet; ``stress_vector`` ``(m, 2)`` and
-    ``moduli`` ``(m, 3, 3)`` are those of the own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m,
+    ``moduli`` ``(m, 2, 4)`` are those of the own material, ``trial``, ``traction`` ``(m, 2)`` and ``derivative`` ``(m,
     2, 2)`` those of the law; ``active`` ``(m,)`` points touch, ``sticks`` those that also stick, and ``changes`` went
     over. ``offset`` is added to the gap. The next evaluation searches partners from ``start`` on: anywhere, near the
     last ones, or, until it is set again, on their facets.
@@ -58,9 +58,9 @@ class Pair:
 
     def evaluate(self, u: Array, motion: Array) -> None:
         """Evaluate at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``; raises `ProjectionError`."""
-        displacement, stress, moduli = self.surface.deform(u)
+        displacement, *own = self.surface.deform(u)
         self._moved = displacement, motion
-        self.moduli = np.ascontiguousarray(moduli)
+        self.stress_vector, self.moduli = map(np.ascontiguousarray, own)
         if self.moves:
             x, curve, facet = (
                 self.surface.point.reshape(-1, 2) + displacement,
@@ -73,8 +73,7 @@ class Pair:
                 known = None if self.start == "anywhere" else facet
                 self.projection, self.start = curve.closest_point(x, self._outward, motion, known), "near"
             self.separation = x - self.projection.point
-        (xx, yy, _, xy), (N_x, N_y), n = stress.T, self._outward.T, self.projection.normal
-        self.stress_vector = np.stack([xx * N_x + xy * N_y, xy * N_x + yy * N_y], axis=1)
+        n = self.projection.normal
         self.frame = np.stack([n[:, 0], n[:, 1], -n[:, 1], n[:, 0]], axis=1).reshape(-1, 2, 2)
         self.opening = self._in_frame(self.separation if self.moves else self._relative(displacement, motion))
         self.opening[:, 0] += self.offset

@@ -11,7 +11,15 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
-from archord.geometry.basis import CONTACT_POINTS, Array, bulk_quadrature, cell_basis, strain, strain_matrix
+from archord.geometry.basis import (
+    CONTACT_POINTS,
+    Array,
+    bulk_quadrature,
+    cell_basis,
+    displacement_gradient,
+    strain,
+    strain_matrix,
+)
 from archord.geometry.curve import Curve, RigidCircle, in_pieces
 from archord.kernels.compat import cell_degree
 from archord.materials.material import Material, Points
@@ -143,9 +151,21 @@ class Surface:
         force[self._owned_local] += curve_force[self._owned]
 
     def deform(self, u: Array) -> tuple[Array, Array, Array]:
-        """Own displacement ``(n q, 2)``, stress ``(n q, 4)`` and tangent ``(n q, 3, 3)`` at the contact points."""
-        stress, tangent = self.points.update(strain(self.gradient, self.cell_dofs, u).reshape(-1, 3))
-        return self.displacement(u), stress, tangent
+        """Own displacement ``(n q, 2)`` at the contact points, force of the own stress per undeformed area ``(n q,
+        2)``, and its derivative ``(n q, 2, 4)`` by the displacement gradient, ``[xx, yy, xy, yx]``."""
+        x, y = self.outward.reshape(-1, 2).T
+        at, z = (self.gradient, self.cell_dofs, u), np.zeros(self.weight.size)
+        if self.material.finite:
+            stress, moduli = self.points.update(displacement_gradient(*at).reshape(-1, 4))
+            cut = np.moveaxis(np.array([[x, z, y, z], [z, y, z, x]]), -1, 0)
+            return self.displacement(u), np.einsum("mij,mj->mi", cut, stress), cut @ moduli
+        stress, moduli = self.points.update(strain(*at).reshape(-1, 3))
+        cut = np.moveaxis(np.array([[x, z, y], [z, y, x]]), -1, 0)
+        return (
+            self.displacement(u),
+            np.einsum("mij,mj->mi", cut, stress[:, [0, 1, 3]]),
+            (cut @ moduli)[..., [0, 1, 2, 2]],
+        )
 
     def displacement(self, u: Array) -> Array:
         """Own displacement ``(n q, 2)`` at the contact points."""

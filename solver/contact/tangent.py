@@ -58,7 +58,7 @@ def _points(pair: Pair) -> Any:
     """What the kernels know of a pair, of arrays that it and its surface hold."""
     own, P = pair.surface, pair.projection
     sizes = *own.shape.shape, own.trace.shape[1], P.shape.shape[1]
-    at_points = own.shape, own.gradient, own.trace, own.outward, own.weight, pair.share, pair.gamma, pair.active
+    at_points = own.shape, own.gradient, own.trace, own.weight, pair.share, pair.gamma, pair.active
     state = pair.traction, pair.derivative, pair.stress_vector, pair.separation, pair.moduli
     opposite = P.shape, P.slope, P.normal, P.tangent, P.bend, pair.strayed, P.slides
     return structure(_SOURCE, "Side", (int(pair.moves), *sizes, *at_points, *state, *opposite))
