@@ -219,7 +219,8 @@ class _Writer:
         plastic = any(body.material.yields for body in self.problem.bodies)
         for k, target in enumerate(targets, 1):
             values = {drive.name: drive.value(target) for drive in self.problem.all_drives}
-            yield from ("*STEP, INC=1000", "*STATIC", "1., 1.")
+            large = any(body.material.finite for body in self.problem.bodies)
+            yield from (f"*STEP, INC=1000{', NLGEOM' if large else ''}", "*STATIC", "1., 1.")
             for i in self.problem.interactions if k == 1 and self.problem.fit else ():
                 yield from ("** Abaqus alone, without the stars: *CONTACT INTERFERENCE, SHRINK", f"** {_pair(i)}")
             rows = [row for m in self.held if m.rates for row in m.boundary(values)]
@@ -247,6 +248,7 @@ def _pair(interaction: Interaction) -> str:
 
 
 def _material(name: str, material: Any) -> Iterator[str]:
+    material = material.inner if material.finite else material
     if type(material) not in (Elastic, J2Material):
         raise ValueError(f"the material of {name!r} cannot be exported: decks know no such law (back stresses are one)")
     yield from (f"*MATERIAL, NAME={label(name)}", "*ELASTIC", f"{material.E!r}, {material.nu!r}")
