@@ -68,7 +68,7 @@ class LargeStrain(Material):
         axes = _PrincipalAxes(strain)
         T, moduli, new = self._logarithmic(axes.strain, state)
         S, hessian = axes.back(T[:, [0, 1, 3]], moduli)
-        (a, b), (c, d), z, (xx, yy, xy) = *np.moveaxis(F, 0, -1), np.zeros(len(F)), S.T
+        ((a, b), (c, d)), z, (xx, yy, xy) = np.moveaxis(F, 0, -1), np.zeros(len(F)), S.T
         to_nominal = _table([[a, z, b], [z, d, c], [z, b, a], [c, z, d]])
         dC = _table([[2 * a, z, z, 2 * c], [z, 2 * d, 2 * b, z], [b, c, a, d]])
         turning = _table([[xx, z, xy, z], [z, yy, z, xy], [xy, z, yy, z], [z, xy, z, xx]])
@@ -92,16 +92,20 @@ class LargeStrain(Material):
             moduli = moduli + (grown[:, None] * deviator)[:, [0, 1, 3], None] * np.array([1.0, 1.0, 0.0])
         return stress, moduli, new
 
+    def energy(self, stress: Array) -> Array:
+        """Elastic energy density ``(n,)`` of stresses ``(n, 4)`` that do work on logarithmic strains."""
+        return self.inner.energy(stress)
+
     def stored(self, strain: Array, stress: Array, state: State) -> Array:
         """Elastic energy per undeformed volume ``(n,)`` at gradients of which ``state`` is the new one."""
-        return self.inner.energy(self._logarithmic(_PrincipalAxes(strain).strain, state)[0])
+        return self.energy(self._logarithmic(_PrincipalAxes(strain).strain, state)[0])
 
     def true_stress(self, strain: Array, stress: Array, state: State) -> Array:
         """Cauchy's stress ``(n, 4)`` at gradients with the nominal ``stress``, of which ``state`` is the new one."""
         F = _gradient(strain)
         T = self._logarithmic(_PrincipalAxes(strain).strain, state)[0]
         J = np.exp((1 - 2 * self.inner.nu) / self.inner.E * T[:, :3].sum(axis=1))
-        (a, b), (c, d), (xx, yy, xy, yx) = *np.moveaxis(F, 0, -1), stress.T
+        ((a, b), (c, d)), (xx, yy, xy, yx) = np.moveaxis(F, 0, -1), stress.T
         return np.stack([xx * a + xy * b, yx * c + yy * d, T[:, 2], xx * c + xy * d], axis=1) / J[:, None]
 
 

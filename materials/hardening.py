@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from archord.materials.material import Array
 
@@ -35,7 +36,7 @@ class Hardening(Protocol):
         """Plastic work density: the integral of `stress` from 0."""
         ...
 
-    def at(self, points: Array) -> Hardening:
+    def at(self, points: npt.NDArray[np.integer]) -> Hardening:
         """The law of these ``points`` of an array, where each has its own."""
         return self
 
@@ -59,7 +60,7 @@ class Scaled(Hardening):
         """Plastic work density."""
         return self.factor * self.law.work(peeq)
 
-    def at(self, points: Array) -> Scaled:
+    def at(self, points: npt.NDArray[np.integer]) -> Scaled:
         """Of these points."""
         return Scaled(self.law, self.factor[points])
 

@@ -88,7 +88,8 @@ class _BodyPoints:
         self.cells, self.dofs = cells, V.dofmap.list[cells]
         self.gradient, self.point, self.weight = basis.gradient, basis.point, basis.measure * w
         self.points = Points(material, self.weight.size)
-        self.strain, self.stress = np.zeros((2, self.weight.size, 4))
+        self.strain: Array = np.zeros((self.weight.size, 4))
+        self.stress: Array = np.zeros((self.weight.size, 4))
         self.finite, C = material.finite, material.elastic_tangent
         self.elastic = _SMALL.T @ C @ _SMALL if self.finite else C
         self.yielding = cells[:0]  # cells that had a point off its elastic tangent at the last update
@@ -123,7 +124,7 @@ class PointFields(NamedTuple):
 def _check_elastic_tangent(material: Material) -> None:
     """Raise ValueError for what would be assembled wrongly: an elastic tangent that is not symmetric, or a response
     that is not that tangent's though the material does not yield."""
-    material = material.inner if material.finite else material
+    material = getattr(material, "inner", material)
     C, probe = material.elastic_tangent, 1e-3 * np.array([[3.0, -1.0, 2.0], [-20.0, 5.0, 10.0]])
     if not np.allclose(C, C.T, rtol=0, atol=1e-12 * C.max()):
         raise ValueError("elastic_tangent of a material must be symmetric")

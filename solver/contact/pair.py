@@ -58,9 +58,9 @@ class Pair:
 
     def evaluate(self, u: Array, motion: Array) -> None:
         """Evaluate at ``u`` ``(n, 2)``, with the opposite's nodes moved by ``motion``; raises `ProjectionError`."""
-        displacement, *own = self.surface.deform(u)
+        displacement, stress_vector, moduli = self.surface.deform(u)
         self._moved = displacement, motion
-        self.stress_vector, self.moduli = map(np.ascontiguousarray, own)
+        self.stress_vector, self.moduli = np.ascontiguousarray(stress_vector), np.ascontiguousarray(moduli)
         if self.moves:
             x, curve, facet = (
                 self.surface.point.reshape(-1, 2) + displacement,

@@ -1,4 +1,4 @@
-"""Large strain in the solver: a thick cylinder blown up, a joint whose clearance vanishes, tangents, rotation, energy."""
+"""Large strain in the solver: a cylinder blown up, a joint whose clearance vanishes, tangents, rotation, energy."""
 
 from __future__ import annotations
 
