@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from archord.postprocess.run import Run
 
-_CONTACT = {"pressure": "pressure", "facet_pressure": "pressure", "gap": "gap"}
+_CONTACT = {"pressure": "pressure", "facet_pressure": "pressure", "gap": "gap", "contact_shear": "shear"}
 _UNITLESS = ("peeq", "plastic")  # beginnings of names
 _GAP = 0.3  # degrees: the least gap in a circle
 _SMOOTH = 0.9  # cosine of the angle between facets without a corner
@@ -77,8 +77,8 @@ def probe(run: Run, edge: str, quantity: str, step: int, line: Sequence[float]) 
     """A ``quantity`` along an ``edge`` of the mesh or the straight ``line`` x0, y0, x1, y1. Raises `InputError`.
 
     At the nodes of an edge its "hoop" (the default), "normal" or "shear" stress, or a nodal field; at the integration
-    points of a surface "pressure" or "gap", or "facet_pressure", the mean of each facet, which scatters less where
-    bodies yield. On a line a nodal field (von Mises stress), linear between nodes.
+    points of a surface "pressure", "gap" or, with friction, "contact_shear", or "facet_pressure", the mean of each
+    facet, which scatters less where bodies yield. On a line a nodal field (von Mises stress), linear between nodes.
     """
     if bool(edge) == bool(line):
         raise InputError("probe: give an edge or a line.")
@@ -94,7 +94,10 @@ def _contact(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
     from archord.geometry.curve import circle_through  # with bases, which most readers of runs do without
 
     arc = run.arc(step, edge)
-    points = undeformed(arc, edge, run.scene), arc.s, getattr(arc, _CONTACT[quantity])
+    values = getattr(arc, _CONTACT[quantity])
+    if values is None:
+        raise InputError(f"{run.folder}: has no {quantity}, as its contacts have no friction.")
+    points = undeformed(arc, edge, run.scene), arc.s, values
     circle, share = circle_through(points[0].reshape(-1, 2)), arc.weight / arc.width[:, None]
     means = [np.einsum("fq,fq...->f...", share, values) for values in points]
     x, s, values = means if quantity == "facet_pressure" else points

@@ -51,7 +51,7 @@ def arc_profiles(joint: Joint) -> dict[str, ArcProfile]:
         given = {key: value for key, value in (vars(edge) | {"s": s}).items() if key not in ("X", "slip")}
         arrays = {key: value[order, along] for key, value in given.items() if value is not None}
         if along.step < 0 and edge.shear is not None:  # s runs the other way
-            arrays["shear"] = -arrays["shear"]
+            arrays["shear"] = 0.0 - arrays["shear"]
         found[name] = ArcProfile(**arrays, radius=radius[name])
     return found
 

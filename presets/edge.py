@@ -98,7 +98,7 @@ def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
         displaced = side.point + np.einsum("nqa,nai->nqi", side.shape, u[side.cell_dofs])
         local = np.zeros((side.n_facets, side.weight.shape[1], 10))
         # the frame's tangent runs along the opposite surface, which this one meets the other way round
-        shear = -pair.shear
+        shear = 0.0 - pair.shear
         sticks = np.abs(shear) < (1 - _ON_CONE) * getattr(pair.law, "friction", 0.0) * pair.pressure
         values = np.stack([side.weight, pair.pressure, pair.distance, pair.slip, shear, sticks], axis=-1)
         local[side.facet] = np.concatenate([values, displaced, side.point], axis=-1)

@@ -145,6 +145,7 @@ def test_a_whole_hole_runs_round_once(tmp_path):
         ({"edge": "hole", "quantity": "temperature"}, "has no 'temperature' there, but stress_xx"),
         ({"line": (100.0, 0.0, 101.0, 0.0)}, "no body lies on the line"),
         ({"edge": "end", "quantity": "pressure"}, "has no side 'end'; its sides are"),
+        ({"edge": "hole", "quantity": "contact_shear"}, "its contacts have no friction"),
         ({}, "give an edge or a line"),
     ],
 )
