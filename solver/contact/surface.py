@@ -100,7 +100,10 @@ class Surface:
             self.point = self.shape @ self._nodes  # on the curve
         on_facet = np.broadcast_to(self.trace[:, None, :], (*self.weight.shape, self.trace.shape[1]))
         self.trace_shape = np.take_along_axis(self.shape, on_facet, axis=2)
-        self.points = Points(self.material, self.weight.size)
+        self.points, (x, y) = Points(self.material, self.weight.size), self.outward.reshape(-1, 2).T
+        z = np.zeros_like(x)
+        rows = [[x, z, y, z], [z, y, z, x]] if self.material.finite else [[x, z, y], [z, y, x]]
+        self._cut = np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))  # takes a stress to the force on the edge
 
     def _trace_inequality(self) -> Array:
         """Smallest ``gamma`` ``(n,)`` with ``|sigma_n(v)|^2 over a facet <= gamma a(v, v) over its cell``, any ``v``;
@@ -153,19 +156,13 @@ class Surface:
     def deform(self, u: Array) -> tuple[Array, Array, Array]:
         """Own displacement ``(n q, 2)`` at the contact points, force of the own stress per undeformed area ``(n q,
         2)``, and its derivative ``(n q, 2, 4)`` by the displacement gradient, ``[xx, yy, xy, yx]``."""
-        x, y = self.outward.reshape(-1, 2).T
-        at, z = (self.gradient, self.cell_dofs, u), np.zeros(self.weight.size)
+        at, cut = (self.gradient, self.cell_dofs, u), self._cut
         if self.material.finite:
             stress, moduli = self.points.update(displacement_gradient(*at).reshape(-1, 4))
-            cut = np.moveaxis(np.array([[x, z, y, z], [z, y, z, x]]), -1, 0)
             return self.displacement(u), np.einsum("mij,mj->mi", cut, stress), cut @ moduli
         stress, moduli = self.points.update(strain(*at).reshape(-1, 3))
-        cut = np.moveaxis(np.array([[x, z, y], [z, y, x]]), -1, 0)
-        return (
-            self.displacement(u),
-            np.einsum("mij,mj->mi", cut, stress[:, [0, 1, 3]]),
-            (cut @ moduli)[..., [0, 1, 2, 2]],
-        )
+        force = np.einsum("mij,mj->mi", cut, stress[:, [0, 1, 3]])
+        return self.displacement(u), force, (cut @ moduli)[..., [0, 1, 2, 2]]
 
     def displacement(self, u: Array) -> Array:
         """Own displacement ``(n q, 2)`` at the contact points."""

@@ -168,6 +168,18 @@ def test_a_table_of_hardening_is_that_of_the_deck():
     assert np.interp(peeq, block[:, 1], block[:, 0]) == pytest.approx(data.block.law.stress(peeq), rel=1e-3)
 
 
+def test_friction_and_large_strain_are_told():
+    """With the stiffness of sticking, that of the pressure; in every step."""
+    found = written_deck(scene(analysis={"friction": 0.1, "strain": "large"}))
+    (rows,) = (rows for keyword, _, rows in found.blocks if keyword == "*FRICTION")
+    (pressure,) = (rows for keyword, _, rows in found.blocks if keyword == "*SURFACE BEHAVIOR")
+    assert rows == [["0.1", *pressure[0]]]
+    assert found.text.count("NLGEOM") == found.text.count("*STEP") == STEPS
+    plain = written_deck(scene()).text
+    assert "FRICTION" not in plain
+    assert "NLGEOM" not in plain
+
+
 def test_a_rigid_pin_moves_as_a_whole():
     """All its nodes held sideways and pushed down."""
     data = scene(None, pin={"rigid": True})

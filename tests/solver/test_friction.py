@@ -11,6 +11,7 @@ from archord.geometry.meshes.refine import Circle
 from archord.materials.elasticity import Elastic
 from archord.presets.joint import Joint
 from archord.scene.scene import Scene
+from archord.solver.contact.law import LAWS, contact_law
 from archord.solver.problem import Body, Drive, Interaction, Problem, Support
 from archord.solver.system import System
 from tests.solver.parts import blocks, solve
@@ -210,6 +211,14 @@ def test_a_tangential_force_leaves_the_stick_zone_of_cattaneo_and_mindlin():
             x2 = system.comm.allreduce((x[near] ** 2).sum()) / system.comm.allreduce(near.sum())
             flat = MU * p0 * (1 - stick - x2 / (2 * a**2) * (1 - 1 / stick))
             assert q == pytest.approx(flat, rel=0.02)
+
+
+def test_what_cannot_rub_is_refused():
+    """No friction is the law without; a tied surface has none, and a coefficient is not negative."""
+    assert contact_law("frictionless", 0.0) is LAWS["frictionless"]
+    for law, friction in (("tied", 0.1), ("frictionless", -0.1)):
+        with pytest.raises(ValueError, match="friction must be positive"):
+            contact_law(law, friction)
 
 
 def test_the_joint_of_the_paper_with_friction():
