@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 import traceback
-from time import perf_counter
+from time import perf_counter, sleep
 
 import click
 
@@ -18,6 +18,8 @@ import archord
 from archord.options import Group
 from archord.ranks import COLLECTIVE, launcher_rank, run_on_ranks
 from archord.scene.errors import InputError
+
+_HEARD = 0.3  # seconds in which a launcher (MPICH's) hands on what a rank said, which it drops with a job that aborts
 
 FILES = {
     "solve_commands": ("solve", "scene", "mesh"),
@@ -95,5 +97,6 @@ def _fail(error: Exception) -> int:
     mpi = sys.modules.get("mpi4py.MPI")
     if mpi is not None and mpi.Is_initialized() and mpi.COMM_WORLD.size > 1:
         print(f"archord: rank {mpi.COMM_WORLD.rank} failed: {error}", file=sys.stderr, flush=True)
+        sleep(_HEARD)
         mpi.COMM_WORLD.Abort(1)
     return 1
