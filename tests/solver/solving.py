@@ -7,16 +7,23 @@ from dataclasses import dataclass
 from mpi4py import MPI
 
 from archord.benchmarks.case import E, paper_joint
+from archord.kernels.compiled import CompilerError
 from archord.presets.arc import ArcProfile
 from archord.presets.joint import Joint
 from archord.presets.joint_account import JointAccount
 from archord.presets.measures import Measures, Work
 from archord.scene.scene import Scene
 from archord.solver.coarse_start import coarse_start
+from archord.solver.linear.substructured import schur_kernels
 from archord.solver.stepping import march
 
 __all__ = ["SEVERAL", "E", "Solution", "scene", "solve"]
 
+try:
+    schur_kernels()
+    MUMPS_FROM_C = True
+except CompilerError:  # PyPI's dolfinx has no headers
+    MUMPS_FROM_C = False
 SEVERAL = MPI.COMM_WORLD.size > 1  # on one rank all cuts of a mesh are the same, and one of them is enough
 
 scene = paper_joint

@@ -11,6 +11,7 @@ from archord.output.run import solve_scene
 from archord.solver.linear import choose as module
 from archord.solver.linear.choose import choose
 from archord.solver.linear.strategy import Facts
+from tests.solver.solving import MUMPS_FROM_C
 
 ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, 0.5, lambda: True)
 
@@ -41,6 +42,7 @@ def test_what_is_left_out_on_request_is_not_used(monkeypatch):
 
 
 @pytest.mark.mpi
+@pytest.mark.skipif(not MUMPS_FROM_C, reason="MUMPS has no headers")
 def test_several_ranks_eliminate_their_own_unknowns_and_one_rank_says_why_not(comm):
     choice = choose(replace(ELASTIC, comm=comm, yields=True))
     assert choice.uses("substructured") == (comm.size > 1)
@@ -48,6 +50,7 @@ def test_several_ranks_eliminate_their_own_unknowns_and_one_rank_says_why_not(co
 
 
 @pytest.mark.mpi
+@pytest.mark.skipif(not MUMPS_FROM_C, reason="MUMPS has no headers")
 def test_a_rank_without_a_library_is_a_reason_for_all(comm, monkeypatch):
     if comm.size == 1:
         pytest.skip("one rank has another reason")
