@@ -106,7 +106,8 @@ class _BodyPoints:
 
     def forces(self) -> Array:
         """What of the stress does work on the strain ``(n, q, k)``."""
-        return (self.stress if self.finite else self.stress[:, [0, 1, 3]]).reshape(*self.weight.shape, -1)
+        stress = self.stress if self.finite else self.stress[:, [0, 1, 3]]
+        return stress.reshape(*self.weight.shape, len(self.elastic))
 
 
 class PointFields(NamedTuple):
