@@ -17,19 +17,21 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 
 from archord.materials.hardening import Scaled
 from archord.materials.j2 import J2Material
 from archord.materials.material import Array, Material, State
 
 _NEAR = 0.05  # relative distance of eigenvalues below which divided differences are series
+_RATIO = [1 / (k + 1) if k % 2 == 0 else 0.0 for k in range(15)]  # artanh(x)/x
+_MIXED = [-1.0 if k % 2 == 0 else (k + 1) / (k + 2) for k in range(14)]  # (1/(1 + x) - artanh(x)/x)/x
 
 
 @dataclass(frozen=True)
 class LargeStrain(Material):
     """The material ``inner`` at large strain; states, moduli and all else are its own."""
 
-    yields: ClassVar[bool] = True
     finite: ClassVar[bool] = True
 
     inner: Any
@@ -39,6 +41,11 @@ class LargeStrain(Material):
         if name.startswith("__") or name == "inner":
             raise AttributeError(name)
         return getattr(self.inner, name)
+
+    @property
+    def yields(self) -> bool:  # type: ignore[override]
+        """Whether the inner material does."""
+        return self.inner.yields
 
     @property
     def elastic_tangent(self) -> Array:
@@ -140,19 +147,14 @@ class _PrincipalAxes:
             for s in (s, -s)
         )
         x = radius / mean
-        near = x < _NEAR
-        far = np.where(near, 0.5, x)
-        ratio = np.where(near, sum(x ** (2 * k) / (2 * k + 1) for k in range(8)), np.arctanh(far) / far)
+        ratio, (mixed, swapped) = polyval(x, _RATIO), (polyval(y, _MIXED) for y in (x, -x))
+        far = x >= _NEAR
+        y = x[far]
+        ratio[far] = np.arctanh(y) / y
+        mixed[far], swapped[far] = (1 / (1 + y) - ratio[far]) / y, (ratio[far] - 1 / (1 - y)) / y
         self._first = 0.5 / one, 0.5 / two, 0.5 * ratio / mean  # g[1, 1], g[2, 2], g[1, 2]
-        mixed = []
-        for sign in (1, -1):  # (1/(1 + x) - artanh(x)/x)/x
-            series = sum((-1 if k % 2 == 0 else (k + 1) / (k + 2)) * (sign * x) ** k for k in range(14))
-            mixed.append(np.where(near, series, sign * (1 / (1 + sign * far) - np.arctanh(far) / far) / far))
-        self._second = (
-            -0.25 / one**2,
-            -0.25 / two**2,
-            *(0.25 * m / mean**2 for m in mixed),
-        )  # g[1, 1, 1], ..., g[1, 2, 2]
+        quarter = 0.25 / mean**2
+        self._second = -0.25 / one**2, -0.25 / two**2, quarter * mixed, quarter * swapped  # g[1, 1, 1], ..., g[1, 2, 2]
         E, F = 0.5 * np.log1p(more + radius), 0.5 * np.log1p(more - radius)
         self.strain = np.stack([c * c * E + s * s * F, s * s * E + c * c * F, 2 * c * s * (E - F)], axis=1)
 

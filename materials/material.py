@@ -23,8 +23,9 @@ class Material(Protocol):
     """A constitutive law in the plane; every method is a pure function. What it does not define is that of a material
     without history, to inherit.
 
-    One that ``yields`` can leave its `elastic_tangent`, by yielding or otherwise; a body that cannot is assembled once,
-    from that tangent alone. One that is ``finite`` gets displacement gradients for strains (see finite.py).
+    One that ``yields`` can leave its `elastic_tangent`, by yielding or otherwise; one that is ``finite`` gets
+    displacement gradients for strains (see finite.py). A body that neither holds for is assembled once, from the
+    elastic tangent alone.
     """
 
     yields: ClassVar[bool] = False

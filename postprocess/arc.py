@@ -13,7 +13,7 @@ import numpy as np
 from archord.materials.material import Array
 from archord.output.step_file import step_name
 from archord.presets.arc import ArcProfile
-from archord.presets.edge import PER_STEP, RUBBING, SurfaceProfile
+from archord.presets.edge import OF_FRICTION, PER_STEP, SurfaceProfile
 from archord.scene.errors import InputError
 from archord.scene.scene import Scene
 
@@ -43,7 +43,7 @@ def read_contact(folder: str | Path, scene: Any, step: int) -> dict[str, Any]:
     with opened(folder, "contact", step) as file:
         groups = {key: group for key, group in file.items() if isinstance(group, h5py.Group)}
         if all("shear" in group for group in groups.values()):
-            names |= {name: f"{name}/{step_name(step)}" for name in RUBBING}
+            names |= {name: f"{name}/{step_name(step)}" for name in OF_FRICTION}
         found = {key: {name: group[at][()] for name, at in names.items()} for key, group in groups.items()}
     if not joint:
         return {name: SurfaceProfile(**arrays) for name, arrays in found.items()}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # a profile is read from a run folder, too, without the solve
 
 PER_STEP = ("coordinates", "pressure", "raw_pressure", "gap")  # of contact.h5
 _ON_CONE = 1e-6  # of the largest shear: what comes as close slides
-RUBBING = ("shear", "sticks")  # of one with friction, too
+OF_FRICTION = ("shear", "sticks")  # of one with friction also
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class SurfaceProfile(EdgeProfile):
 
 def per_step(system: System) -> tuple[str, ...]:
     """Names of the arrays of contact.h5 that change."""
-    return PER_STEP + RUBBING if system.contact.rubs else PER_STEP
+    return PER_STEP + OF_FRICTION if system.contact.has_friction else PER_STEP
 
 
 def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
@@ -103,9 +103,9 @@ def surface_profiles(system: System) -> dict[str, SurfaceProfile]:
         values = np.stack([side.weight, pair.pressure, pair.distance, pair.slip, shear, sticks], axis=-1)
         local[side.facet] = np.concatenate([values, displaced, side.point], axis=-1)
         whole = side.sum_over_ranks(local)
-        weight, raw, gap, slip, *rubbing = np.moveaxis(whole[..., :6], -1, 0)
+        weight, raw, gap, slip, *of_friction = np.moveaxis(whole[..., :6], -1, 0)
         coordinates, X, s = whole[..., 6:8], whole[..., 8:], side.curve.arc_length(side.curve_xi)
-        more = dict(zip(RUBBING, rubbing, strict=True)) if system.contact.rubs else {}
+        more = dict(zip(OF_FRICTION, of_friction, strict=True)) if system.contact.has_friction else {}
         found[name] = SurfaceProfile(s, weight, coordinates, project(raw, s, weight), raw, gap, X, slip, **more)
     return found
 

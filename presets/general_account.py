@@ -22,6 +22,7 @@ from archord.solver.stepping import Step
 from archord.solver.system import System
 
 _FEW_FACETS = 3
+_FAR_TURN = 0.02  # angle at which linear rotations stretch radii by 0.02 %
 _LARGE_STRAIN = 0.05  # PEEQ
 _SPURIOUS = 1e-4  # of the work or the energy, in the springs that hold floating bodies
 _ALONE = 0.1  # of the same, where the springs alone hold a body
@@ -50,12 +51,15 @@ class GeneralAccount:
             require_mirrored(scene, self.system)
             if scene.mesh.shape is None:
                 self._warnings += require_facing(self.system)
+        turning = {f"{coupling.name} rotation" for coupling in scene.coupling}
+        turning |= {load.name for load in scene.load if load.direction == "rotation"}
+        self._turning = [n for n, name in enumerate(self.system.drive_names) if name in turning]
         self._supports = list(dict.fromkeys(s.name for s in problem.supports if s.name not in self.system.drive_names))
 
     def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
         """Headings of history.csv and their values: loads, supports, interactions, bodies, energies, what the step
         cost."""
-        energies = ENERGIES if self.system.contact.rubs else ENERGIES[:2]
+        energies = ENERGIES if self.system.contact.has_friction else ENERGIES[:2]
         last = dict.fromkeys((*energies, "work"), self.scene.units.energy_of(self.scene.analysis.thickness))
         last |= {"force_balance": "", "iterations": "", "cutbacks": "", "seconds": "s"}
         first = ("step", attrgetter("step")), ("load_factor", attrgetter("at"))
@@ -144,7 +148,7 @@ class GeneralAccount:
 
     def step_warnings(self, m: Record, profiles: Mapping[str, Any], residual: float) -> list[str]:
         """What to warn of after the step ``m``. Collective."""
-        said = []
+        said, system = list[str](), self.system
         for name, profile in profiles.items():
             touching = int((profile.in_contact > 0).sum())
             if 0 < touching < _FEW_FACETS:
@@ -154,12 +158,17 @@ class GeneralAccount:
             said.append(
                 f'PEEQ reaches {largest:.2g}, too much for small-strain theory; analysis.strain = "large" is for that'
             )
+        angle = max(map(abs, system.driven()[0][self._turning]), default=0.0)
+        if angle > _FAR_TURN:
+            said.append(
+                f"a coupling turns by {angle:.2g} rad; it turns linearly, which stretches radii by {angle**2 / 2:.1g}"
+            )
         if residual > 1e-8 and m.force_balance:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
         if m.force_balance > 1e-8:
             said.append(f"the forces on the whole do not balance: {m.force_balance:.1e} of the largest is left")
         total = max(abs(m.work), m.elastic_energy + dissipated(m))
-        if (spurious := self.system.stabilisation_energy) > _SPURIOUS * total:
+        if (spurious := system.stabilisation_energy) > _SPURIOUS * total:
             said.append(f"springs that hold floating bodies do {spurious:.1e} of the work {total:.1e}")
         return said
 

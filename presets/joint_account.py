@@ -58,7 +58,7 @@ class JointAccount:
             "seconds": ("", 1.0, "s"),
         }
         columns: list[tuple[str, Callable[[Any], float | int]]] = []
-        left_out = {"peeq", *(() if self.system.contact.rubs else ("friction_dissipation",))}
+        left_out = {"peeq", *(() if self.system.contact.has_friction else ("friction_dissipation",))}
         for name in [field.name for field in fields(Measures) if field.name not in left_out]:
             scale, divisor, unit = scales.get(name, ("", 1.0, ""))
             columns.append((headed(name, unit), attrgetter(name)))

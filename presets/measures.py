@@ -92,7 +92,7 @@ class Work:
 def costs(before: Sequence[Any], step: Step, system: System, work: float, seconds: float) -> dict[str, Any]:
     """What both kinds of records tell of a ``step`` that follows the steps ``before``. Collective."""
     energy = dict(zip(("elastic_energy", "plastic_dissipation"), system.energies(), strict=True))
-    energy |= {"friction_dissipation": system.rubbed(), "work": work}
+    energy |= {"friction_dissipation": system.friction_dissipation(), "work": work}
     cost = {"iterations": step.iterations, "cutbacks": step.cutbacks, "seconds": seconds}
     return {"step": len(before) + 1} | energy | cost
 

@@ -1,7 +1,7 @@
 """Bulk terms: internal forces and tangents of elastic and elastic-plastic bodies, assembled by dolfinx.
 
-Elastic bodies contribute one constant stiffness matrix. Only cells of plastic bodies carry history, a return map and a
-tangent that changes; without them nothing of it is compiled or stored.
+Elastic bodies contribute one constant stiffness matrix. Only cells of plastic bodies, and of all at large strain, carry
+history, a return map and a tangent that changes; without them nothing of it is compiled or stored.
 """
 
 from __future__ import annotations
@@ -145,8 +145,9 @@ class Bulk:
         n_owned = V.mesh.topology.index_map(2).size_local
         self.cells = {tag: cells[tag][cells[tag] < n_owned] for tag in materials}
         u, v = _voigt(ufl.TrialFunction(V)), _voigt(ufl.TestFunction(V))
-        self._plastic = {tag: _BodyPoints(V, self.cells[tag], m) for tag, m in materials.items() if m.yields}
-        self.plastic = bool(self._plastic)
+        self._nonlinear = {tag: _BodyPoints(V, self.cells[tag], m) for tag, m in materials.items() if m.yields or m.finite}
+        self.plastic = any(m.yields for m in materials.values())
+        self.finite = any(m.finite for m in materials.values())
         elastic = {}
         for tag, material in materials.items():
             _check_elastic_tangent(material)
@@ -155,33 +156,33 @@ class Bulk:
             dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata={"quadrature_degree": rule})(1)
             elastic[tag] = fem.form(ufl.inner(ufl.dot(moduli, u), v) * dx)
         self.elastic_forms = list(elastic.values())
-        if self._plastic:
+        if self._nonlinear:
             cell, metadata = V.mesh.basix_cell(), {"quadrature_degree": rule, "quadrature_rule": "default"}
-            k = self._k = len(next(iter(self._plastic.values())).elastic)
+            k = self._k = len(next(iter(self._nonlinear.values())).elastic)
             element = [basix.ufl.quadrature_element(cell, shape, degree=rule) for shape in ((k,), (k, k))]
             self._sigma, self._correction = (fem.Function(fem.functionspace(V.mesh, e)) for e in element)
             if k == 4:
                 u, v = _gradient(ufl.TrialFunction(V)), _gradient(ufl.TestFunction(V))
-            domain = [(1, np.sort(np.concatenate([p.cells for p in self._plastic.values()])))]
+            domain = [(1, np.sort(np.concatenate([p.cells for p in self._nonlinear.values()])))]
             dx = ufl.Measure("dx", V.mesh, subdomain_data=domain, metadata=metadata)(1)
-            self._plastic_force = fem.form(ufl.inner(self._sigma, v) * dx)
+            self._force = fem.form(ufl.inner(self._sigma, v) * dx)
             self._correction_kernel = fem.compile_form(V.mesh.comm, ufl.inner(ufl.dot(self._correction, u), v) * dx)
         self._corrected_cells: np.ndarray | None = None  # those of the form that was made last
         self._correction_forms: list[fem.Form] = []
-        self.stiffness = None  # of the bodies that cannot yield
-        stiff = [form for tag, form in elastic.items() if tag not in self._plastic]
+        self.stiffness = None  # of the bodies that stay linear
+        stiff = [form for tag, form in elastic.items() if tag not in self._nonlinear]
         if stiff:
             self.stiffness = matrix(V, stiff)
             assemble(self.stiffness, stiff)
             self.stiffness.assemble()
 
     def histories(self) -> dict[int, tuple[np.ndarray, Points]]:
-        """Cells ``(n,)`` of this rank and their ``n q`` points with history, by the plastic body's tag."""
-        return {tag: (body.cells, body.points) for tag, body in self._plastic.items()}
+        """Cells ``(n,)`` of this rank and their ``n q`` points, by the tag of a body that is not linear."""
+        return {tag: (body.cells, body.points) for tag, body in self._nonlinear.items()}
 
     def update(self, u: Array) -> None:
-        """Return-map the plastic bodies at the nodal displacements ``u`` ``(n_nodes, 2)`` of this rank."""
-        for body in self._plastic.values():
+        """Return-map the bodies that are not linear at the nodal displacements ``u`` ``(n_nodes, 2)`` of this rank."""
+        for body in self._nonlinear.values():
             tangent, (n, q), k = body.update(u), body.weight.shape, self._k
             self._sigma.x.array.reshape(-1, q, k)[body.cells] = body.forces()
             # points that do not flow have its diagonal
@@ -196,14 +197,14 @@ class Bulk:
         """Add the internal force of the displacement ``u`` (last passed to `update`) to ``force``."""
         if self.stiffness is not None:
             self.stiffness.multAdd(u, force, force)
-        if self._plastic:
+        if self._nonlinear:
             with force.localForm() as local:
-                fem_petsc.assemble_vector(local, self._plastic_force)
+                fem_petsc.assemble_vector(local, self._force)
         force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def add_action(self, direction: fem.Function, out: PETSc.Vec) -> None:
         """Add the last tangent, applied to ``direction``, to ``out``; `add_force` then needs another `update`."""
-        for body in self._plastic.values():
+        for body in self._nonlinear.values():
             eps, k = body.measure(direction.x.array.reshape(-1, 2)), self._k
             q = eps.shape[1]
             moduli = self._correction.x.array.reshape(-1, q, k, k)[body.cells] + body.elastic
@@ -212,9 +213,9 @@ class Bulk:
 
     def assemble_correction(self, A: PETSc.Mat, bcs: list[fem.DirichletBC]) -> None:
         """Add the tangent correction to ``A``: the consistent minus the elastic tangent, in the cells that yield."""
-        if not self._plastic:
+        if not self._nonlinear:
             return
-        cells = np.sort(np.concatenate([body.yielding for body in self._plastic.values()]))
+        cells = np.sort(np.concatenate([body.yielding for body in self._nonlinear.values()]))
         if self._corrected_cells is None or not np.array_equal(cells, self._corrected_cells):
             domains = {fem.IntegralType.cell: [(1, cells)]}
             coefficients = {self._correction: self._correction}
@@ -225,7 +226,7 @@ class Bulk:
     def energies(self, u: Array) -> tuple[float, float]:
         """Elastic energy and plastic dissipation, this rank's part; collective."""
         stored = dissipated = 0.0
-        for data in self._plastic.values():
+        for data in self._nonlinear.values():
             w, points = data.weight.ravel(), data.points
             stored += float(w @ points.material.stored(data.strain, data.stress, points.trial))
             dissipated += float(w @ np.broadcast_to(points.material.dissipation(points.trial), w.shape))
@@ -241,7 +242,7 @@ class Bulk:
     def peeq(self) -> tuple[float, float]:
         """Largest PEEQ at a quadrature point, and the integral of PEEQ over this rank's cells."""
         largest = integral = 0.0
-        for data in self._plastic.values():
+        for data in self._nonlinear.values():
             peeq = np.asarray(data.points.peeq)
             largest = max(largest, float(peeq.max(initial=0.0)))
             integral += float(data.weight.ravel() @ peeq)
@@ -249,13 +250,13 @@ class Bulk:
 
     def peeq_of(self, tag: int) -> tuple[Array, Array]:
         """PEEQ ``(n q,)`` and places ``(n q, 2)`` of this rank's points of a plastic body."""
-        body = self._plastic[tag]
+        body = self._nonlinear[tag]
         return np.asarray(body.points.peeq), body.point.reshape(-1, 2)
 
     def at_points(self, u: Array) -> Iterator[PointFields]:
         """The state at this rank's integration points, body by body, at ``u`` ``(n_nodes, 2)`` of the last update."""
         for tag, cells in self.cells.items():
-            body = self._plastic.get(tag)
+            body = self._nonlinear.get(tag)
             if body is None:
                 body = _BodyPoints(self.V, cells, self.materials[tag])
                 body.update(u)

@@ -51,10 +51,12 @@ class Equilibrium:
         self._reaction = np.zeros((self.n_owned, 2))
         self.changes = 0
         self.reaction_norm = self.noise = self.largest_reaction = 0.0
-        closing = contact.pairs and all(pair.law.closes for pair in contact.pairs)
+        closing = contact.pairs and all(pair.law.unilateral for pair in contact.pairs)
         dofs, by_force = 2 * index_map.size_global, len(drives.unknown) > 0
         gamma = contact.gamma_factor if closing else None
-        facts = Facts(self.comm, dofs, bulk.plastic, by_force, gamma, lambda: all(map(drives.held, problem.bodies)))
+        facts = Facts(
+            self.comm, dofs, bulk.plastic, bulk.finite, by_force, gamma, lambda: all(map(drives.held, problem.bodies))
+        )
         self.choice = choose(facts)
         self._factoriser = partial(self.choice.factoriser, V)  # of tangents of all displacements
         condense = self.choice.uses("condensed")

@@ -135,7 +135,7 @@ class System:
         stored, dissipated = self.problem.symmetry * self.comm.allreduce(parts)
         return float(stored), float(dissipated)
 
-    def rubbed(self) -> float:
+    def friction_dissipation(self) -> float:
         """Work done against friction so far, on the whole."""
         return self.problem.symmetry * self.comm.allreduce(self.contact.dissipated())
 

@@ -220,6 +220,8 @@ class _Writer:
         for k, target in enumerate(targets, 1):
             values = {drive.name: drive.value(target) for drive in self.problem.all_drives}
             large = any(body.material.finite for body in self.problem.bodies)
+            if large and k == 1:
+                yield "** NLGEOM is elastic by St. Venant and Kirchhoff in CalculiX; archord has Hencky's elasticity"
             yield from (f"*STEP, INC=1000{', NLGEOM' if large else ''}", "*STATIC", "1., 1.")
             for i in self.problem.interactions if k == 1 and self.problem.fit else ():
                 yield from ("** Abaqus alone, without the stars: *CONTACT INTERFERENCE, SHRINK", f"** {_pair(i)}")

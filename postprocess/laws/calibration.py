@@ -235,6 +235,11 @@ def check_compatible(runs: list[RunCurve]) -> None:
         if not run.scene.joint.is_block:
             model = run.scene.joint.model
             raise InputError(f'{run.name}: joint.model = "{model}" has no law to fit; only "block" has.')
+        if run.scene.analysis.friction:
+            raise InputError(
+                f"{run.name}: analysis.friction = {run.scene.analysis.friction:g} does not fit: the law is for contact "
+                "without friction; archord fit RUN --table FILE keeps the run's own P(delta)."
+            )
         for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
             if not solid.perfectly_plastic:
                 said = f" = {solid.hardening:g}" if isinstance(solid.hardening, float) and solid.hardening else ""

@@ -28,10 +28,11 @@ from archord.solver.contact.tangent import ContactTangent, trial_rate
 
 class Contact:
     """All ``interfaces``, if any, in the displacement space ``V``: ``surfaces`` of bodies, ``rigid`` ones, ``pairs``,
-    and whether any of them ``rubs``.
+    and whether any of them ``has_friction``.
 
-    A surface belongs to one interface. ``active_set_changes`` counts this rank's points that opened or closed at the
-    last evaluation; ``tangent`` is the derivative of what `add_force` adds, renewed as the pattern grows. Collective.
+    A surface belongs to one interface. ``active_set_changes`` counts this rank's points that opened, closed or changed
+    between stick and slide at the last evaluation; ``tangent`` is the derivative of what `add_force` adds, renewed as
+    the pattern grows. Collective.
     """
 
     def __init__(self, V: fem.FunctionSpace, interfaces: Sequence[Interface] = ()) -> None:
@@ -40,7 +41,7 @@ class Contact:
         self.surfaces = [surface for surface in self._all if isinstance(surface, Surface)]
         self.rigid = [surface for surface in self._all if isinstance(surface, RigidSurface)]
         self.pairs = [pair for i in interfaces for pair in i.pairs]
-        self.rubs = any(pair.law.rubs for pair in self.pairs)
+        self.has_friction = any(pair.law.has_friction for pair in self.pairs)
         self._n_dofs = V.dofmap.index_map.size_global
         for number, surface in enumerate(self.rigid):
             surface.curve_dofs[:] = self._n_dofs + number
@@ -59,7 +60,7 @@ class Contact:
 
     def begin(self, u: Array) -> None:
         """Begin a step at this rank's accepted displacements ``u`` ``(n, 2)``. Collective."""
-        for pair in self.pairs if self.rubs else []:
+        for pair in self.pairs if self.has_friction else []:
             pair.begin(u, pair.opposite.curve_displacement(u))
 
     def search(self) -> None:

@@ -23,12 +23,12 @@ class ContactLaw(Protocol):
     """A law by its `update`, a pure function; without a history and without friction as it stands.
 
     Points of a law that ``slides`` move along the opposite surface; others keep partners, and undeformed gaps as zero.
-    One that ``rubs`` has shear; ``closes`` tells that points which do not touch carry nothing.
+    One that ``has_friction`` has shear; of one that is ``unilateral`` points which do not touch carry nothing.
     """
 
     slides: ClassVar[bool] = True
-    rubs: ClassVar[bool] = False
-    closes: ClassVar[bool] = False
+    has_friction: ClassVar[bool] = False
+    unilateral: ClassVar[bool] = False
 
     def state(self, n: int) -> State:
         """History of ``n`` points at the beginning: None, or a dataclass of arrays, as that of a material."""
@@ -55,7 +55,7 @@ class ContactLaw(Protocol):
 class Frictionless(ContactLaw):
     """``p = [trial]_+`` and no shear."""
 
-    closes = True
+    unilateral = True
 
     def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
         """Pressure where the trial pressure is positive."""
@@ -65,11 +65,11 @@ class Frictionless(ContactLaw):
 
 
 @dataclass(frozen=True)
-class Slid:
-    """History of ``m`` points: ``lag``, the slip over which the shear is less than that of the own body's stress by
-    Nitsche's gamma, ``pressure``, and the energy ``dissipated`` per area."""
+class FrictionState:
+    """History of ``m`` points: ``elastic_slip``, gamma times which is what the shear is below that of the own body's
+    stress, ``pressure``, and the energy ``dissipated`` per area."""
 
-    lag: Array
+    elastic_slip: Array
     pressure: Array
     dissipated: Array
 
@@ -78,24 +78,25 @@ class Slid:
 class Coulomb(ContactLaw):
     """Shear within the cone ``|q| <= friction p`` (Chouly, Mlika and Renard 2018; in time backward Euler).
 
-    A point that sticks has its trial shear, and the slip of the step is added to its ``lag``: what sticks for many
-    steps does not creep. Where that leaves the cone the shear comes back to it at the same pressure, and the lag
-    becomes what gives this shear: a return map with gamma for its stiffness. Points that do not touch have no lag.
+    A point that sticks has its trial shear, and the slip of the step is added to its elastic slip: what sticks for
+    many steps does not creep. Where that leaves the cone the shear comes back to it at the same pressure, and the
+    elastic slip becomes what gives this shear: a return map with gamma for its stiffness. It is zero at points that do
+    not touch.
     """
 
     friction: float
-    rubs = True
-    closes = True
+    has_friction = True
+    unilateral = True
 
-    def state(self, n: int) -> Slid:
+    def state(self, n: int) -> FrictionState:
         """Points at rest."""
-        return Slid(*np.zeros((3, n)))
+        return FrictionState(*np.zeros((3, n)))
 
     def update(self, gap: Array, slip: Array, trial: Array, gamma: Array, state: State) -> tuple[Array, Array, State]:
         """Pressure as without friction, and the shear returned to the cone."""
         touches = ~(trial[:, 0] <= 0)
         pressure = np.where(touches, trial[:, 0], 0.0)
-        sticking = np.where(touches, trial[:, 1] - gamma[:, 1] * state.lag, 0.0)
+        sticking = np.where(touches, trial[:, 1] - gamma[:, 1] * state.elastic_slip, 0.0)
         sign, beyond = np.sign(sticking), np.abs(sticking) - self.friction * pressure
         slides = beyond > 0
         shear = np.where(slides, sign * self.friction * pressure, sticking)
@@ -104,7 +105,9 @@ class Coulomb(ContactLaw):
         derivative[:, 0, 0], derivative[:, 1, 1] = touches, touches & ~slides
         derivative[:, 1, 0] = np.where(slides, sign * self.friction, 0.0)
         lost = 0.5 * self.friction * (state.pressure + pressure) * np.abs(moved)
-        new = Slid(np.where(touches, state.lag + slip + moved, 0.0), pressure, state.dissipated + lost)
+        new = FrictionState(
+            np.where(touches, state.elastic_slip + slip + moved, 0.0), pressure, state.dissipated + lost
+        )
         return np.stack([pressure, shear], axis=1), derivative, new
 
     def elastic(self) -> Coulomb:

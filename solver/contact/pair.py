@@ -79,14 +79,14 @@ class Pair:
         self.opening[:, 0] += self.offset
         if self.law.slides and not self.moves:
             self.opening[:, 0] += (self.separation * n).sum(1)
-        if self.law.rubs:
+        if self.law.has_friction:
             own, before = self._begun
             step = self._in_frame(self._relative(displacement - own, motion - before))
             P, (rise, self.opening[:, 1]) = self.projection, step.T
             drift = np.einsum("ma,mai->mi", P.slope, (motion - before)[P.nodes])
             self.strayed = np.stack([rise, self._in_frame(drift)[:, 1]], axis=1)
         self.trial = self._in_frame(self.stress_vector) - self.gamma * self.opening
-        if self.law.rubs:  # what has no partner has no history
+        if self.law.has_friction:  # what has no partner has no history
             self.trial[~self.projection.found, 0] = -1.0
         self.traction = self._answer(self.trial)
 

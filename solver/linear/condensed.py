@@ -34,6 +34,8 @@ def why_not(facts: Facts) -> str | None:
     """Why the systems do not shrink to the contact."""
     if facts.yields:
         return "bodies can yield"
+    if facts.finite:
+        return "strains are large, the matrix changes all over"
     if facts.by_force:
         return "displacements of drives are unknown"
     if facts.dofs >= _MOST_DOFS:

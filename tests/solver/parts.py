@@ -218,6 +218,29 @@ def quarter_annulus(comm: MPI.Comm, a: float, b: float, size: float, **options) 
     return gmsh_to_mesh(comm, build, [Circle("inner", (0.0, 0.0), a), Circle("outer", (0.0, 0.0), b)], **options)
 
 
+def notched_bar(comm: MPI.Comm, width: float, finest: float) -> TaggedMesh:
+    """A quarter of a square "bar" of ``width`` with two cracks in line: its "ligament" of 1 on y = 0, the sides "axis"
+    on x = 0 and "lid"; elements grow from the size ``finest`` at the crack's tip."""
+
+    def build(gmsh) -> None:
+        geo = gmsh.model.geo
+        corners = (0.0, 0.0), (1.0, 0.0), (width, 0.0), (width, width), (0.0, width)
+        p = [geo.addPoint(x, y, 0) for x, y in corners]
+        lines = [geo.addLine(a, b) for a, b in zip(p, [*p[1:], p[0]], strict=True)]
+        face = geo.addPlaneSurface([geo.addCurveLoop(lines)])
+        geo.synchronize()
+        gmsh.model.addPhysicalGroup(2, [face], name="bar")
+        for line, name in ((lines[0], "ligament"), (lines[3], "lid"), (lines[4], "axis")):
+            gmsh.model.addPhysicalGroup(1, [line], name=name)
+        field = gmsh.model.mesh.field
+        field.add("MathEval", 1)
+        field.setString(1, "F", f"{finest} + 0.12 * Sqrt((x - 1)^2 + y^2)")
+        field.setAsBackgroundMesh(1)
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+
+    return gmsh_to_mesh(comm, build)
+
+
 def solve(problem: Problem, loads) -> System:
     """Step through ``loads`` from rest and return the system at the last; no step may be cut."""
     system = System(problem)

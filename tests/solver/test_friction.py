@@ -120,7 +120,7 @@ def test_a_pressed_ring_slips_at_the_torque_of_its_pressure(kinematics):
     if kinematics == "reference":  # else those who hold feel the normals turn with the pin by an angle, over mu
         assert torque == pytest.approx(on_contact, rel=1e-3, abs=1e-3 * full[0])
     slipped = (path[-1] - on_contact[-1] / torque[1] * path[2]) * r
-    assert system.rubbed() == pytest.approx(full[-1] / r * slipped, rel=0.01)
+    assert system.friction_dissipation() == pytest.approx(full[-1] / r * slipped, rel=0.01)
 
 
 def test_boundless_friction_ties_what_is_pressed():
@@ -150,7 +150,7 @@ def test_sliding_forth_and_back_loses_what_the_loads_put_in():
         q, f = system.driven()
         work += float(((q - last[0]) * (f + last[1])).sum() / 2)
         last = q, f
-        lost.append(system.rubbed())
+        lost.append(system.friction_dissipation())
     assert (np.diff(lost) >= 0).all()
     assert work == pytest.approx(system.energies()[0] + lost[-1], rel=2e-3)
     assert abs(system.drive_force("x")) == pytest.approx(MU * 10, rel=1e-3)
@@ -241,5 +241,5 @@ def test_the_joint_of_the_paper_with_friction():
         if load == pytest.approx(0.005):
             assert pytest.approx(5.6493e-3, rel=1e-3) == P
     assert last[1] == pytest.approx(1.32327e-2, rel=1e-3)
-    assert joint.rubbed() == pytest.approx(1.27e-6, rel=0.05)
-    assert work - joint.energies()[0] == pytest.approx(joint.rubbed(), rel=0.05)
+    assert joint.friction_dissipation() == pytest.approx(1.27e-6, rel=0.05)
+    assert work - joint.energies()[0] == pytest.approx(joint.friction_dissipation(), rel=0.05)

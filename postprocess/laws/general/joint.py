@@ -31,7 +31,8 @@ class LawJoint:
     the block's, or rigid). ``pin_hardening`` and ``block_hardening`` are d(yield stress)/d(PEEQ) over Young's modulus
     of the body (0: perfect plasticity, None: no straight line). Laws of P(delta) are for a pin in a wide block, and say
     so of a ``ring``, where ``block_size`` (None: wide) is small, the pin is ``whole``, not cut at the pressed
-    diameter, or there is ``friction``, which no law knows. Raises ValueError for values that make no joint.
+    diameter, or there is ``friction`` or ``large_strain``, which no law knows. Raises ValueError for values that make
+    no joint.
     """
 
     radius: float
@@ -52,6 +53,7 @@ class LawJoint:
     block_size: float | None = None
     whole: bool = False
     friction: float = 0.0
+    large_strain: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -92,6 +94,7 @@ class LawJoint:
             block_size=scene.joint.W,
             whole=scene.pin.whole,
             friction=scene.analysis.friction,
+            large_strain=scene.analysis.strain == "large",
             **given,
         )
 

@@ -13,7 +13,7 @@ from archord.solver.linear.choose import choose
 from archord.solver.linear.strategy import Facts
 from tests.solver.solving import MUMPS_FROM_C
 
-ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, 0.5, lambda: True)
+ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, False, 0.5, lambda: True)
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,8 @@ ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, 0.5, lambda: True)
         ({"dofs": 10_000}, "direct"),
         ({"dofs": 50_000}, "lagged + direct"),
         ({"yields": True, "dofs": 50_000}, "direct"),
+        ({"finite": True}, "direct"),
+        ({"finite": True, "dofs": 50_000}, "lagged + direct"),
         ({"by_force": True}, "bordered + direct"),
         ({"by_force": True, "dofs": 50_000}, "bordered + lagged + direct"),
         ({"gamma_factor": None}, "direct"),
