@@ -43,8 +43,9 @@ def _conclude(printed: str, files: Iterable[Path], faults: list[str], quiet: boo
 @click.command()
 @argument("figures", "[FIGURE]...", "fig2 ... fig9, or all", nargs=-1, type=str)
 @output("folder for runs, tables, pictures, report", "runs/paper")
+@click.option("--strain", type=click.Choice(["small", "large"]), default="small", help="analysis.strain of all runs")
 @quiet()
-def reproduce(figures: tuple[str, ...], output: Path, quiet: bool) -> int:
+def reproduce(figures: tuple[str, ...], output: Path, strain: str, quiet: bool) -> int:
     """Solve what the paper's figures need, and write each as CSV and picture; all of them with a report.
 
     Runs that are there already are not solved again. Under mpirun the ranks solve different runs side by side.
@@ -55,7 +56,7 @@ def reproduce(figures: tuple[str, ...], output: Path, quiet: bool) -> int:
 
     comm = MPI.COMM_WORLD
     try:
-        files = make(figures or ["all"], output, comm, _telling(quiet))
+        files = make(figures or ["all"], output, comm, _telling(quiet), strain)
     except RuntimeError as error:
         if comm.rank == 0:
             print(f"archord: {error}.", file=sys.stderr)

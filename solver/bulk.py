@@ -145,7 +145,8 @@ class Bulk:
         n_owned = V.mesh.topology.index_map(2).size_local
         self.cells = {tag: cells[tag][cells[tag] < n_owned] for tag in materials}
         u, v = _voigt(ufl.TrialFunction(V)), _voigt(ufl.TestFunction(V))
-        self._nonlinear = {tag: _BodyPoints(V, self.cells[tag], m) for tag, m in materials.items() if m.yields or m.finite}
+        nonlinear = {tag: m for tag, m in materials.items() if m.yields or m.finite}
+        self._nonlinear = {tag: _BodyPoints(V, self.cells[tag], m) for tag, m in nonlinear.items()}
         self.plastic = any(m.yields for m in materials.values())
         self.finite = any(m.finite for m in materials.values())
         elastic = {}

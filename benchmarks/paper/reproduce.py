@@ -25,16 +25,19 @@ def chosen(names: Sequence[str]) -> list[str]:
     return [name for name in FIGURES if name in names or "all" in names]
 
 
-def reproduce(names: Sequence[str], folder: Path, comm: MPI.Comm, said: Callable[[str], None]) -> list[Path]:
+def reproduce(
+    names: Sequence[str], folder: Path, comm: MPI.Comm, said: Callable[[str], None], strain: str = "small"
+) -> list[Path]:
     """Solve what ``names`` need and is not in ``folder`` yet, and write their CSV files and pictures.
 
-    With all figures also ``report.md``. ``said(sentence)`` follows every run. Returns the files, on rank 0. Raises
-    `InputError` for unknown figures and a folder that cannot be written, and RuntimeError if a run failed. Collective.
+    With all figures also ``report.md``. All runs are of small or large ``strain``. ``said(sentence)`` follows each.
+    Returns the files, on rank 0. Raises `InputError` for unknown figures and a folder that cannot be written, and
+    RuntimeError if a run failed. Collective.
     """
     wanted = chosen(names)
     agreed(comm, lambda: claim_folder(folder, force=True))
-    runs = Runs(folder / "runs")
-    needed = cases(joint for name in wanted for joint in LAYOUTS[name]["joints"])
+    runs = Runs(folder / "runs", strain)
+    needed = cases((joint for name in wanted for joint in LAYOUTS[name]["joints"]), strain)
     if complaints := solve_missing(needed, runs.folder, comm, said):
         raise RuntimeError("; ".join(complaints))
     if comm.rank != 0:
@@ -62,7 +65,7 @@ def report(runs: Runs, claims: str, pictures: list[str]) -> str:
     return f"""# The claims of Hu et al., judged
 
 Hu et al., *A new model for elasto-plastic conformal contact between cylinders*. Like bodies, nu = 0.3 (the paper \
-gives neither), block of 100 R, closest points on the deformed curves, small strains; E* = 1.
+gives neither), block of 100 R, closest points on the deformed curves, {runs.strain} strains; E* = 1.
 
 Two meshes, 4 % R and 2 % R on the arcs, differ in P by at most {error:.2%} from 0.2 dR on ({worst}): the \
 discretisation error of the finer one, which all numbers come from, is below that.

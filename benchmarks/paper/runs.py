@@ -35,8 +35,8 @@ JOINTS: dict[str, tuple[float, float | None]] = {
 FULL_YIELD, MILD_YIELD = "plastic_0.5_0.2", "plastic_0.1_0.1"  # the joints of figures 5 and 8
 
 
-def case(joint: str, plane: Plane, mesh: str = "fine") -> Case:
-    """One run, delta = 2 dR: E* = 1 in either plane."""
+def case(joint: str, plane: Plane, mesh: str = "fine", strain: str = "small") -> Case:
+    """One run, delta = 2 dR: E* = 1 in either plane; ``strain`` is "small" or "large"."""
     ratio, strength = JOINTS[joint]
     yields = {} if strength is None else {"yield_stress": strength / 100}
     solid = {"E": E if plane == "strain" else 2.0, "nu": 0.3, **yields}
@@ -47,27 +47,28 @@ def case(joint: str, plane: Plane, mesh: str = "fine") -> Case:
         joint={"clearance": None, "relative_clearance": ratio / 100, **size},
         pin=solid,
         block=solid,
-        analysis={"plane": plane},
+        analysis={"plane": plane, "strain": strain},
     )
-    return Case(f"{joint}-{plane}-{mesh}", scene)
+    return Case(f"{joint}-{plane}-{mesh}{'-large' if strain == 'large' else ''}", scene)
 
 
-def cases(joints: Iterable[str]) -> list[Case]:
+def cases(joints: Iterable[str], strain: str = "small") -> list[Case]:
     """All planes and meshes of ``joints``, the longest runs first."""
     asked = set(joints)
     wanted = [joint for joint in JOINTS if joint in asked]
-    return [case(joint, plane, mesh) for mesh in ("fine", "coarse") for joint in wanted for plane in PLANES]
+    return [case(joint, plane, mesh, strain) for mesh in ("fine", "coarse") for joint in wanted for plane in PLANES]
 
 
 @dataclass(frozen=True)
 class Runs:
-    """The finished runs in ``folder``."""
+    """The finished runs in ``folder``, of small or large ``strain``."""
 
     folder: Path
+    strain: str = "small"
 
     def run(self, joint: str, plane: Plane, mesh: str = "fine") -> Run:
         """One of them."""
-        return Run(case(joint, plane, mesh).folder(self.folder))
+        return Run(case(joint, plane, mesh, self.strain).folder(self.folder))
 
     def curve(self, joint: str, plane: Plane, mesh: str = "fine") -> RunCurve:
         """Its curves."""

@@ -1,7 +1,8 @@
 """A second opinion: CalculiX on the deck of a scene, and what its result files say.
 
-As a program, ``python3 -m archord.benchmarks.peers.calculix SCENE``, it solves a scene by archord and by CalculiX on
-the same mesh, whole processes with one thread each, and prints their last forces, their stresses at nodes and times.
+As a program, ``python3 -m archord.benchmarks.peers.calculix SCENE [SECTION.KEY=VALUE ...]``, it solves a scene, with
+these keys changed, by archord and by CalculiX on the same mesh, whole processes with one thread each, and prints their
+last forces, their stresses at nodes and times.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -159,13 +161,15 @@ def read_nodal(text: str, block: str, mesh: DeckMesh) -> Array:
     return values
 
 
-def compare(scene: Path, folder: Path) -> Table:
-    """archord and CalculiX on ``scene``, in ``folder``: forces, the largest von Mises stress at a node of every body,
+def compare(scene: Path, overrides: Sequence[str], folder: Path) -> Table:
+    """archord and CalculiX on ``scene`` with ``overrides``, in ``folder``: forces, the largest von Mises stress at a node of every body,
     the difference of its stresses (root of the mean square over nodes, over that of archord's), and seconds. Raises
     `InputError` and `Failure`."""
-    command = (sys.executable, "-m", "archord", "solve", str(scene.resolve()), "-o", "run", "--force", "--quiet")
+    overrides = ["output.fields=nodes", *overrides]
+    changes = [word for override in overrides for word in ("--set", override)]
+    command = (sys.executable, "-m", "archord", "solve", str(scene.resolve()), *changes, "-o", "run", "--force", "-q")
     ours = run_once(Process("archord", command, folder, lambda: Run(folder / "run")))
-    theirs = run_once(replace(process(load_scene(scene), folder / "calculix"), limit=_LONG))
+    theirs = run_once(replace(process(load_scene(scene, overrides), folder / "calculix"), limit=_LONG))
     table, run, opinion = Table("", "archord", "CalculiX", "difference", left=1), ours.result, theirs.result
 
     def add(what: str, one: float, other: float) -> None:
@@ -186,4 +190,4 @@ def compare(scene: Path, folder: Path) -> Table:
 
 
 if __name__ == "__main__":
-    print(compare(Path(sys.argv[1]), Path("runs/calculix")))
+    print(compare(Path(sys.argv[1]), sys.argv[2:], Path("runs/calculix")))

@@ -138,10 +138,10 @@ class Law:
         if joint.friction:
             said.append(
                 f"without friction; with the coefficient {joint.friction:g} P is higher: in the paper's elastic joint "
-                "at 2 dR by 3.6 % with 0.1, by 10.6 % with 0.3"
+                "at 2 dR by 3.5 % with 0.1, by 10.5 % with 0.3"
             )
         if joint.large_strain:
-            said.append("of small strain; at large strain P is higher: in the paper's joint at 2 dR by 0.2 to 0.4 %")
+            said.append("of small strain; at large strain P is higher: 0.2 to 0.4 % at dR/R = 0.5 %, 1.6 % at 2 %")
         for kind in said:
             warnings.warn(LawRangeWarning(f"{self.name}: is a law {kind}"), stacklevel=4)
 

@@ -14,8 +14,9 @@ from petsc4py import PETSc
 @dataclass(frozen=True)
 class Facts:
     """Of a problem: its ``dofs`` on all ranks of ``comm``; whether bodies ``yields``, or are at large strain as
-    ``finite``; whether levels of drives are unknown, as ``by_force``; ``gamma_factor``, the largest of its frictionless interactions, None without one or with
-    others; and ``held()``, whether supports alone keep every body from moving rigidly (collective)."""
+    ``finite``; whether levels of drives are unknown, as ``by_force``; ``gamma_factor``, the largest of its unilateral
+    interactions, None without one or with others; and ``held()``, whether supports alone keep every body from moving
+    rigidly (collective)."""
 
     comm: MPI.Comm
     dofs: int
