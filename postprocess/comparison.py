@@ -67,8 +67,8 @@ def compare_runs(runs: list[Run]) -> Comparison:
         if not len(load):
             raise InputError(f"{runs[0].folder}: shares no range of loads with the others.")
         between = np.array([np.abs(load[:, None] - t["load"]).min(axis=1) > margin for t in tables])
-    pairs = list(zip(tables, between, strict=True))
-    values = {name: np.array([_at(load, t["load"], t[name], k) for t, k in pairs]) for name in labels if name != "load"}
+        tables = [_at(load, table, k) for table, k in zip(tables, between, strict=True)]
+    values = {name: np.array([table[name] for table in tables]) for name in labels if name != "load"}
     return Comparison(runs, labels, all(alike), load, values, between)
 
 
@@ -111,13 +111,15 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[dict[str, Array]], dict[str, st
     return tables, labels, per[:, 2]
 
 
-def _at(load: Array, own: Array, values: Array, between: np.ndarray) -> Array:
-    """The ``values`` of a run with its ``own`` loads at ``load`` ``(n,)``; interpolated where that lies ``between``."""
-    found = values[np.abs(load[:, None] - own).argmin(axis=1)]
+def _at(load: Array, table: dict[str, Array], between: np.ndarray) -> dict[str, Array]:
+    """The first loading of a run at ``load`` ``(n,)``; interpolated where that lies ``between`` its own loads."""
+    own = table["load"]
+    found = {name: values[np.abs(load[:, None] - own).argmin(axis=1)] for name, values in table.items()}
     if between.any():
         from scipy.interpolate import PchipInterpolator
 
-        found[between] = PchipInterpolator(own, values)(load[between])
+        for name, values in table.items():
+            found[name][between] = PchipInterpolator(own, values)(load[between])
     return found
 
 

@@ -88,6 +88,10 @@ def test_unloading_counts_only_where_the_ways_are_the_same(runs, more):
     stepped.curve = RunCurve("x", paper_joint(), *5 * [delta])
     with pytest.raises(InputError, match="shares no range of loads"):
         compare_runs([released, stepped])
+    there, lower = np.array([1.0, 2.0, 1.0]), np.array([1.0, 2.0, 0.3])
+    released.curve = RunCurve("x", paper_joint(), there, *4 * [lower])
+    for values in compare_runs([released, released]).values.values():
+        np.testing.assert_allclose(values / values[:, :1], [lower, lower], rtol=1e-15)
 
 
 def test_nothing_has_no_relative_difference(runs):
