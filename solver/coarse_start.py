@@ -14,7 +14,7 @@ from archord.geometry.meshes.interpolation import Interpolation
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.system import System
 
-_FEWEST_DOFS = 4_000  # of an elastic problem that is worth a coarse start: iterations are halved
+_FEWEST_DOFS = 2_000  # of an elastic problem that is worth a coarse start: iterations are halved
 _FEWEST_YIELDING = 8_000  # of one that yields
 _FEWEST_POINTS = 30  # in contact: of a contact of few coarse elements nothing can be learnt
 

@@ -25,11 +25,15 @@ SCENES = {
 }
 
 
+def start_from(dofs, monkeypatch):
+    for fewest in ("_FEWEST_DOFS", "_FEWEST_YIELDING"):
+        monkeypatch.setattr(coarse_start, fewest, dofs)
+    monkeypatch.setattr(preset, "_COARSEST", 0.3)
+
+
 @pytest.fixture
 def always(monkeypatch):
-    for fewest in ("_FEWEST_DOFS", "_FEWEST_YIELDING"):
-        monkeypatch.setattr(coarse_start, fewest, 1000)
-    monkeypatch.setattr(preset, "_COARSEST", 0.3)
+    start_from(1000, monkeypatch)
 
 
 def run(scene, folder, comm=MPI.COMM_SELF):
@@ -46,10 +50,9 @@ def run(scene, folder, comm=MPI.COMM_SELF):
 def test_the_solution_is_that_without_it(name, tmp_path, monkeypatch):
     """Forces, peak pressures and dissipation agree to the tolerance of Newton's method, in fewer fine iterations."""
     scene = SCENES[name]
+    start_from(10**9, monkeypatch)
     plain, without = run(scene, tmp_path / "plain")
-    for fewest in ("_FEWEST_DOFS", "_FEWEST_YIELDING"):
-        monkeypatch.setattr(coarse_start, fewest, 1000)
-    monkeypatch.setattr(preset, "_COARSEST", 0.3)
+    start_from(1000, monkeypatch)
     guessed, report = run(scene, tmp_path / "guessed")
     assert sum(s["coarse_iterations"] for s in report["steps"]) > 0
     assert not any(s["coarse_iterations"] for s in without["steps"])
