@@ -149,9 +149,12 @@ class JointAccount:
                 "the mean displacement of the core, contains by how much it is squashed there; a larger "
                 "load.core_radius would spread the force"
             )
-        small = self.scene.analysis.strain == "small"
-        if small and abs(m.delta) > 0.1 * self.scene.joint.radius and not self.scene.doubts:
-            said.append('delta exceeds 0.1 R, too much for small-strain theory; analysis.strain = "large" is for that')
+        scene = self.scene
+        if abs(m.delta) > scene.small * scene.joint.radius and not scene.doubts:
+            said.append(
+                f"delta exceeds {scene.small:.2g} R: small-strain theory makes P too low, relatively by about "
+                f'{scene.too_low:g} delta/R; analysis.strain = "large" is for that'
+            )
         if residual > 1e-8 and m.contact_area:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
         if m.force_balance > 1e-8:
