@@ -173,7 +173,7 @@ def test_a_displacement_beyond_small_strains_is_doubted():
     assert parse_scene(data | large).doubts == []
     (said,) = parse_scene(data | {"load": {"relative_force": 0.17}}).doubts
     assert said.startswith("load.relative_force moves the pin by at least 0.11 R: small-strain theory")
-    assert parse_scene(data | {"analysis": {"friction": 0.3}, "load": {"relative_force": 0.17}}).doubts == []
+    assert parse_scene(data | {"analysis": {"friction": 0.3}, "load": {"relative_force": 0.14}}).doubts == []
 
 
 def test_overrides_replace_values_and_alternatives(tmp_path):
