@@ -14,15 +14,14 @@ from archord.geometry.meshes.interpolation import Interpolation
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.system import System
 
-_FEWEST_DOFS = 2_000  # of an elastic problem that is worth a coarse start: iterations are halved
-_FEWEST_YIELDING = 8_000  # of one that yields
+_FEWEST_DOFS = 8_000  # of a problem that is worth a coarse start
+_FEWEST_FINITE = 2_000  # of an elastic one at large strain, all of whose iterations factorise
 _FEWEST_POINTS = 30  # in contact: of a contact of few coarse elements nothing can be learnt
 
 
 def coarse_start(system: System) -> CoarseStart | None:
     """The coarse start of ``system``; None where that is coarse itself, or has no coarser problem. Collective."""
-    at = system.equilibrium
-    fewest = _FEWEST_YIELDING if at.bulk.plastic or at.choice.uses("condensed") else _FEWEST_DOFS
+    fewest = _FEWEST_FINITE if system.bulk.finite and not system.bulk.plastic else _FEWEST_DOFS
     if system.n_dofs < fewest or system.problem.coarser is None:
         return None
     with system.timer("coarse start"):
