@@ -158,7 +158,7 @@ class GeneralAccount:
             said.append(
                 f'PEEQ reaches {largest:.2g}, too much for small-strain theory; analysis.strain = "large" is for that'
             )
-        angle = max(map(abs, system.driven()[0][self._turning]), default=0.0)
+        angle = np.abs(system.driven()[0][self._turning]).max(initial=0.0)
         if angle > _FAR_TURN:
             said.append(
                 f"a coupling turns by {angle:.2g} rad; it turns linearly, which stretches radii by {angle**2 / 2:.1g}"
