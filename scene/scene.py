@@ -131,7 +131,7 @@ class Scene(Checked):
     @property
     def too_low(self) -> float:
         """By what part of itself P of small strain is about too low, over delta/R: of elastic joints 0.15 to 0.17, of
-        yielding ones 0.2 to 0.65, of dR/R from 0.5 to 5 % and delta up to R/10."""
+        yielding ones 0.2 to 0.8, of dR/R from 0.5 to 5 % and delta up to R/10."""
         return 0.4 if self.plastic else 0.16
 
     @property

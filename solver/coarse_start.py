@@ -11,18 +11,19 @@ import numpy as np
 from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.geometry.meshes.interpolation import Interpolation
+from archord.solver.bulk import Bulk
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.system import System
 
 _FEWEST_DOFS = 8_000  # of a problem that is worth a coarse start
+_FEWEST_STRESS = 4_000  # of one that yields in plane stress, where flow localises and Newton's method is slow
 _FEWEST_FINITE = 2_000  # of an elastic one at large strain, all of whose iterations factorise
 _FEWEST_POINTS = 30  # in contact: of a contact of few coarse elements nothing can be learnt
 
 
 def coarse_start(system: System) -> CoarseStart | None:
     """The coarse start of ``system``; None where that is coarse itself, or has no coarser problem. Collective."""
-    fewest = _FEWEST_FINITE if system.bulk.finite and not system.bulk.plastic else _FEWEST_DOFS
-    if system.n_dofs < fewest or system.problem.coarser is None:
+    if system.n_dofs < _fewest_dofs(system.bulk) or system.problem.coarser is None:
         return None
     with system.timer("coarse start"):
         try:
@@ -30,6 +31,13 @@ def coarse_start(system: System) -> CoarseStart | None:
         except ProjectionError:  # on all ranks: too coarse for the contact to be found
             return None
         return CoarseStart(system, coarse) if 2 * coarse.n_dofs < system.n_dofs else None
+
+
+def _fewest_dofs(bulk: Bulk) -> int:
+    if not bulk.plastic:
+        return _FEWEST_FINITE if bulk.finite else _FEWEST_DOFS
+    planes = {getattr(material, "plane", None) for material in bulk.materials.values()}
+    return _FEWEST_STRESS if "stress" in planes else _FEWEST_DOFS
 
 
 class CoarseStart:
