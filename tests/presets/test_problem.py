@@ -9,7 +9,7 @@ from archord.presets.general_account import GeneralAccount
 from archord.scene.errors import InputError
 from archord.scene.file import parse_any
 from archord.scene.shapes import general_joint
-from archord.solver.stepping import march
+from archord.solver.stepping import Step, march
 from tests.solver.solving import solve
 
 STEEL = {"E": 210000.0, "nu": 0.3}
@@ -83,6 +83,19 @@ def test_a_reference_point_carries_force_and_moment(kind):
     back.append(load("turn", on="pin", direction="rotation", displacement=found["turn displacement"]))
     again = solved(back, pin="none", couplings=[point], supports=[CLAMP], half=False)[1]
     assert (again["press force"], again["turn force"]) == pytest.approx((300, 2000), rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("angle", "told"), [(0.01, []), (0.04, ["it turns linearly, which stretches radii by 0.0008"])]
+)
+def test_a_reference_point_that_turns_far_is_told(angle, told):
+    """Its rotation is linear, at large strain as well."""
+    point = {"name": "pin", "facets": "hole", "point": [0.0, 0.0]}
+    turn = [load("turn", on="pin", direction="rotation", displacement=angle)]
+    held = {"name": "held", "on": "pin", "fixed": ["x", "y"]}
+    account = solved(turn, pin="none", couplings=[point], supports=[CLAMP, held], half=False)[0]
+    said = account.step_warnings(account.step([], Step(1.0), account.profiles(), 0.0, 0.0), {}, 0.0)
+    assert [word.partition("; ")[2] for word in said if "turns" in word] == told
 
 
 def test_a_held_reference_point_does_not_move():

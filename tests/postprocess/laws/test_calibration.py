@@ -204,6 +204,7 @@ def joint_with(name, **sections):
             joint_with("other", pin={"whole": True}),
             "pin.whole = true does not fit: run has the other; one law is for one",
         ),
+        (joint_with("other", analysis={"friction": 0.2}), r"analysis.friction = 0\.2 does not fit: the law is for"),
         (joint_with("other", joint={"block_size": 5.0}), r"joint.block_size is 5 R and that of run 100 R, .* 5\.6%"),
     ],
 )

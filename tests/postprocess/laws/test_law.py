@@ -113,6 +113,17 @@ def test_joints_that_a_law_does_not_hold_for(name, change, said):
         assert LAWS[name].at_load(joint, 0.001, extrapolate=True).peak_pressure > 0
 
 
+@pytest.mark.parametrize(
+    ("of_scene", "said"),
+    [({"friction": 0.1}, "without friction; with the coefficient 0.1"), ({"large_strain": True}, "of small strain")],
+)
+def test_what_no_law_knows_of_a_scene_is_told(of_scene, said):
+    """With a number all the same."""
+    joint = LawJoint(radius=1.0, clearance=0.005, E_star=1.0, **of_scene)
+    with pytest.warns(LawRangeWarning, match=said):
+        assert LAWS["paper"].force(joint, 0.005) > 0
+
+
 def test_what_a_law_needs_or_lacks_is_a_sentence():
     bare = LawJoint(radius=7.0, clearance=0.03, E_star=1.2e5)
     with pytest.raises(ValueError, match="paper-plastic: this law needs yield_stress"):
