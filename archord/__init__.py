@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from archord.api import InputError, Problem, Run, Sweep, load, load_scene, solve
     from archord.geometry.meshes.fenicsx import gmsh_to_mesh
     from archord.materials.elasticity import Elastic
+    from archord.materials.finite import LargeStrain
     from archord.materials.hardening import LinearHardening, SwiftHardening, TabularHardening, VoceHardening
     from archord.materials.j2 import J2Material
     from archord.materials.kinematic import KinematicMaterial
@@ -31,15 +32,16 @@ if TYPE_CHECKING:
 
 
 __all__ = [
-    "Body", "Coupling", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LinearHardening",
-    "Load", "Mesh", "Problem", "ProblemScene", "Run", "Scene", "Support", "Sweep", "SwiftHardening", "System",
-    "TabularHardening", "VoceHardening", "draw_run", "gmsh_to_mesh", "load", "load_scene", "solve",
+    "Body", "Coupling", "Elastic", "InputError", "Interaction", "J2Material", "KinematicMaterial", "LargeStrain",
+    "LinearHardening", "Load", "Mesh", "Problem", "ProblemScene", "Run", "Scene", "Support", "Sweep", "SwiftHardening",
+    "System", "TabularHardening", "VoceHardening", "draw_run", "gmsh_to_mesh", "load", "load_scene", "solve",
 ]  # fmt: skip
 _HOME = {
     "draw_run": "archord.postprocess.pictures.pictures",
     "gmsh_to_mesh": "archord.geometry.meshes.fenicsx",
     "Elastic": "archord.materials.elasticity",
     "J2Material": "archord.materials.j2",
+    "LargeStrain": "archord.materials.finite",
     "KinematicMaterial": "archord.materials.kinematic",
     "System": "archord.solver.system",
     **dict.fromkeys(
