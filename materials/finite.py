@@ -30,7 +30,11 @@ _MIXED = [-1.0 if k % 2 == 0 else (k + 1) / (k + 2) for k in range(14)]  # (1/(1
 
 @dataclass(frozen=True)
 class LargeStrain(Material):
-    """The material ``inner`` at large strain; states, moduli and all else are its own."""
+    """The material ``inner`` of small strain at large strain, by logarithmic strains (Miehe, Apel and Lambrecht 2002).
+
+    It gets displacement gradients and gives nominal stresses, ``[xx, yy, xy, yx]``, in the unit of ``inner``, whose
+    states and moduli it has. All bodies of a problem that yield must be at large strain if one is.
+    """
 
     finite: ClassVar[bool] = True
 

@@ -20,7 +20,8 @@ FORMAT = 1  # version of the scene format: rises when a scene gets a meaning tha
 STEPS = ("stepping.initial", "stepping.maximum")  # what an accuracy chooses of any scene, and of a joint
 CHOSEN = ("joint.element_size", "joint.relative_element_size", "joint.growth", *STEPS)
 _FAR = 0.1  # displacement over R beyond which small strain may be qualitatively wrong
-_STIFFEST = 1.6, 2.3  # P over E* delta of no joint in a block: 1.53 where the clearance vanishes, 2.21 with friction
+_STIFFEST = 1.6  # P over E* delta of no joint in a block: 1.53 where the clearance vanishes
+_STIFFEST_STUCK = 3.5  # the same with friction: 2.2 with a coefficient of 1, 3.15 where nothing slides
 _SOFTEST = 1e-8  # ratio of the moduli
 _WEAKEST = 1e-7  # yield stress over E; below it nothing elastic is left but round-off
 
@@ -119,8 +120,8 @@ class Scene(Checked):
         """What to warn of before anything is solved."""
         farthest, least = max(map(abs, self.targets)) / self.joint.radius, ""
         if self.force_controlled:
-            stiffest = _STIFFEST[self.analysis.friction > 0] * self.E_star * self.thickness
-            farthest, least = farthest / stiffest, "at least "
+            stiffest = _STIFFEST_STUCK if self.analysis.friction else _STIFFEST
+            farthest, least = farthest / (stiffest * self.E_star * self.thickness), "at least "
         if farthest <= self.small or self.joint.is_ring:
             return []
         moved, error = f"load.{self.load.kind} moves the pin by {least}{farthest:.2g} R", self.too_low * farthest

@@ -146,6 +146,10 @@ class Bulk:
         self.cells = {tag: cells[tag][cells[tag] < n_owned] for tag in materials}
         u, v = _voigt(ufl.TrialFunction(V)), _voigt(ufl.TestFunction(V))
         nonlinear = {tag: m for tag, m in materials.items() if m.yields or m.finite}
+        if len({m.finite for m in nonlinear.values()}) > 1:
+            raise ValueError(
+                "bodies at large strain go with linear ones, or all that yield must be at large strain, too"
+            )
         self._nonlinear = {tag: _BodyPoints(V, self.cells[tag], m) for tag, m in nonlinear.items()}
         self.plastic = any(m.yields for m in materials.values())
         self.finite = any(m.finite for m in materials.values())

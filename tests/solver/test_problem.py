@@ -9,11 +9,12 @@ import pytest
 from mpi4py import MPI
 
 from archord.materials.elasticity import Elastic
+from archord.materials.finite import LargeStrain
 from archord.solver.load_path import LoadPath
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Support
 from archord.solver.stepping import StepRules
 from archord.solver.system import System
-from tests.solver.parts import ELASTIC, HARDENING, NU, E, blocks, coordinates, solve
+from tests.solver.parts import ELASTIC, HARDENING, NU, PERFECT, E, blocks, coordinates, solve
 
 DEPTH = 0.02
 ON_EACH_OTHER = Interaction("joint", ("upper bottom", "lower top"))
@@ -152,6 +153,7 @@ REFUSED = {
     "a force on the cells of a set or on its facets": {"loads": [Load("lower", pressure=1.0)]},
     "'joint' is tied": {"interactions": [Interaction("joint", ("upper bottom", "lower top"), "tied", overlap=0.1)]},
     "must say yields": {"bodies": [Body("lower", Stiffening(E, NU, "strain"))]},
+    "must be at large strain, too": {"bodies": [Body("lower", LargeStrain(PERFECT)), Body("upper", PERFECT)]},
 }
 
 
