@@ -5,7 +5,11 @@ from __future__ import annotations
 import gc
 
 import pytest
+from hypothesis import settings
 from mpi4py import MPI
+
+settings.register_profile("same", derandomize=True)  # the same examples in each run
+settings.load_profile("same")
 
 
 def pytest_addoption(parser):
