@@ -17,7 +17,6 @@ from archord.solver.system import System
 
 _FEWEST_DOFS = 8_000  # of a problem that is worth a coarse start
 _FEWEST_STRESS = 4_000  # of one that yields in plane stress, where flow localises and Newton's method is slow
-_FEWEST_FINITE = 2_000  # of an elastic one at large strain, all of whose iterations factorise
 _FEWEST_POINTS = 30  # in contact: of a contact of few coarse elements nothing can be learnt
 
 
@@ -34,10 +33,8 @@ def coarse_start(system: System) -> CoarseStart | None:
 
 
 def _fewest_dofs(bulk: Bulk) -> int:
-    if not bulk.plastic:
-        return _FEWEST_FINITE if bulk.finite else _FEWEST_DOFS
     planes = {getattr(material, "plane", None) for material in bulk.materials.values()}
-    return _FEWEST_STRESS if "stress" in planes else _FEWEST_DOFS
+    return _FEWEST_STRESS if bulk.plastic and "stress" in planes else _FEWEST_DOFS
 
 
 class CoarseStart:

@@ -17,6 +17,7 @@ from archord.kernels.compat import RESIDUAL_NOT_FINITE
 from archord.report.timer import BEFORE_SOLVING
 from archord.solver.equilibrium import Equilibrium
 from archord.solver.linear.lagged import Lagged
+from archord.solver.linear.look_ahead import LookAhead
 
 _PATIENCE = 12  # Newton iterations in which the residual must halve
 CIRCLING = 4  # the same where the active set stands still
@@ -57,6 +58,7 @@ class NewtonSolver:
         self.equilibrium, problem = equilibrium, equilibrium.problem
         self.tolerance, self.max_iterations = problem.tolerance, problem.max_iterations
         self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
+        self._ahead = LookAhead(equilibrium.tangent.revised) if equilibrium.choice.uses("look_ahead") else None
         self._x = equilibrium.vector()
         self._raised: BaseException | None = None
         with equilibrium.timer(BEFORE_SOLVING):
@@ -79,6 +81,7 @@ class NewtonSolver:
         """Start with a new linear solver: after a singular matrix PETSc's MUMPS may skip the next factorisation."""
         self._ksp = PETSc.KSP().create(self.equilibrium.comm)
         self._ksp.setPreSolve(self._guarded(self._before_solve))
+        self._ksp.setPostSolve(self._guarded(self._after_solve))
         for snes in self._solvers.values():
             snes.setKSP(self._ksp)
         self._attach()
@@ -91,9 +94,15 @@ class NewtonSolver:
         self._linear.attach(self._ksp)
         if self._lagged is not None:
             self._lagged.attach(self._ksp)
+        if self._ahead is not None:
+            self._ahead.attach(self._ksp)
 
     def _before_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
         ksp.getPC().setReusePreconditioner(self._reuse)
+
+    def _after_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        if self._ahead is not None and ksp.getConvergedReason() > 0:
+            self._ahead.improve(b, x, self._linear.matrix)
 
     def _guarded(self, callback: Callable) -> Callable:
         """Keep what ``callback``, a method, raises, which PETSc would turn into an error number. It does not keep this

@@ -43,7 +43,7 @@ class TangentMatrix:
         parts.append((2 * self._size + np.arange(len(rigid)), rigid))
         self._prescribed, self._rates = (np.concatenate(column) for column in zip(*parts, strict=True))
         self.factorisations = 0
-        self.A = self._elastic = PETSc.Mat()
+        self.A = self._elastic = self._ahead = PETSc.Mat()
         self.condensed: Condensed | None = None
         if condense:
             self.A = self._allocated()
@@ -51,7 +51,7 @@ class TangentMatrix:
             with self.timer(BEFORE_SOLVING):
                 self.A.convert("aij")  # PETSc has no Cholesky factors of block matrices from MUMPS
                 nodes = np.unique(np.concatenate([surface.curve_dofs for surface in contact.surfaces]))
-                self.condensed = Condensed(self.A, nodes, self._revise)
+                self.condensed = Condensed(self.A, nodes, self._revise_condensed)
         self.renew()
 
     def _allocated(self, *slots: tuple[np.ndarray, np.ndarray]) -> PETSc.Mat:
@@ -72,6 +72,7 @@ class TangentMatrix:
             return
         self.A.destroy()
         self._elastic.destroy()
+        self._ahead.destroy()
         rows, columns = self.contact.pattern()
         mine = (rows >= self._start) & (rows < self._start + self._n)
         rows, columns = rows[mine], columns[mine]
@@ -98,6 +99,13 @@ class TangentMatrix:
             offsets, columns, rowmap = (part.astype(PETSc.IntType) for part in parts)
             A.setValuesBlockedIJV(offsets, columns, values, PETSc.InsertMode.ADD, rowmap)
 
+    def _add_contact(self, A: PETSc.Mat, blocks: Array) -> None:
+        """Add ``blocks`` ``(k, 2, 2)`` in the slots of the contact to ``A``."""
+        tangent, kept = self.contact.tangent, filled(blocks)
+        kept = kept[self._in_matrix[kept]]
+        self._add(A, tangent.rows[kept], tangent.columns[kept], blocks[kept] * self._free[kept])
+        A.assemble()
+
     def update(self, *, factorise: bool = True) -> None:
         """Assemble ``A``, to be factorised or not."""
         if self.condensed is None:
@@ -108,33 +116,48 @@ class TangentMatrix:
                     self.A.axpy(1.0, self.springs.of_free, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
                 self.bulk.assemble_correction(self.A, self._bcs)
         with self.timer("assemble contact"):
-            tangent = self.contact.tangent
-            self._contact_blocks = tangent.blocks()
+            self._contact_blocks = self.contact.tangent.blocks()
             if self.condensed is None:
-                kept = filled(self._contact_blocks)
-                kept = kept[self._in_matrix[kept]]
-                values = self._contact_blocks[kept] * self._free[kept]
-                self._add(self.A, tangent.rows[kept], tangent.columns[kept], values)
-                self.A.assemble()
+                self._add_contact(self.A, self._contact_blocks)
             else:
                 self.factorisations = 1
                 self.condensed.update(self._contact_blocks[self._in_matrix] * self._free[self._in_matrix])
 
-    def _revise(self, increment: Array) -> Array | None:
-        """Go over to the points that ``increment`` ``(k, 2)`` of the nodes near the contact would close: the change of
-        the residual ``(m, 2)`` at those of the contact, with the matrix up to date; None if no point changes."""
-        assert self.condensed is not None
+    def _revise(self, u: Array) -> Array | None:
+        """Go over to the points that an increment ``u`` ``(n_local, 2)`` would close: the change of the residual
+        ``(n_owned, 2)``; None if no point changes."""
         with self.timer("contact"):
-            index_map = self.V.dofmap.index_map
-            u = np.zeros((self._n + index_map.num_ghosts, 2))
-            here = index_map.global_to_local(self.condensed.near)
-            u[here[here >= 0]] = increment[here >= 0]
             change = -self._contact_force()
-            if not self.contact.anticipate(u):
-                return None
-            change += self._contact_force()
+            return change + self._contact_force() if self.contact.anticipate(u) else None
+
+    def _revise_condensed(self, increment: Array) -> Array | None:
+        """`_revise` by ``increment`` ``(k, 2)`` of the nodes near the contact: the change at those of the contact ``(m,
+        2)``, with the matrix up to date."""
+        assert self.condensed is not None
+        index_map = self.V.dofmap.index_map
+        u = np.zeros((self._n + index_map.num_ghosts, 2))
+        here = index_map.global_to_local(self.condensed.near)
+        u[here[here >= 0]] = increment[here >= 0]
+        change = self._revise(u)
+        if change is None:
+            return None
         self.update()
         return self.condensed.at_nodes(change)
+
+    def revised(self, increment: Array) -> tuple[PETSc.Mat, Array] | None:
+        """`_revise` by ``increment`` ``(n_owned, 2)``: another matrix for the points that touch and stick then, valid
+        until the next one, and the change."""
+        self._direction.x.array[: 2 * self._n] = increment.ravel()
+        self._direction.x.scatter_forward()
+        change = self._revise(self._direction.x.array.reshape(-1, 2))
+        if change is None:
+            return None
+        with self.timer("assemble contact"):
+            if not self._ahead:
+                self._ahead = self.A.duplicate()
+            self.A.copy(self._ahead, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            self._add_contact(self._ahead, self.contact.tangent.blocks() - self._contact_blocks)
+        return self._ahead, change
 
     def _contact_force(self) -> Array:
         """The contact's part of the residual ``(n_owned, 2)``."""

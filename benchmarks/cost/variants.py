@@ -28,7 +28,7 @@ WATCHED = (*ABSENT, "dolfinx", "archord.materials.j2", "archord.output.fields", 
            "kernel closest_point")  # fmt: skip
 WITHOUT = {
     "": "",
-    "revised": "from archord.solver.linear import condensed; condensed._MOST_REVISIONS = 0",
+    "revised": "from archord.solver.linear import look_ahead; look_ahead.MOST_REVISIONS = 0",
     **{
         name: f"from archord.solver.linear.choose import LEFT_OUT; LEFT_OUT.add({name!r})"
         for name in ("condensed", "lagged", "substructured")

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from dolfinx import fem
 from petsc4py import PETSc
 
-from archord.solver.linear import bordered, condensed, lagged, substructured
+from archord.solver.linear import bordered, condensed, lagged, look_ahead, substructured
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Strategy
 
 # Every strategy beside MUMPS on the whole matrix, which always goes: None, or why it does not fit the facts.
-RULES = {module.__name__.rpartition(".")[2]: module.why_not for module in (bordered, condensed, substructured, lagged)}
+_MODULES = bordered, condensed, substructured, lagged, look_ahead
+RULES = {module.__name__.rpartition(".")[2]: module.why_not for module in _MODULES}
 INSTEAD = ("condensed", "substructured")  # of MUMPS on the whole matrix: the first that fits
 LEFT_OUT: set[str] = set()  # strategies to do without; benchmarks and tests set it
 
@@ -48,5 +49,5 @@ def choose(facts: Facts) -> Choice:
     reasons = {name: rule(facts) for name, rule in RULES.items()}
     reasons |= {name: "left out on request" for name in LEFT_OUT & reasons.keys()}
     fitting = [name for name in INSTEAD if reasons[name] is None]
-    given_way = [*fitting[1:], *(["lagged"] if "condensed" in fitting else [])]
+    given_way = [*fitting[1:], *(["lagged", "look_ahead"] if "condensed" in fitting else [])]
     return Choice(reasons | {name: f"the system is {fitting[0]}" for name in given_way})

@@ -7,10 +7,7 @@ contact forces, and ``E`` that puts them in their places. By the formula of Wood
 
 a system as small as the contact. ``Z`` is found once, for all places that may get a force.
 
-Which points are closed is asked again after each solve: those whose pressure, linearised, would change its sign with
-the increment found open or close, and the small system is solved again. That is Newton's method for generalised
-equations (Josephy 1979): what is left to its iterations is what is smooth, so that their number does not grow with that
-of the points at the contact's edge.
+Which points are closed is asked again after each solve, as in look_ahead.py, and the small system is solved again.
 """
 
 from __future__ import annotations
@@ -22,12 +19,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
+from archord.solver.linear import look_ahead
 from archord.solver.linear.direct import Direct
 from archord.solver.linear.strategy import Facts, Product, Strategy
 
 _MOST_DOFS = 8_000  # beyond, the work on contact dofs takes longer than factorisations
 _LARGE_GAMMA = 5.0  # beyond, the small system is close to singular
-_MOST_REVISIONS = 2  # of the closed points in one solve: more cost what the iterations cost that they save
 
 
 def why_not(facts: Facts) -> str | None:
@@ -145,7 +142,7 @@ class Condensed(Strategy):
         self._ksp.solve(r, self._y)
         forces, near = np.zeros(self._Z.shape[1]), self._on_all(self._columns, self._y.array_r)
         drawn = self._drawn(near)
-        for _ in range(_MOST_REVISIONS):
+        for _ in range(look_ahead.MOST_REVISIONS):
             change = self._revise((self._near_Z @ drawn - near).reshape(-1, 2))
             if change is None:
                 break

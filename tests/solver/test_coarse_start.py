@@ -26,7 +26,7 @@ SCENES = {
 
 
 def start_from(dofs, monkeypatch):
-    for fewest in ("_FEWEST_DOFS", "_FEWEST_STRESS", "_FEWEST_FINITE"):
+    for fewest in ("_FEWEST_DOFS", "_FEWEST_STRESS"):
         monkeypatch.setattr(coarse_start, fewest, dofs)
     monkeypatch.setattr(preset, "_COARSEST", 0.3)
 

@@ -20,16 +20,16 @@ ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, False, 0.5, lambda: True)
     ("change", "strategy"),
     [
         ({}, "condensed"),
-        ({"dofs": 10_000}, "direct"),
-        ({"dofs": 50_000}, "lagged + direct"),
-        ({"yields": True, "dofs": 50_000}, "direct"),
-        ({"finite": True}, "direct"),
-        ({"finite": True, "dofs": 50_000}, "lagged + direct"),
+        ({"dofs": 10_000}, "look_ahead + direct"),
+        ({"dofs": 50_000}, "lagged + look_ahead + direct"),
+        ({"yields": True, "dofs": 50_000}, "look_ahead + direct"),
+        ({"finite": True}, "look_ahead + direct"),
+        ({"finite": True, "dofs": 50_000}, "lagged + look_ahead + direct"),
         ({"by_force": True}, "bordered + direct"),
         ({"by_force": True, "dofs": 50_000}, "bordered + lagged + direct"),
         ({"gamma_factor": None}, "direct"),
-        ({"gamma_factor": 10.0}, "direct"),
-        ({"held": lambda: False}, "direct"),
+        ({"gamma_factor": 10.0}, "look_ahead + direct"),
+        ({"held": lambda: False}, "look_ahead + direct"),
     ],
 )
 def test_what_is_used(change, strategy):

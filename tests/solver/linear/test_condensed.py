@@ -9,8 +9,7 @@ from petsc4py import PETSc
 
 from archord.benchmarks.case import paper_joint
 from archord.presets.joint import Joint
-from archord.solver.linear import choose
-from archord.solver.linear import condensed as condensed_module
+from archord.solver.linear import choose, look_ahead
 from archord.solver.linear.condensed import Condensed
 from tests.solver.solving import solve
 
@@ -84,9 +83,9 @@ def test_the_joint_ends_in_the_same_state_with_one_factorisation(kinematics, pin
     With fixed partners nothing else is nonlinear: where all of them are found, the first iteration is the last."""
     scene = paper_joint(0.08, 3, pin=pin, analysis={"kinematics": kinematics})
     short = solve(scene)
-    monkeypatch.setattr(condensed_module, "_MOST_REVISIONS", 20)
+    monkeypatch.setattr(look_ahead, "MOST_REVISIONS", 20)
     patient = solve(scene)
-    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
+    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed", "look_ahead"})
     long = solve(scene)
     assert short.joint.equilibrium.tangent.factorisations == 1 < long.joint.equilibrium.tangent.factorisations
     counts = [[m.iterations for m in run.steps] for run in (short, long)]

@@ -1,0 +1,59 @@
+"""Which points touch and stick, asked again after each linear solve, of whatever strategy.
+
+Those whose trial traction, linearised, would come to another branch of their law with the increment found go over to
+it, and the system is solved again with their blocks changed: by FGMRES, which the factorisation of the matrix before
+preconditions, as the change is of low rank. That is Newton's method for generalised equations (Josephy 1979): what is
+left to its iterations is what is smooth, so that their number does not grow with that of the points at the edges of
+contact and of stick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from petsc4py import PETSc
+
+from archord.geometry.basis import Array
+from archord.solver.linear.strategy import Facts
+
+MOST_REVISIONS = 2  # of the points in one solve: more cost what the iterations cost that they save
+_TOLERANCE = 1e-3  # residual of a system over its right-hand side
+_MOST_SOLVES = 40  # with the factorisation, for one revision
+
+Revise = Callable[[Array], tuple[PETSc.Mat, Array] | None]
+
+
+def why_not(facts: Facts) -> str | None:
+    """Why points are not asked again."""
+    if facts.by_force:
+        return "displacements of drives are unknown"
+    return "there is no contact, or one with a law that never opens" if facts.gamma_factor is None else None
+
+
+class LookAhead:
+    """``revise(increment)`` goes over to the points that touch and stick after an ``increment`` ``(n_owned, 2)`` of the
+    displacements, and returns the matrix for them with what they add to the residual ``(n_owned, 2)``; None for no
+    change. Collective."""
+
+    def __init__(self, revise: Revise) -> None:
+        self._revise = revise
+
+    def attach(self, ksp: PETSc.KSP) -> None:
+        """Let ``ksp`` precondition."""
+        self._ksp = PETSc.KSP().create(ksp.comm)
+        self._ksp.setType("fgmres")
+        self._ksp.setGMRESRestart(_MOST_SOLVES)
+        self._ksp.setPC(ksp.getPC())
+        self._ksp.setInitialGuessNonzero(True)
+        self._ksp.setTolerances(rtol=_TOLERANCE, max_it=_MOST_SOLVES)
+
+    def improve(self, r: PETSc.Vec, x: PETSc.Vec, A: PETSc.Mat) -> None:
+        """Replace ``x``, the solution of ``A x = r``, by that of the system revised, of Newton's step ``-x``."""
+        r = r.copy()
+        for _ in range(MOST_REVISIONS):
+            revised = self._revise(-x.array_r.reshape(-1, 2))
+            if revised is None:
+                break
+            r.array[:] += revised[1].ravel()
+            self._ksp.setOperators(revised[0], A)
+            self._ksp.solve(r, x)

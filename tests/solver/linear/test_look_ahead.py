@@ -1,0 +1,51 @@
+"""Points that are asked again within a linear solve: the same states, in fewer iterations."""
+
+import pytest
+
+from archord.benchmarks.case import paper_joint
+from archord.solver.linear import choose, lagged, look_ahead
+from tests.solver.solving import solve
+
+SCENES = {
+    "yielding": paper_joint(0.08, 10, 0.002),
+    "friction": paper_joint(0.08, 4, 0.002, analysis={"friction": 0.3}),
+    "large strain": paper_joint(0.08, 4, analysis={"strain": "large"}),
+    "rigid pin": paper_joint(0.08, 4, 0.002, pin={"rigid": True}),
+    "released": paper_joint(0.1, 1, 0.002, load={"displacement": [1.5, 1.0, 0.2]}),
+}
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", SCENES)
+def test_the_states_are_those_without_it_in_fewer_iterations(name, comm, monkeypatch):
+    """To the tolerance of Newton's method, on one rank or several, which take as many iterations."""
+    short, alone = solve(SCENES[name], comm), solve(SCENES[name])
+    monkeypatch.setattr(choose, "LEFT_OUT", {"look_ahead"})
+    long = solve(SCENES[name])
+    for a, b, c in zip(short.steps, alone.steps, long.steps, strict=True):
+        assert (a.P, a.p0, a.eps) == pytest.approx((c.P, c.p0, c.eps), rel=1e-8)
+        assert (a.P, a.iterations) == pytest.approx((b.P, b.iterations), rel=1e-9)
+    assert sum(m.iterations for m in short.steps) < 0.9 * sum(m.iterations for m in long.steps)
+
+
+@pytest.mark.parametrize("pin", [{}, {"rigid": True}], ids=["deformable", "rigid"])
+def test_what_is_linear_but_for_the_contact_takes_one_iteration(pin, monkeypatch):
+    """Elastic bodies and fixed partners, where all points that change are found and systems are solved to the end."""
+    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
+    monkeypatch.setattr(look_ahead, "MOST_REVISIONS", 20)
+    monkeypatch.setattr(look_ahead, "_TOLERANCE", 1e-12)
+    monkeypatch.setattr(look_ahead, "_MOST_SOLVES", 200)
+    steps = solve(paper_joint(0.08, 3, pin=pin, analysis={"kinematics": "reference"})).steps
+    assert [m.iterations for m in steps] == [1, 1, 1]
+
+
+def test_an_old_factorisation_preconditions_as_well(monkeypatch):
+    """Large elastic joints keep the first factorisation of a step."""
+    monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
+    scene = paper_joint(0.1, 3)
+    usual = solve(scene)
+    monkeypatch.setattr(lagged, "_MANY_DOFS", 0)
+    kept = solve(scene)
+    assert kept.joint.equilibrium.tangent.factorisations < usual.joint.equilibrium.tangent.factorisations
+    for a, b in zip(kept.steps, usual.steps, strict=True):
+        assert (a.P, a.p0, a.eps) == pytest.approx((b.P, b.p0, b.eps), rel=1e-8)
