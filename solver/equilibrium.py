@@ -21,7 +21,7 @@ from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.drives import Drives
 from archord.solver.interrupt import Interrupt, Interrupted
-from archord.solver.linear.bordered import Bordered
+from archord.solver.linear.bordered import Border, Bordered
 from archord.solver.linear.choose import choose
 from archord.solver.linear.strategy import Facts
 from archord.solver.problem import Problem
@@ -40,7 +40,7 @@ class Equilibrium:
     def __init__(self, problem: Problem, bulk: Bulk, contact: Contact, timer: Timer) -> None:
         self.problem, self.bulk, self.contact, self.timer = problem, bulk, contact, timer
         self.V, self.comm, V = bulk.V, bulk.V.mesh.comm, bulk.V
-        self.interrupt, self.u = Interrupt(), fem.Function(V, name="displacement")
+        self.interrupt, self.u, self._increment = Interrupt(), fem.Function(V, name="displacement"), fem.Function(V)
         self.load, index_map = 0.0, V.dofmap.index_map
         self.n_owned, self.n_local = index_map.size_local, index_map.size_local + index_map.num_ghosts
         self._stiffest = max(float(body.material.elastic_tangent[0, 0]) for body in problem.bodies)
@@ -118,7 +118,7 @@ class Equilibrium:
         drives = self.drives
         lacking: Array = np.zeros(0)
         if self.border:
-            self.levels[drives.unknown] = drives.weight * self.border.levels(x)
+            self.levels[drives.unknown] = drives.weight * self.border.last.levels(x)
         self.u.x.array[self.fixed.ravel()] = self.levels @ self._rate_of_fixed
         self.evaluate()
         renewed = self._follow_pattern()
@@ -157,6 +157,38 @@ class Equilibrium:
         self.noise = 1e-13 * self._stiffest * min(largest, self.problem.travel) + contact_noise
         if totals[2]:
             raise Interrupted(self.comm.allreduce(self.interrupt.received, op=MPI.MAX))
+
+    def revised(self, increment: Array) -> tuple[PETSc.Mat, Array] | None:
+        """Go over to the points that touch and stick after an ``increment`` of this rank's unknowns: another matrix for
+        them, valid until the next one, and what they add to the residual; None if no point changes. Collective."""
+        n, levels = 2 * self.n_owned, np.zeros_like(self.levels)
+        if self.border:
+            levels[self.drives.unknown] = self.drives.weight * self.comm.bcast(increment[n:])
+        with self.timer("contact"):
+            u = self._increment.x
+            u.array[:n] = increment[:n]
+            u.scatter_forward()
+            u.array[self.fixed.ravel()] = levels @ self._rate_of_fixed
+            before = self._contact_residual()
+            if not self.contact.anticipate(u.array.reshape(-1, 2), levels):
+                return None
+            change = self._contact_residual() - before
+        matrix, blocks = self.tangent.revised()
+        if self.border:
+            matrix = Border(matrix, *self.tangent.border(blocks)).matrix()
+        return matrix, change
+
+    def _contact_residual(self) -> Array:
+        """The contact's part of the residual at this rank's unknowns."""
+        force, drives = np.zeros((self.n_owned, 2)), self.drives
+        self.contact.add_force(force)
+        free = np.where(self.fixed[: self.n_owned], 0.0, force).ravel()
+        if not self.border:
+            return free
+        rates = drives.unknown_rate[:, : self.n_owned].reshape(len(drives.weight), -1)
+        on_rigid = np.broadcast_to(self.contact.force_on_drives(), self.levels.shape)[drives.unknown]
+        on_levels = self.comm.allreduce(rates @ (force.ravel() - free)) + drives.weight * on_rigid
+        return np.append(free, on_levels[: self.border.last.extra])
 
     def _where_free(self) -> Array:
         """The forces of the last evaluation ``(n_owned, 2)`` where displacements are not prescribed, zero elsewhere."""

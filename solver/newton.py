@@ -58,7 +58,7 @@ class NewtonSolver:
         self.equilibrium, problem = equilibrium, equilibrium.problem
         self.tolerance, self.max_iterations = problem.tolerance, problem.max_iterations
         self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
-        self._ahead = LookAhead(equilibrium.tangent.revised) if equilibrium.choice.uses("look_ahead") else None
+        self._ahead = LookAhead(equilibrium.revised) if equilibrium.choice.uses("look_ahead") else None
         self._x = equilibrium.vector()
         self._raised: BaseException | None = None
         with equilibrium.timer(BEFORE_SOLVING):
@@ -101,8 +101,12 @@ class NewtonSolver:
         ksp.getPC().setReusePreconditioner(self._reuse)
 
     def _after_solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        if self._ahead is not None and ksp.getConvergedReason() > 0:
-            self._ahead.improve(b, x, self._linear.matrix)
+        border = self.equilibrium.border
+        if self._ahead is None or ksp.getConvergedReason() < 0 or (border and border.singular is not None):
+            return
+        self._ahead.improve(b, x, self._linear.matrix)
+        if border:
+            border.singular = None  # vectors that FGMRES tries say nothing of it
 
     def _guarded(self, callback: Callable) -> Callable:
         """Keep what ``callback``, a method, raises, which PETSc would turn into an error number. It does not keep this
@@ -133,6 +137,8 @@ class NewtonSolver:
         self._renewed, self._reuse = True, False  # the last factorisation is of another matrix
         if at.border:
             at.border.singular = None
+        if self._ahead is not None:
+            self._ahead.given_up = False
         if guess is not None:
             at.pack(guess, self._x)
             at.contact.search()

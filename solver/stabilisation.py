@@ -18,7 +18,6 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.solver.bulk import assemble, matrix
 from archord.solver.contact.contact import Contact
-from archord.solver.contact.surface import RigidSurface
 from archord.solver.contact.tangent import trial_rate
 from archord.solver.drives import MOVABLE, Drives
 
@@ -103,9 +102,8 @@ class RigidMotions:
         r, pressed, openings = len(self.free), 0.0, []
         force, stiffness = np.zeros(r), np.zeros((r, r))
         for pair in self.contact.pairs:
-            opening = np.stack([-trial_rate(pair, motion) / pair.gamma for motion in self.free], axis=2)
-            if isinstance(pair.opposite, RigidSurface):
-                opening -= pair.frame @ (self.levels @ pair.opposite.rate).T
+            rates = [trial_rate(pair, *motion) for motion in zip(self.free, self.levels, strict=True)]
+            opening = -np.stack(rates, axis=2) / pair.gamma[..., None]
             weight = pair.share * pair.surface.weight.ravel()
             force += np.einsum("m,mi,mik->k", weight, pair.traction, opening)
             stiff = (weight[:, None] * pair.gamma)[:, None] * pair.derivative

@@ -43,7 +43,7 @@ class TangentMatrix:
         parts.append((2 * self._size + np.arange(len(rigid)), rigid))
         self._prescribed, self._rates = (np.concatenate(column) for column in zip(*parts, strict=True))
         self.factorisations = 0
-        self.A = self._elastic = self._ahead = PETSc.Mat()
+        self.A = self._elastic = self._revised = PETSc.Mat()
         self.condensed: Condensed | None = None
         if condense:
             self.A = self._allocated()
@@ -72,7 +72,7 @@ class TangentMatrix:
             return
         self.A.destroy()
         self._elastic.destroy()
-        self._ahead.destroy()
+        self._revised.destroy()
         rows, columns = self.contact.pattern()
         mine = (rows >= self._start) & (rows < self._start + self._n)
         rows, columns = rows[mine], columns[mine]
@@ -123,41 +123,21 @@ class TangentMatrix:
                 self.factorisations = 1
                 self.condensed.update(self._contact_blocks[self._in_matrix] * self._free[self._in_matrix])
 
-    def _revise(self, u: Array) -> Array | None:
-        """Go over to the points that an increment ``u`` ``(n_local, 2)`` would close: the change of the residual
-        ``(n_owned, 2)``; None if no point changes."""
-        with self.timer("contact"):
-            change = -self._contact_force()
-            return change + self._contact_force() if self.contact.anticipate(u) else None
-
     def _revise_condensed(self, increment: Array) -> Array | None:
-        """`_revise` by ``increment`` ``(k, 2)`` of the nodes near the contact: the change at those of the contact ``(m,
-        2)``, with the matrix up to date."""
+        """Go over to the points that ``increment`` ``(k, 2)`` of the nodes near the contact would close: the change of
+        the residual ``(m, 2)`` at those of the contact, with the matrix up to date; None if no point changes."""
         assert self.condensed is not None
-        index_map = self.V.dofmap.index_map
-        u = np.zeros((self._n + index_map.num_ghosts, 2))
-        here = index_map.global_to_local(self.condensed.near)
-        u[here[here >= 0]] = increment[here >= 0]
-        change = self._revise(u)
-        if change is None:
-            return None
+        with self.timer("contact"):
+            index_map = self.V.dofmap.index_map
+            u = np.zeros((self._n + index_map.num_ghosts, 2))
+            here = index_map.global_to_local(self.condensed.near)
+            u[here[here >= 0]] = increment[here >= 0]
+            before = self._contact_force()
+            if not self.contact.anticipate(u, np.zeros(len(self.drives.rate))):
+                return None
+            change = self._contact_force() - before
         self.update()
         return self.condensed.at_nodes(change)
-
-    def revised(self, increment: Array) -> tuple[PETSc.Mat, Array] | None:
-        """`_revise` by ``increment`` ``(n_owned, 2)``: another matrix for the points that touch and stick then, valid
-        until the next one, and the change."""
-        self._direction.x.array[: 2 * self._n] = increment.ravel()
-        self._direction.x.scatter_forward()
-        change = self._revise(self._direction.x.array.reshape(-1, 2))
-        if change is None:
-            return None
-        with self.timer("assemble contact"):
-            if not self._ahead:
-                self._ahead = self.A.duplicate()
-            self.A.copy(self._ahead, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            self._add_contact(self._ahead, self.contact.tangent.blocks() - self._contact_blocks)
-        return self._ahead, change
 
     def _contact_force(self) -> Array:
         """The contact's part of the residual ``(n_owned, 2)``."""
@@ -165,11 +145,23 @@ class TangentMatrix:
         self.contact.add_force(force)
         return np.where(self._fixed, 0.0, force)
 
-    def border(self) -> tuple[Array, Array, Array]:
-        """Derivatives of the residual with respect to the unknown levels ``(n_owned dofs, m)``, of what these prescribe
+    def revised(self) -> tuple[PETSc.Mat, Array]:
+        """``A`` for the points that touch and stick now, beside that of the last `update` and valid until the next
+        call; and the contact's blocks."""
+        with self.timer("assemble contact"):
+            blocks = self.contact.tangent.blocks()
+            if not self._revised:
+                self._revised = self.A.duplicate()
+            self.A.copy(self._revised, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            self._add_contact(self._revised, blocks - self._contact_blocks)
+        return self._revised, blocks
+
+    def border(self, blocks: Array | None = None) -> tuple[Array, Array, Array]:
+        """With the contact's ``blocks``, else those of the last `update`: derivatives of the residual with respect to the unknown levels ``(n_owned dofs, m)``, of what these prescribe
         with respect to the displacements, alike, and with respect to the levels ``(m, m)``, of all ranks. The bulk's of
         both are the same where its tangent is symmetric, as of all materials without recovery of back stresses."""
-        drives, tangent, blocks = self.drives, self.contact.tangent, self._contact_blocks
+        drives, tangent = self.drives, self.contact.tangent
+        blocks = self._contact_blocks if blocks is None else blocks
         m, free = len(drives.unknown), ~self._fixed.ravel()
         load, rate = drives.unknown_load.reshape(m, -1), drives.unknown_rate[:, : self._n].reshape(m, -1)
         on_rows = np.einsum("nij,njm->nim", blocks, self._column_rate)

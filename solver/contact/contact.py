@@ -91,11 +91,12 @@ class Contact:
             self.tangent = ContactTangent(self._reaches)
         return grew
 
-    def anticipate(self, u: Array) -> bool:
-        """Open and close points as ``u`` ``(n, 2)`` would, to first order, with the partners and rigid surfaces they
-        have; returns whether any does. Closed points carry their trial pressure, even a tension. Collective."""
+    def anticipate(self, u: Array, levels: Array) -> bool:
+        """Open and close points as increments ``u`` ``(n, 2)``, and those of the drives' ``levels`` ``(d,)``, would, to
+        first order, with the partners they have; returns whether any does. Closed points carry their trial pressure,
+        even a tension. Collective."""
         for pair in self.pairs:
-            pair.expect(trial_rate(pair, u))
+            pair.expect(trial_rate(pair, u, levels))
         return self.comm.allreduce(sum(pair.changes for pair in self.pairs)) > 0
 
     def round_off(self) -> float:

@@ -44,13 +44,14 @@ class ContactTangent:
         return values
 
 
-def trial_rate(pair: Pair, u: Array) -> Array:
-    """What displacements ``u`` ``(n, 2)`` add to the trial tractions ``(m, 2)``, linearised at the last evaluation:
-    points keep their partners, and a rigid opposite stands still. Collective."""
-    motion = pair.opposite.curve_displacement(u) if isinstance(pair.opposite, Surface) else np.zeros((1, 2))
-    own, opposite = u[pair.surface.cell_dofs], motion[pair.projection.nodes]
+def trial_rate(pair: Pair, u: Array, levels: Array) -> Array:
+    """What displacements ``u`` ``(n, 2)``, and a rigid opposite moved by ``levels`` ``(d,)`` of the drives, add to the
+    trial tractions ``(m, 2)``, linearised at the last evaluation: points keep their partners. Collective."""
+    opposite = pair.opposite
+    motion = opposite.curve_displacement(u) if isinstance(opposite, Surface) else levels[None] @ opposite.rate
+    own, partner = u[pair.surface.cell_dofs], motion[pair.projection.nodes]
     rate = np.empty_like(pair.trial)
-    library(_SOURCE).trial_rate(_points(pair), *map(pointer, (own, opposite, rate)))
+    library(_SOURCE).trial_rate(_points(pair), *map(pointer, (own, partner, rate)))
     return rate
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 from petsc4py import PETSc
 
 from archord.geometry.basis import Array
@@ -18,25 +19,23 @@ from archord.solver.linear.strategy import Facts
 
 MOST_REVISIONS = 2  # of the points in one solve: more cost what the iterations cost that they save
 _TOLERANCE = 1e-3  # residual of a system over its right-hand side
-_MOST_SOLVES = 40  # with the factorisation, for one revision
+_MOST_SOLVES = 10  # with the factorisation, for one revision: more cost what a factorisation does
 
 Revise = Callable[[Array], tuple[PETSc.Mat, Array] | None]
 
 
 def why_not(facts: Facts) -> str | None:
     """Why points are not asked again."""
-    if facts.by_force:
-        return "displacements of drives are unknown"
     return "there is no contact, or one with a law that never opens" if facts.gamma_factor is None else None
 
 
 class LookAhead:
-    """``revise(increment)`` goes over to the points that touch and stick after an ``increment`` ``(n_owned, 2)`` of the
-    displacements, and returns the matrix for them with what they add to the residual ``(n_owned, 2)``; None for no
-    change. Collective."""
+    """``revise(increment)`` goes over to the points that touch and stick after an ``increment`` of this rank's unknowns
+    ``(n,)``, and returns the matrix for them with what they add to the residual ``(n,)``; None for no change.
+    Collective."""
 
     def __init__(self, revise: Revise) -> None:
-        self._revise = revise
+        self._revise, self.given_up = revise, False
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` precondition."""
@@ -49,11 +48,16 @@ class LookAhead:
 
     def improve(self, r: PETSc.Vec, x: PETSc.Vec, A: PETSc.Mat) -> None:
         """Replace ``x``, the solution of ``A x = r``, by that of the system revised, of Newton's step ``-x``."""
+        if self.given_up or not np.isfinite(x.norm()):
+            return
         r = r.copy()
         for _ in range(MOST_REVISIONS):
-            revised = self._revise(-x.array_r.reshape(-1, 2))
+            revised = self._revise(-x.array_r)
             if revised is None:
                 break
-            r.array[:] += revised[1].ravel()
+            r.array[:] += revised[1]
             self._ksp.setOperators(revised[0], A)
             self._ksp.solve(r, x)
+            if self._ksp.getIterationNumber() >= _MOST_SOLVES:
+                self.given_up = True
+                break

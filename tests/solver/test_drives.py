@@ -163,7 +163,7 @@ def test_the_bordered_tangent_is_the_derivative_of_the_residual():
     free = np.append(~equilibrium.fixed.ravel(), np.ones(n - equilibrium.fixed.size, dtype=bool))
     for _ in range(3):
         direction.array[:] = rng.normal(size=n) * free
-        equilibrium.border.mult(None, direction, product)
+        equilibrium.border.last.mult(None, direction, product)
         sides = []
         for h in (1e-7, -1e-7):
             at.array[:] = x.array_r + h * direction.array_r
