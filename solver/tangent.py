@@ -157,9 +157,10 @@ class TangentMatrix:
         return self._revised, blocks
 
     def border(self, blocks: Array | None = None) -> tuple[Array, Array, Array]:
-        """With the contact's ``blocks``, else those of the last `update`: derivatives of the residual with respect to the unknown levels ``(n_owned dofs, m)``, of what these prescribe
-        with respect to the displacements, alike, and with respect to the levels ``(m, m)``, of all ranks. The bulk's of
-        both are the same where its tangent is symmetric, as of all materials without recovery of back stresses."""
+        """Derivatives of the residual with respect to the unknown levels ``(n_owned dofs, m)``, of what these prescribe
+        with respect to the displacements, alike, and with respect to the levels ``(m, m)``, of all ranks; with the
+        contact's ``blocks``, else those of the last `update`. The bulk's of the first two are the same where its
+        tangent is symmetric, as of all materials without recovery of back stresses."""
         drives, tangent = self.drives, self.contact.tangent
         blocks = self._contact_blocks if blocks is None else blocks
         m, free = len(drives.unknown), ~self._fixed.ravel()
