@@ -7,11 +7,14 @@ from archord.benchmarks.case import paper_joint
 from archord.solver.linear import choose, lagged, look_ahead
 from tests.solver.solving import solve
 
+FORCE = {"displacement": None, "relative_force": 0.01}
 SCENES = {
     "yielding": paper_joint(0.08, 10, 0.002),
     "friction": paper_joint(0.08, 4, 0.002, analysis={"friction": 0.3}),
     "large strain": paper_joint(0.08, 4, analysis={"strain": "large"}),
     "rigid pin": paper_joint(0.08, 4, 0.002, pin={"rigid": True}),
+    "by force": paper_joint(0.08, 4, load=FORCE),
+    "rigid pin by force": paper_joint(0.08, 4, pin={"rigid": True}, load=FORCE),
     "released": paper_joint(0.1, 1, 0.002, load={"displacement": [1.5, 1.0, 0.2]}),
 }
 
@@ -29,14 +32,15 @@ def test_the_states_are_those_without_it_in_fewer_iterations(name, comm, monkeyp
     assert sum(m.iterations for m in short.steps) < 0.9 * sum(m.iterations for m in long.steps)
 
 
+@pytest.mark.parametrize("load", [{}, FORCE], ids=["moved", "pressed"])
 @pytest.mark.parametrize("pin", [{}, {"rigid": True}], ids=["deformable", "rigid"])
-def test_what_is_linear_but_for_the_contact_takes_one_iteration(pin, monkeypatch):
+def test_what_is_linear_but_for_the_contact_takes_one_iteration(pin, load, monkeypatch):
     """Elastic bodies and fixed partners, where all points that change are found and systems are solved to the end."""
     monkeypatch.setattr(choose, "LEFT_OUT", {"condensed"})
     monkeypatch.setattr(look_ahead, "MOST_REVISIONS", 20)
     monkeypatch.setattr(look_ahead, "_TOLERANCE", 1e-12)
     monkeypatch.setattr(look_ahead, "_MOST_SOLVES", 200)
-    steps = solve(paper_joint(0.08, 3, pin=pin, analysis={"kinematics": "reference"})).steps
+    steps = solve(paper_joint(0.08, 3, pin=pin, load=load, analysis={"kinematics": "reference"})).steps
     assert [m.iterations for m in steps] == [1, 1, 1]
 
 
