@@ -23,9 +23,6 @@ with suppress(TypeError, ValueError):  # a handler of another language, or not t
     # Python's own again, which raises BrokenPipeError: dolfinx starts PETSc, whose handler ends the process with a page
     signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
 
-# sums in an order that depends on where memory lies: the same scene would not give the same last digits
-PETSc.Options()["vec_mdot_use_gemv"] = PETSc.Options()["vec_maxpy_use_gemv"] = False
-
 _REASONS = vars(PETSc.SNES.ConvergedReason)
 RESIDUAL_NOT_FINITE = _REASONS.get("DIVERGED_FNORM_NAN", _REASONS.get("DIVERGED_FUNCTION_NANORINF"))  # until PETSc 3.24
 _KINDS = hasattr(Geometry, "dofmaps")  # of cells, of which dolfinx from 0.11 on may have several in a mesh

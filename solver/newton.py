@@ -59,6 +59,8 @@ class NewtonSolver:
         self.tolerance, self.max_iterations = problem.tolerance, problem.max_iterations
         self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
         self._ahead = LookAhead(equilibrium.revised) if equilibrium.choice.uses("look_ahead") else None
+        for sums in ("vec_mdot_use_gemv", "vec_maxpy_use_gemv"):  # in an order that depends on where memory lies
+            PETSc.Options()[sums] = False
         self._x = equilibrium.vector()
         self._raised: BaseException | None = None
         with equilibrium.timer(BEFORE_SOLVING):

@@ -58,14 +58,15 @@ class Recovery:
         return converged
 
     def _solve_at_once(self, guess: Array, afar: bool) -> bool:
-        """Solve from ``guess``; one from ``afar`` is too stiff for a line search, which creeps there, and may yield far
-        too much: points come first that cannot yield (further). Where friction makes it fail, it is left out first."""
+        """Solve from ``guess``; one from ``afar`` is too stiff for a line search, which creeps there, as at large strain,
+        and may yield far too much: points come first that cannot yield (further). Where friction makes it fail, it is
+        left out first."""
         yielding = self.equilibrium.plastic_points()
         sliding = [pair.points for pair in self.equilibrium.contact.pairs if pair.law.has_friction]
         yields = self.equilibrium.comm.allreduce(len(yielding)) > 0
         if yields and afar:
             guess = self._simplified(yielding, guess)
-        return self._solve_either_way(guess, full_steps=afar and not yields) or (
+        return self._solve_either_way(guess, full_steps=(afar or self.equilibrium.bulk.finite) and not yields) or (
             bool(sliding) and self._solve_either_way(self._simplified(yielding * afar + sliding, guess))
         )
 
