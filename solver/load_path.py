@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from archord.solver.coarse_start import CoarseStart
 
 _STRAIGHT = 1e-6  # part of a step that may lie beside the line of the last one
+_AS_GOOD = 2.0  # residual of an extrapolated guess over that of a coarse start, below which it serves as well
 _PREDICTOR_LIMIT = 4.0  # an increment is not extrapolated to more than this many times its length
 
 
@@ -37,10 +38,11 @@ class Position:
 class LoadPath:
     """The path that ``solver``'s equilibrium follows from the position ``at``, from the beginning if absent.
 
-    The guess for a step is, where there is a ``coarse`` start, what a coarser mesh found. Else it extrapolates the last
-    increment; where that fails elastic bodies start from the last state itself. Where the path starts or turns, or
-    another drive takes over, the guess comes from the elastic solution, at the start from ``first_guess(load)``. The
-    increment from a state without equilibrium (a press fit), or of loose bodies, says nothing about the next.
+    The guess for a step extrapolates the last increment; where that fails elastic bodies start from the last state
+    itself. Where the path starts or turns, or another drive takes over, the guess comes from the elastic solution, at
+    the start from ``first_guess(load)``. The increment from a state without equilibrium (a press fit), or of loose
+    bodies, says nothing about the next. Where there is a ``coarse`` start, what a coarser mesh found comes first,
+    unless extrapolation leaves a residual of the same size or less.
     """
 
     def __init__(
@@ -57,11 +59,21 @@ class LoadPath:
     def _guesses(self, load: float) -> Iterator[tuple[Array, bool]]:
         """Guesses for a step to ``load``, and whether to find the elastic solution from there first."""
         self.coarse_iterations = 0
+        ahead = None
         if self.coarse is not None:
             ahead = self.coarse.increment(load)
             self.coarse_iterations = self.coarse.iterations
-            if ahead is not None:
-                yield self.state + ahead, False
+        guesses = list(self._own_guesses(load))
+        if ahead is not None:
+            of_coarse, own = self.state + ahead, guesses[0]
+            off = self.solver.newton.residual_norm
+            extrapolates = self.at.increment is not None and not own[1]
+            later = extrapolates and off(own[0]) < _AS_GOOD * off(of_coarse)
+            guesses.insert(1 if later else 0, (of_coarse, False))
+        yield from guesses
+
+    def _own_guesses(self, load: float) -> Iterator[tuple[Array, bool]]:
+        """Those without a coarse start."""
         if self.at.increment is None:
             yield self._first_guess(load), True
             return

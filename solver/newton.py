@@ -164,6 +164,17 @@ class NewtonSolver:
             result.worst = at.worst_place()
         return result
 
+    def residual_norm(self, guess: Array) -> float:
+        """The norm of the residual at ``guess``, as `solve` takes it; infinite where a contact point finds no partner."""
+        at, f = self.equilibrium, self._x.duplicate()
+        at.pack(guess, self._x)
+        at.contact.search()
+        try:
+            at.residual_of(self._x, f)
+        except ProjectionError:
+            return np.inf
+        return float(f.norm())
+
     def _residual(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         """The residual ``f`` at the unknowns ``x``, not a number where a contact point finds no partner."""
         self._result.evaluations += 1
