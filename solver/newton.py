@@ -165,7 +165,7 @@ class NewtonSolver:
         return result
 
     def residual_norm(self, guess: Array) -> float:
-        """The norm of the residual at ``guess``, as `solve` takes it; infinite where a contact point finds no partner."""
+        """The norm of the residual at a ``guess`` for `solve`; infinite where a contact point finds no partner."""
         at, f = self.equilibrium, self._x.duplicate()
         at.pack(guess, self._x)
         at.contact.search()

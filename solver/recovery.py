@@ -58,9 +58,9 @@ class Recovery:
         return converged
 
     def _solve_at_once(self, guess: Array, afar: bool) -> bool:
-        """Solve from ``guess``; one from ``afar`` is too stiff for a line search, which creeps there (as it does at large
-        strain), and may yield far too much: points come first that cannot yield (further). Where friction makes it
-        fail, it is left out first."""
+        """Solve from ``guess``; one from ``afar`` is too stiff for a line search, which creeps there, and may yield far
+        too much: points come first that cannot yield (further). Elastic bodies at large strain are too stiff for it
+        everywhere. Where friction makes it fail, it is left out first."""
         yielding = self.equilibrium.plastic_points()
         sliding = [pair.points for pair in self.equilibrium.contact.pairs if pair.law.has_friction]
         yields = self.equilibrium.comm.allreduce(len(yielding)) > 0
