@@ -42,7 +42,7 @@ class LoadPath:
     itself. Where the path starts or turns, or another drive takes over, the guess comes from the elastic solution, at
     the start from ``first_guess(load)``. The increment from a state without equilibrium (a press fit), or of loose
     bodies, says nothing about the next. Where there is a ``coarse`` start, what a coarser mesh found comes first,
-    unless extrapolation leaves a residual of the same size or less.
+    unless bodies yield and extrapolation leaves a residual of the same size or less.
     """
 
     def __init__(
@@ -66,9 +66,8 @@ class LoadPath:
         guesses = list(self._own_guesses(load))
         if ahead is not None:
             of_coarse, own = self.state + ahead, guesses[0]
-            off = self.solver.newton.residual_norm
-            extrapolates = self.at.increment is not None and not own[1]
-            later = extrapolates and off(own[0]) < _AS_GOOD * off(of_coarse)
+            off, plastic = self.solver.newton.residual_norm, self.solver.equilibrium.bulk.plastic
+            later = plastic and not own[1] and off(own[0]) < _AS_GOOD * off(of_coarse)
             guesses.insert(1 if later else 0, (of_coarse, False))
         yield from guesses
 

@@ -50,14 +50,16 @@ class LookAhead:
         """Replace ``x``, the solution of ``A x = r``, by that of the system revised, of Newton's step ``-x``."""
         if self.given_up or not np.isfinite(x.norm()):
             return
-        r = r.copy()
+        r, better = r.copy(), x.copy()
         for _ in range(MOST_REVISIONS):
             revised = self._revise(-x.array_r)
             if revised is None:
                 break
             r.array[:] += revised[1]
             self._ksp.setOperators(revised[0], A)
-            self._ksp.solve(r, x)
-            if self._ksp.getIterationNumber() >= _MOST_SOLVES:
-                self.given_up = True
+            self._ksp.solve(r, better)
+            if np.isfinite(better.norm()):
+                better.copy(x)
+            self.given_up = self._ksp.getConvergedReason() < 0
+            if self.given_up:
                 break
