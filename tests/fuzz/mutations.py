@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from random import Random
 from typing import Any, get_args
@@ -49,6 +50,7 @@ _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?(?![\w.])")
 _VALUE = re.compile(r"(?<= = )[^#\n]+")
 
 
+@cache
 def base_scenes() -> dict[str, str]:
     """The repository's scenes, the printed examples, and the scenes of `GENERAL` with what presets stand for, by name,
     on coarse meshes and in two steps."""
