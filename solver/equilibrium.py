@@ -55,8 +55,9 @@ class Equilibrium:
         dofs, by_force = 2 * index_map.size_global, len(drives.unknown) > 0
         gamma = contact.gamma_factor if closing else None
         facts = Facts(
-            self.comm, dofs, bulk.plastic, bulk.finite, by_force, gamma, lambda: all(map(drives.held, problem.bodies))
-        )
+            self.comm, dofs, bulk.plastic, contact.has_friction, bulk.finite, by_force, gamma,
+            lambda: all(map(drives.held, problem.bodies)),
+        )  # fmt: skip
         self.choice = choose(facts)
         self._factoriser = partial(self.choice.factoriser, V)  # of tangents of all displacements
         condense = self.choice.uses("condensed")

@@ -13,14 +13,15 @@ from petsc4py import PETSc
 
 @dataclass(frozen=True)
 class Facts:
-    """Of a problem: its ``dofs`` on all ranks of ``comm``; whether bodies ``yields``, or are at large strain as
-    ``finite``; whether levels of drives are unknown, as ``by_force``; ``gamma_factor``, the largest of its unilateral
-    interactions, None without one or with others; and ``held()``, whether supports alone keep every body from moving
-    rigidly (collective)."""
+    """Of a problem: its ``dofs`` on all ranks of ``comm``; whether bodies ``yields``, surfaces have ``friction``, or
+    strains are large, as ``finite``; whether levels of drives are unknown, as ``by_force``; ``gamma_factor``, the
+    largest of its unilateral interactions, None without one or with others; and ``held()``, whether supports alone keep
+    every body from moving rigidly (collective)."""
 
     comm: MPI.Comm
     dofs: int
     yields: bool
+    friction: bool
     finite: bool
     by_force: bool
     gamma_factor: float | None

@@ -108,7 +108,7 @@ def test_a_restarted_run_remembers_the_continuation_in_gamma(tmp_path):
     go_on(problem, tmp_path / "halted")
     whole, halted = (read_history(tmp_path / name / "history.csv") for name in ("whole", "halted"))
     assert whole["iterations"] == halted["iterations"]
-    assert whole["iterations"][-1] > 15  # more than one solve's: it was raised
+    assert whole["iterations"][-1] > 25  # more than one solve's: it was raised
     assert halted["P"] == pytest.approx(whole["P"], rel=1e-9)
 
 

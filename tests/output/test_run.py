@@ -128,14 +128,14 @@ def test_the_resolved_scene_gives_the_same_numbers(run, tmp_path):
 
 
 def test_a_stopped_run_keeps_its_accepted_steps_and_says_why(tmp_path):
-    """Two of ten steps, then no convergence: both readable; run.json has the residuals and active-set changes of
-    every attempt at the third."""
-    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 4}, stepping={"minimum": 1.0})
+    """Four of ten steps, then no convergence: all four readable; run.json has the residuals and active-set changes of
+    every attempt at the fifth."""
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6}, stepping={"minimum": 1.0})
     assert solve_scene(problem, tmp_path, MPI.COMM_SELF).status == "stopped"
-    assert accepted_steps(tmp_path) == 2
+    assert accepted_steps(tmp_path) == 4
     report = json.loads((tmp_path / "run.json").read_text())
     assert report["status"] == "stopped"
-    assert "no equilibrium at delta = 0.003" in report["message"]
+    assert "no equilibrium at delta = 0.005" in report["message"]
     failed = report["failed_step"]
     assert failed["cutbacks"] == len([a for a in failed["attempts"] if not a["converged"]]) == 1
     last = failed["attempts"][-1]

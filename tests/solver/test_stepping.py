@@ -40,11 +40,11 @@ def test_a_failed_step_leaves_no_trace():
 
 def test_a_solve_that_cannot_go_on_says_where_and_why():
     """The message holds delta, the reason, the residual and its place; accepted steps were reported before."""
-    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 4})
+    problem = scene(0.08, 10, yield_stress=0.002, analysis={"max_iterations": 6})
     joint, accepted = Joint(problem, MPI.COMM_SELF), []
     targets = problem.targets
     with pytest.raises(
-        StepFailure, match=r"no equilibrium at delta = 0\.003: no convergence .* residual at \(.*no smaller"
+        StepFailure, match=r"no equilibrium at delta = 0\.005: no convergence .* residual at \(.*no smaller"
     ):
         march(
             joint.load_path(),
@@ -52,7 +52,7 @@ def test_a_solve_that_cannot_go_on_says_where_and_why():
             rules=StepRules(minimum=1.0),
             target_done=lambda step, position: accepted.append(step.load),
         )
-    assert accepted == targets[:2]
+    assert accepted == targets[:4]
 
 
 def test_one_large_step_finds_the_plastic_state():

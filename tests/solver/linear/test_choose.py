@@ -13,7 +13,7 @@ from archord.solver.linear.choose import choose
 from archord.solver.linear.strategy import Facts
 from tests.solver.solving import MUMPS_FROM_C
 
-ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, False, 0.5, lambda: True)
+ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, False, False, 0.5, lambda: True)
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,8 @@ ELASTIC = Facts(MPI.COMM_SELF, 5000, False, False, False, 0.5, lambda: True)
         ({}, "condensed"),
         ({"dofs": 10_000}, "look_ahead + direct"),
         ({"dofs": 50_000}, "lagged + look_ahead + direct"),
-        ({"yields": True, "dofs": 50_000}, "look_ahead + direct"),
+        ({"yields": True, "dofs": 50_000}, "direct"),
+        ({"yields": True, "friction": True}, "look_ahead + direct"),
         ({"finite": True}, "look_ahead + direct"),
         ({"finite": True, "dofs": 50_000}, "lagged + look_ahead + direct"),
         ({"by_force": True}, "bordered + look_ahead + direct"),
