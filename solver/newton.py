@@ -58,7 +58,8 @@ class NewtonSolver:
         self.equilibrium, problem = equilibrium, equilibrium.problem
         self.tolerance, self.max_iterations = problem.tolerance, problem.max_iterations
         self._lagged = Lagged() if equilibrium.choice.uses("lagged") else None
-        self._ahead = LookAhead(equilibrium.revised) if equilibrium.choice.uses("look_ahead") else None
+        looks, yields = equilibrium.choice.uses("look_ahead"), equilibrium.bulk.plastic
+        self._ahead = LookAhead(equilibrium.revised, yields=yields) if looks else None
         for sums in ("vec_mdot_use_gemv", "vec_maxpy_use_gemv"):  # in an order that depends on where memory lies
             PETSc.Options()[sums] = False
         self._x = equilibrium.vector()

@@ -19,7 +19,8 @@ from archord.solver.linear.strategy import Facts
 
 MOST_REVISIONS = 2  # of the points in one solve: more cost what the iterations cost that they save
 _TOLERANCE = 1e-3  # residual of a system over its right-hand side
-_MOST_SOLVES = 10  # with the factorisation, for one revision: more cost what a factorisation does
+_MOST_SOLVES = 40  # with the factorisation, for one revision: nearly incompressible bodies need most
+_MOST_SOLVES_YIELDING = 10  # where bodies yield: what the linearised system says holds less far there
 
 Revise = Callable[[Array], tuple[PETSc.Mat, Array] | None]
 
@@ -33,20 +34,21 @@ def why_not(facts: Facts) -> str | None:
 
 class LookAhead:
     """``revise(increment)`` goes over to the points that touch and stick after an ``increment`` of this rank's unknowns
-    ``(n,)``, and returns the matrix for them with what they add to the residual ``(n,)``; None for no change.
-    Collective."""
+    ``(n,)``, and returns the matrix for them with what they add to the residual ``(n,)``; None for no change. Whether
+    bodies may yield is ``yields``. Collective."""
 
-    def __init__(self, revise: Revise) -> None:
+    def __init__(self, revise: Revise, *, yields: bool) -> None:
         self._revise, self.given_up = revise, False
+        self._most_solves = _MOST_SOLVES_YIELDING if yields else _MOST_SOLVES
 
     def attach(self, ksp: PETSc.KSP) -> None:
         """Let ``ksp`` precondition."""
         self._ksp = PETSc.KSP().create(ksp.comm)
         self._ksp.setType("fgmres")
-        self._ksp.setGMRESRestart(_MOST_SOLVES)
+        self._ksp.setGMRESRestart(self._most_solves)
         self._ksp.setPC(ksp.getPC())
         self._ksp.setInitialGuessNonzero(True)
-        self._ksp.setTolerances(rtol=_TOLERANCE, max_it=_MOST_SOLVES)
+        self._ksp.setTolerances(rtol=_TOLERANCE, max_it=self._most_solves)
 
     def improve(self, r: PETSc.Vec, x: PETSc.Vec, A: PETSc.Mat) -> None:
         """Replace ``x``, the solution of ``A x = r``, by that of the system revised, of Newton's step ``-x``."""
