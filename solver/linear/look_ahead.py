@@ -28,7 +28,7 @@ Revise = Callable[[Array], tuple[PETSc.Mat, Array] | None]
 def why_not(facts: Facts) -> str | None:
     """Why points are not asked again."""
     if facts.yields and not facts.friction:
-        return "bodies yield without friction: it takes as long as the iterations that it saves"
+        return "bodies yield without friction: it would take as long as the iterations that it saves"
     return "there is no contact, or one with a law that never opens" if facts.gamma_factor is None else None
 
 
