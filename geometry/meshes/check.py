@@ -14,10 +14,13 @@ from scipy.spatial import cKDTree
 from archord.geometry.basis import Array, bulk_quadrature, cell_kind, tabulate
 from archord.geometry.curve import Curve, circle_through
 from archord.geometry.meshes.fenicsx import gathered
+from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.plane_mesh import PlaneMesh, distinct_edges, outer_sides, sides_of
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
+_DISTORTED = 0.02  # smallest over largest jacobian of a cell that is told of; refused are those below -0.02, as the
+# corner of a cell with two sides on one arc, which is flat, comes out a little below zero
 _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
 _INTO = 0.02, 1e-3  # of a side: how deep bodies may overlap by their sides being straight, or curved
 _PIECES = 8  # of a side, as a polygon
@@ -31,16 +34,19 @@ def _at(x: Array) -> str:
     return f"({x[0]:g}, {x[1]:g})"
 
 
+def _in(mesh: PlaneMesh, cell: int) -> str:
+    """The place of a ``cell`` and the sets that have it."""
+    names = [repr(name) for name, tags in mesh.cell_sets.items() if mesh.bodies[cell] in tags]
+    place = _at(mesh.x[mesh.cells[cell]].mean(axis=0))
+    return f"{place} in {' and '.join(names)}" if names else place
+
+
 def faults(mesh: PlaneMesh) -> list[str]:
     """Why nothing can be computed on ``mesh``: cells that are folded, collapsed, there twice, or three at an edge."""
-    (J, _), said, middle = _jacobians(mesh), [], mesh.x[mesh.cells].mean(axis=1)
-    det, size = np.linalg.det(J), (J**2).sum(axis=(2, 3)).max(axis=1)
-    bad = (det.min(axis=1) <= _FLAT * size) & (det.max(axis=1) >= -_FLAT * size)
-    if bad.any():
-        said.append(f"{bad.sum()} cells are folded or have no area, the first at {_at(middle[bad][0])}")
+    said = _unsound(mesh)
     _, first, count = np.unique(np.sort(mesh.cells, axis=1), axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
-        said.append(f"{(count > 1).sum()} cells are there twice, the first at {_at(middle[first[count > 1][0]])}")
+        said.append(f"{(count > 1).sum()} cells are there twice, the first at {_in(mesh, first[count > 1][0])}")
     sides = sides_of(mesh.cells)
     first, which = distinct_edges(sides[:, :2])
     crowded = first[np.bincount(which) > 2]
@@ -60,6 +66,55 @@ def _jacobians(mesh: PlaneMesh) -> tuple[Array, Array]:
     kind, order = cell_kind(mesh.cells.shape[1])
     X, w = bulk_quadrature(kind, order + 1)
     return np.einsum("jqa,nai->nqij", tabulate(kind, order, X)[1:], mesh.x[mesh.cells]), w
+
+
+def _unsound(mesh: PlaneMesh) -> list[str]:
+    """Why the map of a cell cannot be inverted everywhere, corners and middles of sides included."""
+    ordered = np.sort(mesh.cells, axis=1)
+    repeating = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
+    if len(repeating):
+        at, kind = _in(mesh, repeating[0]), cell_kind(mesh.cells.shape[1])[0].name
+        return [
+            f"{len(repeating)} cells have a node twice, the first at {at}: a {kind} must not be collapsed; "
+            "mesh such bodies with triangles alone, or with quadrilaterals of four different corners"
+        ]
+    smallest, largest = smallest_determinants(mesh)
+    size = np.ptp(mesh.x[mesh.cells], axis=1).max(axis=1) ** 2
+    flat = largest <= _FLAT * size
+    folded = (smallest < -_DISTORTED * largest) | _turned_at_points(mesh)
+    bad = np.flatnonzero(flat | folded)
+    if not len(bad):
+        return []
+    worst = bad[np.argmin((smallest / size)[bad])]
+    how = "it has no area"
+    if not flat[worst]:
+        how = f"{_falls(smallest, largest, worst)}; move the nodes on its sides"
+    return [f"{len(bad)} cells are folded or have no area, the worst at {_in(mesh, worst)}: {how}"]
+
+
+def _turned_at_points(mesh: PlaneMesh) -> np.ndarray:
+    """Whether the determinants of a cell ``(n,)`` do not have one sign at its integration points."""
+    J, _ = _jacobians(mesh)
+    det = np.linalg.det(J)
+    none = _FLAT * (J**2).sum(axis=(2, 3)).max(axis=1)
+    return (det.min(axis=1) <= none) & (det.max(axis=1) >= -none)
+
+
+def _falls(smallest: Array, largest: Array, cell: int) -> str:
+    return f"its Jacobian determinant falls to {smallest[cell] / largest[cell]:.2g} of its largest value"
+
+
+def distorted(mesh: PlaneMesh) -> list[str]:
+    """A warning of cells whose map is nearly singular somewhere: stresses there are worthless."""
+    smallest, largest = smallest_determinants(mesh)
+    bad = np.flatnonzero(smallest < _DISTORTED * largest)
+    if not len(bad):
+        return []
+    worst = bad[np.argmin((smallest / largest)[bad])]
+    return [
+        f"{len(bad)} cells are distorted, the worst at {_in(mesh, worst)}: "
+        f"{_falls(smallest, largest, worst)}, so stresses there are not to be trusted"
+    ]
 
 
 def areas(mesh: PlaneMesh) -> Array:
@@ -93,7 +148,8 @@ def check_mesh(
         checks += [_of_surface(mesh, inside, name) for name in surfaces]
         checks += [*(_sagitta(mesh, *pair) for pair in pairs if len(pair) == 2), _overlaps(mesh, inside, overlap)]
         found = next((said for check in checks for said in check), "")
-        warnings = [said for body, cells in inside.items() for said in cracks(mesh, body, cells)]
+        warnings = distorted(mesh)
+        warnings += [said for body, cells in inside.items() for said in cracks(mesh, body, cells)]
     found, warnings = tagged.mesh.comm.bcast((found, warnings))
     if found:
         raise ValueError(found)

@@ -9,7 +9,7 @@ import numpy as np
 
 from archord.geometry.basis import cell_kind
 from archord.geometry.curve import Curve, circle_through
-from archord.geometry.meshes.check import areas, cracks, parts
+from archord.geometry.meshes.check import areas, cracks, distorted, parts
 from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between, sides_of
 from archord.postprocess.pictures.pictures import save_figure
 from archord.report.figure import new_figure
@@ -30,7 +30,9 @@ def mesh_text(name: str, mesh: PlaneMesh) -> str:
     for name, tags in mesh.facet_sets.items():
         facets.add(name, *_facet_row(mesh, mesh.edges[np.isin(mesh.tags, tags)], cells))
     points = Table("point set", "nodes", left=1, rows=((name, len(nodes)) for name, nodes in mesh.point_sets.items()))
-    warnings = [f"warning: {said}" for name, inside in cells.items() for said in cracks(mesh, name, inside)]
+    doubts = distorted(mesh)
+    doubts += [said for name, inside in cells.items() for said in cracks(mesh, name, inside)]
+    warnings = [f"warning: {said}" for said in doubts]
     tables = [str(table) for table in (bodies, facets, points) if table.rows]
     return "\n\n".join([head, *tables, *filter(None, ["\n".join(warnings)])])
 

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from archord.geometry.basis import QUADRILATERAL, TRIANGLE, lagrange_element, tabulate
 from archord.geometry.curve import circle_through
-from archord.geometry.meshes.check import check_mesh, faults, free_motions
+from archord.geometry.meshes.check import check_mesh, distorted, faults, free_motions
 from archord.geometry.meshes.fenicsx import distribute, gathered
+from archord.geometry.meshes.jacobian import smallest_determinants
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.refine import Circle, refined
 
@@ -156,6 +158,74 @@ def test_the_circle_of_points():
     assert circle_through(x[:3]) is None
 
 
+def bent(kind, order, amount, mirrored=False):
+    """One cell, the middle of whose side on y = 0 goes up by ``amount``."""
+    nodes = lagrange_element(kind, order).points
+    middle = np.isclose(nodes[:, 1], 0) & (nodes[:, 0] > 0) & (nodes[:, 0] < 1)
+    x = nodes.copy()
+    x[middle, 1] += 4 * amount * x[middle, 0] * (1 - x[middle, 0])
+    x[:, 0] *= -1 if mirrored else 1
+    return PlaneMesh.of_sets(x, np.arange(len(x))[None], {}, {}, {})
+
+
+def test_a_corner_of_two_sides_on_one_arc_is_a_warning():
+    """It is flat, and comes out on either side of zero; quadrature never comes there."""
+    for amount, warned in ((0.24, False), (0.248, True), (0.2502, True)):
+        mesh = bent(TRIANGLE, 2, amount)
+        assert faults(mesh) == []
+        said = " ".join(distorted(mesh))
+        assert ("1 cells are distorted, the worst at" in said) == warned
+        assert ("not to be trusted" in said) == warned
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize("kind", [TRIANGLE, QUADRILATERAL])
+def test_a_side_may_bend_until_the_jacobian_vanishes_at_a_point(kind, order, mirrored):
+    """The smallest determinant against a grid of 200 by 200 points, in and beyond the bend that turns a cell over."""
+    X = (np.stack(np.meshgrid(*[np.linspace(0, 1, 201)] * 2), axis=-1)).reshape(-1, 2)
+    X = X[X.sum(axis=1) <= 1 + 1e-12] if kind == TRIANGLE else X
+    verdicts = set()
+    for amount in np.linspace(-1.23, 1.23, 25):
+        mesh = bent(kind, order, amount, mirrored)
+        J = np.einsum("jqa,ai->qij", tabulate(kind, order, X)[1:], mesh.x[mesh.cells[0]])
+        sampled = np.linalg.det(J) * (-1 if mirrored else 1)
+        smallest, largest = smallest_determinants(mesh)
+        verdicts.add(sampled.min() > 0)
+        assert (smallest[0] > 0) == (sampled.min() > 0)
+        assert bool(faults(mesh)) == (sampled.min() < -0.02 * sampled.max())
+        if sampled.min() > 0:
+            assert largest[0] <= sampled.max() * (1 + 1e-9)
+            assert abs(smallest[0] - sampled.min()) < 2e-3 * largest[0]
+    assert verdicts == {True, False}
+
+
+def test_a_fold_between_corners_and_nodes_is_found():
+    """Random cells: those with a negative determinant anywhere on a fine grid are refused, and no others."""
+    rng = np.random.default_rng(1)
+    X = (np.stack(np.meshgrid(*[np.linspace(0, 1, 101)] * 2), axis=-1)).reshape(-1, 2)
+    hidden = 0
+    for kind, order in ((TRIANGLE, 2), (TRIANGLE, 3), (QUADRILATERAL, 2), (QUADRILATERAL, 3)):
+        inside = X[X.sum(axis=1) <= 1 + 1e-12] if kind == TRIANGLE else X
+        nodes = lagrange_element(kind, order).points
+        x = nodes + rng.uniform(-0.35, 0.35, (300, *nodes.shape)) / order
+        made = PlaneMesh.of_sets(x.reshape(-1, 2), np.arange(x.size // 2).reshape(300, -1), {}, {}, {})
+        table = tabulate(kind, order, inside)[1:]
+        sampled = np.linalg.det(np.einsum("jqa,nai->nqij", table, x)).min(axis=1)
+        at_nodes = np.linalg.det(np.einsum("jqa,nai->nqij", tabulate(kind, order, nodes)[1:], x)).min(axis=1)
+        smallest, largest = smallest_determinants(made)
+        assert (np.abs(smallest - sampled) < 2e-3 * largest).all()
+        hidden += ((at_nodes > 0) & (smallest <= 0)).sum()
+    assert hidden > 20
+
+
+def test_collapsed_cells_say_so():
+    x, cells = grid(2, 1)
+    cells[1, 3] = cells[1, 1]
+    said = faults(PlaneMesh.of_sets(x, cells, {"plate": np.arange(2)}, {}, {}))[0]
+    assert said.startswith("1 cells have a node twice, the first at (0.75, 0.25) in 'plate': a quadrilateral must not")
+
+
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_cells_that_cannot_be_used(mirrored):
     """Folded, flat or there twice; clockwise ones can be."""
@@ -167,7 +237,7 @@ def test_cells_that_cannot_be_used(mirrored):
     assert faults(PlaneMesh.of_sets(x, cells, {}, {}, {}))[0].startswith("2 cells are folded or have no area")
     x, cells = grid(2, 1)
     twice = PlaneMesh.of_sets(x, np.concatenate([cells, cells[:1]]), {}, {}, {})
-    assert faults(twice)[0] == "1 cells are there twice, the first at (0.25, 0.5)"
+    assert faults(twice)[0] == "1 cells are there twice, the first at (0.25, 0.5) in 'all'"
     curved = refined(PlaneMesh.of_sets(x, cells, {}, {}, {}), order=2)
     apart, bound = curved.cells.copy(), curved.cells.copy()
     apart[1, 5] = apart[1, 6]

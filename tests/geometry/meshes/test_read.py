@@ -235,6 +235,8 @@ def test_what_an_input_deck_may_look_like(comm, deck, old, new):
         ("more.inp", "mroe.inp", "No such file"),
         (" 12, 1., 1.", " 12, 1., 1., 0.5", "not plane: z differs"),
         (" 3, 2., 0.", " 3, 2., nan", "not finite"),
+        (" 12, 1., 1.", " 12, .1, .1", "cells are folded .* in 'Left' and 'BOTH' and 'again': its Jacobian"),
+        (" 7, 1, 2, 12, 11,", " 7, 1, 2, 12, 12,", "1 cells have a node twice, .* must not be collapsed"),
     ],
 )
 def test_a_deck_gone_wrong_is_refused_in_a_sentence(comm, deck, old, new, said):
