@@ -8,6 +8,7 @@ import hashlib
 import os
 import platform
 import shlex
+import stat
 import subprocess
 import tempfile
 from collections.abc import Sequence
@@ -48,7 +49,7 @@ def _loaded(source: Path, libraries: tuple[str, ...]) -> tuple[cffi.FFI, Any]:
     header = source.with_suffix(".h").read_text(encoding="utf-8")
     key = "\0".join([*compiler, *_FLAGS, platform.machine(), header]).encode() + source.read_bytes()
     path = cache_folder() / f"{source.stem}-{hashlib.sha256(key).hexdigest()[:16]}.so"
-    if not path.exists():
+    if not is_private(path):  # missing, or another user's
         _compile([*compiler, *_FLAGS], source, path, libraries)
     ffi = cffi.FFI()
     ffi.cdef("".join(line for line in header.splitlines(keepends=True) if not line.startswith("#")))
@@ -65,11 +66,24 @@ def pointer(array: npt.NDArray[Any]) -> Any:
 
 
 def cache_folder() -> Path:
-    """The user's folder for what is made once and used again; one of this process where that cannot be written."""
+    """The user's folder for what is made once and used again; one of this process where that cannot be written, or
+    where another user may write."""
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "archord"
     with suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-    return folder if os.access(folder, os.W_OK) else Path(_temporary().name)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if folder.stat().st_uid == os.geteuid() and not is_private(folder):
+            folder.chmod(0o700)
+    usable = is_private(folder) and os.access(folder, os.W_OK)
+    return folder if usable else Path(_temporary().name)
+
+
+def is_private(path: Path) -> bool:
+    """Whether ``path`` is there, belongs to this user, and no other user may write to it."""
+    try:
+        found = path.stat()
+    except OSError:
+        return False
+    return found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 @cache
@@ -90,4 +104,5 @@ def _compile(command: list[str], source: Path, path: Path, libraries: tuple[str,
         if result.returncode:
             said = [line for line in result.stderr.splitlines() if "error" in line] or [f"exit {result.returncode}"]
             raise CompilerError(f"{source.name} could not be compiled: {said[0]}")
+        made.chmod(0o700)
         os.replace(made, path)

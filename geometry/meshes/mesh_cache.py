@@ -6,13 +6,13 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
-import pickle
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 from archord.geometry.meshes.plane_mesh import PlaneMesh
-from archord.kernels.compiled import cache_folder
+from archord.geometry.meshes.stored import store_mesh, stored_mesh
+from archord.kernels.compiled import cache_folder, is_private
 
 _MOST = 100  # meshes kept
 _LARGEST = 200_000  # triangles: larger ones take long to solve, and space
@@ -21,8 +21,8 @@ _LARGEST = 200_000  # triangles: larger ones take long to solve, and space
 def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
     """The mesh that ``key`` says all about: the kept one, or what ``make`` returns.
 
-    Other versions of gmsh or of the code that meshes make meshes of their own. A mesh that cannot be read or written
-    is made, and so are all where the environment says ``ARCHORD_KEEP_MESHES=0``.
+    Other versions of gmsh or of the code that meshes make meshes of their own. A mesh that cannot be read or written,
+    or that another user may have written, is made, and so are all where the environment says ``ARCHORD_KEEP_MESHES=0``.
     """
     if os.environ.get("ARCHORD_KEEP_MESHES") == "0":
         return make()
@@ -33,16 +33,27 @@ def kept_mesh(key: tuple, make: Callable[[], PlaneMesh]) -> PlaneMesh:
     folder = cache_folder() / "meshes"
     path = folder / f"{digest[:32]}.mesh"
     with suppress(Exception):  # whatever a damaged file makes of it
-        mesh = pickle.loads(path.read_bytes())
-        os.utime(path)
-        return mesh
+        if is_private(folder) and is_private(path):
+            mesh = stored_mesh(path)
+            os.utime(path)
+            return mesh
     mesh = make()
     if len(mesh.cells) <= _LARGEST:
         with suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            new = path.with_suffix(f".{os.getpid()}.mesh")
-            new.write_bytes(pickle.dumps(mesh))
-            os.replace(new, path)
-            for old in sorted(folder.glob("*.mesh"), key=os.path.getmtime)[:-_MOST]:
-                old.unlink()
+            _keep(mesh, path)
     return mesh
+
+
+def _keep(mesh: PlaneMesh, path: Path) -> None:
+    """Write ``mesh`` to ``path``, and remove those that were not used for longest. Raises `OSError`."""
+    folder = path.parent
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if not is_private(folder):
+        return
+    new = path.with_suffix(f".{os.getpid()}.mesh")
+    new.unlink(missing_ok=True)
+    with open(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        store_mesh(mesh, file)
+    os.replace(new, path)
+    for old in sorted(folder.glob("*.mesh"), key=os.path.getmtime)[:-_MOST]:
+        old.unlink()

@@ -1,5 +1,6 @@
 """C kernels: compiled once, called with arrays that fit."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archord.kernels.compiled import CompilerError, _loaded, cache_folder, library, pointer, structure
+from archord.kernels.compiled import CompilerError, _loaded, cache_folder, is_private, library, pointer, structure
 
 
 @pytest.fixture
@@ -54,6 +55,34 @@ def test_a_cache_that_cannot_be_written_is_no_hindrance(source, monkeypatch):
     other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
     assert Path(other).name.startswith("archord-")
     assert not Path(other).exists()
+
+
+def test_what_others_may_have_written_is_not_loaded(source, monkeypatch):
+    """A library of another user, or one that others may write, is compiled again; a folder of another is not used."""
+    source.write_text("double twice(double x) { return 2 * x; }\n")
+    library(source)
+    (kept,) = (source.parent / "cache" / "archord").iterdir()
+    planted = source.with_name("planted.c")
+    planted.write_text("double twice(double x) { return -1; }\n")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", str(kept), str(planted)], check=True)
+    kept.chmod(0o777)
+    _loaded.cache_clear()
+    assert library(source).twice(1.5) == 3.0
+    assert not kept.stat().st_mode & 0o022
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", str(kept), str(planted)], check=True)
+    me = os.geteuid()
+    monkeypatch.setattr(os, "geteuid", lambda: me + 1)
+    _loaded.cache_clear()
+    assert cache_folder() != kept.parent
+    assert not is_private(kept)
+
+
+def test_the_own_cache_is_closed_to_others(source):
+    folder = source.parent / "cache" / "archord"
+    folder.mkdir(parents=True)
+    folder.chmod(0o777)
+    assert cache_folder() == folder
+    assert folder.stat().st_mode & 0o777 == 0o700
 
 
 def test_a_structure_has_numbers_and_pointers(source):

@@ -1,5 +1,6 @@
 """Kept meshes: the same to the last bit as new ones, on any number of ranks, told apart by all that shapes them."""
 
+import pickle
 import time
 
 import numpy as np
@@ -87,6 +88,34 @@ def test_a_file_that_is_no_mesh_is_made_again(comm, made, tmp_path, spoil):
     spoil(path)
     for a, b in zip(first, content(quarter_joint(comm, **QUARTER)), strict=True):
         assert (a == b).all()
+    assert len(made) == 2
+
+
+class Planted:
+    """A pickle that runs something when it is read."""
+
+    def __reduce__(self):
+        return pytest.fail, ("a pickle of the cache was run",)
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o666])
+def test_nothing_in_the_cache_is_run(comm, made, tmp_path, mode):
+    """A planted pickle is no mesh; a mesh that others may write is made again, and kept for this user alone."""
+    first = content(quarter_joint(comm, **QUARTER))
+    (path,) = tmp_path.glob("meshes/*.mesh")
+    if mode == 0o600:
+        path.write_bytes(pickle.dumps(Planted()))
+    path.chmod(mode)
+    for a, b in zip(first, content(quarter_joint(comm, **QUARTER)), strict=True):
+        assert (a == b).all()
+    assert len(made) == 2
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_folder_of_others_is_not_used(comm, made, tmp_path):
+    quarter_joint(comm, **QUARTER)
+    (tmp_path / "meshes").chmod(0o777)
+    quarter_joint(comm, **QUARTER)
     assert len(made) == 2
 
 
