@@ -123,7 +123,7 @@ def scene(example: bool, general: bool, reference: bool, materials: bool, expand
 
 
 @click.command()
-@argument("file", "FILE", "mesh (.msh, .inp, .xdmf), or scene (.toml)")
+@argument("file", "FILE", "mesh (.msh, .inp, .xdmf, .npz), or scene (.toml)")
 @output("picture to draw [<name>.png]")
 @overrides()
 @pictures("the mesh with its named sets")

@@ -21,6 +21,7 @@ from archord.geometry.basis import Array
 from archord.output.disk import replace_file
 from archord.output.step_file import all_arrays, hdf5_in_memory, image, put
 from archord.presets.measures import Work
+from archord.report.readable import require_file
 from archord.report.version import VERSION
 from archord.scene.errors import InputError
 from archord.solver.load_path import Position
@@ -120,7 +121,7 @@ def _header(body: bytes) -> bytes:
 def read(path: Path) -> Checkpoint:
     """Read ``path``, of this version or 0.1. Raises `InputError` if it is missing, damaged, or of a newer archord."""
     try:
-        content = path.read_bytes()
+        content = require_file(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read, so that the run cannot be continued: {error.strerror}.") from None
     body = content[_HEADER:]

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from archord.output.disk import new_name
+from archord.report.readable import require_file
 from archord.scene.errors import InputError
 
 FILES = ("scene.toml", "history.csv", "fields.vtkhdf", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
@@ -82,7 +83,8 @@ def refuse_folder(scene: Path) -> None:
 def report_of(folder: Path) -> dict[str, Any]:
     """The run.json in ``folder``; empty if there is none that can be read."""
     with suppress(OSError, ValueError):
-        if isinstance(report := json.loads((folder / "run.json").read_text(encoding="utf-8")), dict):
+        report = json.loads(require_file(folder / "run.json").read_text(encoding="utf-8"))
+        if isinstance(report, dict):
             return report
     return {}
 

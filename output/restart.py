@@ -15,6 +15,7 @@ from archord.output import checkpoint as checkpoints
 from archord.output.checkpoint import Checkpoint
 from archord.output.folder import CHECKPOINT
 from archord.presets.account import record_type
+from archord.report.readable import require_file
 from archord.scene.errors import InputError
 from archord.scene.file import AnyScene, load_scene, parse_any, scene_keys
 from archord.scene.keys import toml_value
@@ -72,7 +73,7 @@ def _lost_tables(folder: Path, scene: AnyScene) -> list[str]:
     texts = dict.fromkeys(parts, "")
     for name in parts:
         with suppress(OSError, ValueError):
-            texts[name] = (folder / name).read_text(encoding="utf-8")
+            texts[name] = require_file(folder / name).read_text(encoding="utf-8")
     return [name for name, part in parts.items() if part not in texts[name] or not texts[name].endswith("\n")]
 
 
@@ -89,7 +90,7 @@ def _start(folder: Path, scene: AnyScene) -> Start:
         raise InputError(f"{path}: its {n} steps are not the first ones of the scene's path; {said}.")
     path = folder / "run.json"
     try:
-        report = json.loads(path.read_text(encoding="utf-8"))
+        report = json.loads(require_file(path).read_text(encoding="utf-8"))
         record = record_type(scene)
         names = [field.name for field in fields(record)]
         done = [record(**{name: step[name] for name in names if name in step}) for step in report["steps"][: n - 1]]

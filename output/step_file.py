@@ -87,7 +87,7 @@ class StepFile:
                     name, _, step = path.rpartition("/")
                     steps.setdefault(step, {})[name] = array
                 return [(load, steps[step_name(k)]) for k, load in enumerate(file["load"][:after].tolist(), start=1)]
-        except (OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
+        except (MemoryError, OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
             said = f"is missing or damaged, so that the run cannot be continued ({error})"
             raise InputError(f"{self.path}: {said}.") from None
 

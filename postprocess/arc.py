@@ -30,7 +30,7 @@ def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
             if int(file["accepted"][()]) < step:
                 raise KeyError(step)
             yield file
-    except (OSError, KeyError, RuntimeError, TypeError, ValueError, IndexError):
+    except (MemoryError, OSError, KeyError, RuntimeError, TypeError, ValueError, IndexError):
         raise InputError(f"{path}: cannot be read as the {name} of a run at step {step}.") from None
 
 

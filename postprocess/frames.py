@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from archord.postprocess.arc import undeformed
+from archord.report.readable import require_file
 
 _OF_POINTS = ("s", "angle", "weight", "pressure", "raw_pressure", "gap")
 _TEXT = dict.fromkeys(("run", "status", "message"), str)  # names of runs may look like numbers
@@ -31,7 +32,7 @@ def with_headings(frame: pd.DataFrame) -> pd.DataFrame:
 def read_frame(path: Path) -> pd.DataFrame:
     """The table in a CSV file whose columns are headed ``name [unit]``, by names; a last row that does not end in a
     line break (a copy cut short) is ignored. Raises `OSError`, and `ValueError` if it is no table."""
-    text = path.read_bytes().decode()
+    text = require_file(path).read_bytes().decode()
     whole = io.StringIO(text[: text.rfind("\n") + 1])
     table = pd.read_csv(whole, dtype=_TEXT, keep_default_na=False, na_values=[""], float_precision="round_trip")
     if not isinstance(table.index, pd.RangeIndex):

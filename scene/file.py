@@ -10,6 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from archord.report.readable import require_file
 from archord.scene.errors import InputError
 from archord.scene.faults import shortened
 from archord.scene.problem import ProblemScene
@@ -132,7 +133,7 @@ def read_targets(data: dict[str, Any], scene: Path) -> None:
 def read_text(path: str | Path) -> str:
     """The text of the file ``path``. Raises `InputError`."""
     try:
-        with Path(path).open("rb") as file:
+        with require_file(path).open("rb") as file:
             raw = file.read(_LARGEST_FILE + 1)
         if len(raw) > _LARGEST_FILE:
             raise OSError(None, f"it is larger than {_LARGEST_FILE // 10**6} MB")

@@ -31,7 +31,9 @@ class Circle(RigidCircle):
 class Mesh(Section):
     """Where the mesh comes from: a file, or the shape of a preset."""
 
-    file: Name | None = key("gmsh (.msh), Abaqus, CalculiX (.inp), dolfinx (.xdmf) file", default=None, example="a.msh")
+    file: Name | None = key(
+        "gmsh (.msh), Abaqus, CalculiX (.inp), dolfinx (.xdmf), archord (.npz) file", default=None, example="a.msh"
+    )
     scale: Positive = key("factor on the coordinates, 1000 for a file in metres", default=1.0)
     order: Literal[1, 2, 3] | None = key("order of the geometry, that of the file if absent; 2 for circles", other=2)
     refine: int = key("how often every cell is cut in four", default=0, ge=0, le=6)

@@ -14,6 +14,7 @@ from typing import Any
 
 from archord.output.disk import replace_file
 from archord.output.folder import occupied, report_of
+from archord.report.readable import require_file
 from archord.scene.errors import InputError
 from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
@@ -151,7 +152,7 @@ def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Ro
 
 def _history(run: Path) -> list[Row]:
     """Heading and rows of history.csv; none if there is none."""
-    with suppress(OSError), (run / "history.csv").open(encoding="utf-8", newline="") as file:
+    with suppress(OSError), require_file(run / "history.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.reader(file))
     return []
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
+from archord.geometry.meshes.beside import beside
 from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order, one_kind, outer_sides
 
 Options = dict[str, str]
@@ -25,8 +26,9 @@ _UNREAD = {"PART", "INSTANCE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGE
 _DEEPEST = 5  # files included in each other
 
 
-def _lines(path: Path, depth: int = 0) -> Iterator[str]:
-    """The lines of a file, those of keywords whole, and those of the files that it includes."""
+def _lines(path: Path, mesh: Path, depth: int = 0) -> Iterator[str]:
+    """The lines of a file, those of keywords whole, and those of the files that it includes, which lie in the folder of
+    the ``mesh``."""
     if depth > _DEEPEST:
         raise ValueError(f"{path.name} includes itself")
     text = path.read_text(encoding="utf-8", errors="replace")
@@ -35,13 +37,13 @@ def _lines(path: Path, depth: int = 0) -> Iterator[str]:
             if not line.upper().startswith("*INCLUDE"):
                 yield line
             if file := re.match(r"\*.*,\s*INPUT\s*=([^,]*)", line, re.IGNORECASE):
-                yield from _lines(path.parent / file[1].strip(' "'), depth + 1)
+                yield from _lines(beside(mesh, file[1].strip(' "')), mesh, depth + 1)
 
 
 def _blocks(path: Path) -> list[tuple[str, Options, Rows]]:
     """Keywords with their options, and the rows of data below them."""
     blocks: list[tuple[str, Options, Rows]] = [("", {}, [])]
-    for line in _lines(path):
+    for line in _lines(path, path):
         first, *others = (part.strip(' "') for part in line.strip(", ").split(","))
         if line.startswith("*"):
             options = {key.strip().upper(): value.strip(' "') for key, _, value in (o.partition("=") for o in others)}

@@ -21,9 +21,12 @@ from archord.geometry.meshes.check import faults
 from archord.geometry.meshes.fenicsx import distribute, gathered, own_gmsh, strips
 from archord.geometry.meshes.plane_mesh import PlaneMesh, flat
 from archord.geometry.meshes.refine import Circle, refined
+from archord.geometry.meshes.stored import stored_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.meshes.xdmf import read_xdmf
+from archord.report.readable import require_file
 
+_HEADERS = (b"$MeshFormat", b"$NOD", b"$Comments")
 Source = str | Path | ModuleType | TaggedMesh
 
 
@@ -39,9 +42,10 @@ def read_mesh(
 ) -> TaggedMesh:
     """The mesh of ``source`` times ``scale``, `refined` with ``circles`` in scaled lengths, on the ranks of ``comm``.
 
-    A source is a .msh file of gmsh, an .inp file of Abaqus or CalculiX, an .xdmf file of dolfinx, the module gmsh with
-    a model on rank 0, or a mesh as `tagged` returns it. Sets have the names of physical groups, of sets and surfaces,
-    or the values of tags. Collective; raises ValueError on all ranks for what is no mesh of plane cells of one kind.
+    A source is a .msh file of gmsh, an .inp file of Abaqus or CalculiX, an .xdmf file of dolfinx, an .npz file of
+    archord, the module gmsh with a model on rank 0, or a mesh as `tagged` returns it. Sets have the names of physical
+    groups, of sets and surfaces, or the values of tags. Collective; raises ValueError on all ranks for what is no mesh
+    of plane cells of one kind.
     """
     made: Any = gathered(source) if isinstance(source, TaggedMesh) else None
     failure = ""
@@ -95,15 +99,20 @@ def _read(source: str | Path | ModuleType, order: int) -> PlaneMesh:
             source.model.mesh.setOrder(order)
         return PlaneMesh.from_gmsh(source)
     path = Path(source)
-    readers = {".msh": _read_gmsh, ".inp": read_abaqus, ".xdmf": read_xdmf}
+    readers = {".msh": _read_gmsh, ".inp": read_abaqus, ".xdmf": read_xdmf, ".npz": stored_mesh}
     if path.suffix.lower() not in readers:
         raise ValueError(f"is none of the files of meshes that are read: {', '.join(readers)}")
-    path.open("rb").close()  # or gmsh would say something else of a file that is not there
+    require_file(path).open("rb").close()  # or gmsh would say something else of a file that is not there
+    if not path.stat().st_size:
+        raise ValueError("is empty")
     return readers[path.suffix.lower()](path)
 
 
 def _read_gmsh(path: Path) -> PlaneMesh:
     """What gmsh reads in a process of its own, as it ends the process on some damaged files."""
+    with path.open("rb") as file:
+        if not file.read(20).startswith(_HEADERS):  # gmsh would run it as a script
+            raise ValueError("is no mesh of gmsh: it must begin with $MeshFormat")
     with ProcessPoolExecutor(1, get_context("fork")) as pool:
         try:
             return pool.submit(_merged, path).result()

@@ -9,7 +9,9 @@ import h5py
 import numpy as np
 from dolfinx.cpp.io import perm_vtk
 
+from archord.geometry.meshes.beside import beside
 from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order
+from archord.report.readable import require_memory
 
 
 def read_xdmf(path: Path) -> PlaneMesh:
@@ -47,7 +49,8 @@ def _data(path: Path, grid: ElementTree.Element, part: str) -> np.ndarray:
     rows = int(item.attrib["Dimensions"].split()[0])
     if item.attrib.get("Format") == "HDF":
         name, _, place = item.text.strip().partition(":")
-        with h5py.File(path.parent / name) as file:
+        with h5py.File(beside(path, name)) as file:
+            require_memory(file[place].nbytes)
             return file[place][()].reshape(rows, -1)
     numbers = np.array(item.text.split(), dtype=float)
     return (numbers.astype(np.int64) if part == "Topology" else numbers).reshape(rows, -1)
