@@ -15,6 +15,7 @@ from archord.report.readable import require_file
 from archord.scene.errors import InputError
 
 FILES = ("scene.toml", "history.csv", "fields.vtkhdf", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
+MESH = "mesh.npz"  # of a run whose mesh was given from Python
 APART = "fields"  # the folder of the files that fields.h5 has links to
 CHECKPOINT = "checkpoint.h5"
 PICTURE = "picture.png"  # drawn later, from the others
@@ -25,9 +26,10 @@ _UNFINISHED = {
 }
 
 
-def clear(folder: Path) -> None:
-    """Remove an old run's files, and what a kill left half done of them. Raises `OSError`."""
-    for name in (CHECKPOINT, *FILES, PICTURE):
+def clear(folder: Path, kept: str = "") -> None:
+    """Remove an old run's files but the one that is ``kept``, and what a kill left half done of them. Raises
+    `OSError`."""
+    for name in {CHECKPOINT, *FILES, MESH, PICTURE} - {kept}:
         (folder / name).unlink(missing_ok=True)
         new_name(folder / name).unlink(missing_ok=True)
     for file in (folder / APART).glob("[0-9]*.h5*"):

@@ -17,7 +17,7 @@ from archord.output.folder import CHECKPOINT
 from archord.presets.account import record_type
 from archord.report.readable import require_file
 from archord.scene.errors import InputError
-from archord.scene.file import AnyScene, load_scene, parse_any, scene_keys
+from archord.scene.file import AnyScene, find_mesh, load_scene, parse_any, scene_keys
 from archord.scene.keys import toml_value
 
 _TARGETS = ("load.displacement", "load.relative_force", "load.force", "load.steps", "path.steps")
@@ -81,7 +81,9 @@ def _start(folder: Path, scene: AnyScene) -> Start:
     """Read what the run left. Raises `InputError` if that is not the first steps of ``scene``."""
     path = folder / CHECKPOINT
     checkpoint = checkpoints.read(path)
-    before = parse_any(tomllib.loads(checkpoint.scene), str(path))
+    data = tomllib.loads(checkpoint.scene)
+    find_mesh(data.get("mesh"), folder)
+    before = parse_any(data, str(path))
     _same_but_for_the_load(folder, before, scene)
     n = checkpoint.step
     reached, wanted = np.array(before.travelled[:n]), np.array(scene.travelled[:n])

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
@@ -18,6 +18,7 @@ from archord.output.checkpoint import write as write_checkpoint
 from archord.output.disk import WriteError, replace_file
 from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import write_history
+from archord.output.own_mesh import given_mesh, mesh_in_use, scene_text, write_mesh
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
@@ -26,13 +27,16 @@ from archord.presets.account import Account, account_of
 from archord.presets.edge import EdgeProfile
 from archord.presets.measures import Work
 from archord.report.timer import Timer
-from archord.scene.file import AnyScene, resolved
+from archord.scene.file import AnyScene
 from archord.solver.coarse_start import coarse_start
 from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.load_path import Position
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.stepping import Step, StepFailure, StepRules, march
 from archord.solver.system import System
+
+if TYPE_CHECKING:
+    from archord.geometry.meshes.plane_mesh import PlaneMesh
 
 
 @dataclass
@@ -124,7 +128,7 @@ class _Output:
         self.folder, self.account, self.system, self._start = folder, account, account.system, start
         comm = self.system.comm
         self._on_root = partial(agreed, comm)
-        self._scene, self._last = resolved(account.scene), perf_counter()
+        self._scene, self._last = scene_text(account.scene, folder), perf_counter()
         self.steps: list[Any] = comm.bcast(start.done if start else [])
         asked = account.scene.output
         self._at_points = asked.fields in ("nodes", "points")
@@ -143,7 +147,8 @@ class _Output:
         """Make the files, or write the step that the run goes on from, and give its state to the joint. Collective."""
         system = self.system
         if not system.comm.bcast(self._start is not None):
-            self._on_root(self._make)
+            mesh = given_mesh(self.account.scene, system.comm)
+            self._on_root(lambda: self._make(mesh))
             return None, Work()
         with system.timer("checkpoint"):
             checkpoint = self._start.checkpoint if self._start else None
@@ -152,8 +157,10 @@ class _Output:
         self._on_root(lambda: replace_file(self.folder / "scene.toml", self._scene))
         return position, work
 
-    def _make(self) -> None:
-        clear(self.folder)
+    def _make(self, given: PlaneMesh | None) -> None:
+        clear(self.folder, kept=mesh_in_use(self.account.scene, self.folder))
+        if given is not None:
+            write_mesh(given, self.folder)
         replace_file(self.folder / "scene.toml", self._scene)
         write_history(self.folder / "history.csv", self.account.columns(), [])
         self._report.write()

@@ -83,10 +83,13 @@ class StepFile:
                 fits = all(name not in file or file[name].shape == a.shape for name, a in fixed.items())
                 if file["accepted"][()] < after or not fits:
                     raise ValueError(f"it does not hold the first {after} steps of this run")
+                loads = file["load"][:after].tolist()
+                if not fixed:  # a run without contact has nothing to tell of it
+                    return [(load, {}) for load in loads]
                 for path, array in all_arrays(file):
                     name, _, step = path.rpartition("/")
                     steps.setdefault(step, {})[name] = array
-                return [(load, steps[step_name(k)]) for k, load in enumerate(file["load"][:after].tolist(), start=1)]
+                return [(load, steps[step_name(k)]) for k, load in enumerate(loads, start=1)]
         except (MemoryError, OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
             said = f"is missing or damaged, so that the run cannot be continued ({error})"
             raise InputError(f"{self.path}: {said}.") from None

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from archord.output.folder import CHECKPOINT, FILES
+from archord.output.folder import CHECKPOINT, FILES, MESH
 from archord.scene.errors import InputError
 
 
@@ -19,7 +19,7 @@ def check_target(path: Path, inputs: Iterable[Path] = (), *, force: bool = True)
         fault = f"{path.parent} is not a folder"
     elif path.is_dir():
         fault = "it is a folder"
-    elif path.name in (*FILES, CHECKPOINT) and (path.parent / "scene.toml").is_file():
+    elif path.name in (*FILES, MESH, CHECKPOINT) and (path.parent / "scene.toml").is_file():
         fault = f"it belongs to the run in {path.parent}"
     elif not os.access(path if path.exists() else path.parent, os.W_OK):
         fault = "permission denied"

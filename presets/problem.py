@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.geometry.curve import RigidCircle
+from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, unknown
 from archord.geometry.shapes.bushing import bushing
@@ -54,12 +55,20 @@ def scene_mesh(scene: ProblemScene, comm: MPI.Comm) -> TaggedMesh:
 
     source = LIVE.get(mesh.file or "", mesh.file)
     if source == mesh.file and mesh.file.endswith(GIVEN):
-        raise ValueError(
-            f"{mesh.file}: is gone with the process that gave it: write such a mesh to a file, and name that"
-        )
+        raise ValueError(f"{mesh.file}: is gone with the process that gave it; the run folder has it as mesh.npz")
     circles = [Circle(circle.facets, (circle.centre[0], circle.centre[1]), circle.radius) for circle in mesh.circle]
     given = tagged(*source) if isinstance(source, tuple) else source
     return read_mesh(given, comm, circles=circles, scale=mesh.scale, order=mesh.order, refine=mesh.refine)
+
+
+def given_mesh(scene: ProblemScene, comm: MPI.Comm) -> PlaneMesh | None:
+    """The mesh given from Python, as `scene_mesh` takes it before it scales and refines it: on rank 0, None elsewhere.
+    Collective."""
+    from archord.geometry.meshes.read import plane_mesh_of, tagged
+
+    source = LIVE[scene.mesh.file or ""]
+    given = tagged(*source) if isinstance(source, tuple) else source
+    return plane_mesh_of(given, comm, scene.mesh.order)
 
 
 def require_mirrored(scene: ProblemScene, system: System) -> None:

@@ -209,11 +209,17 @@ def _value(text: str) -> Any:
     return text
 
 
-def resolved(scene: AnyScene) -> str:
-    """The scene as TOML, with every default filled in but for what an accuracy chooses; it loads as the same scene."""
+def resolved(scene: AnyScene, beside: Path | None = None) -> str:
+    """The scene as TOML, with every default filled in but for what an accuracy chooses; it loads as the same scene.
+
+    The mesh file ``beside`` the scene's file, if there is one, is named without its folder, which may move then."""
     import tomli_w
 
     data = scene.model_dump(exclude_none=True)
+    if beside is not None and "file" in data.get("mesh", {}):
+        mesh = Path(data["mesh"]["file"])
+        if mesh.resolve() == beside.resolve():
+            data["mesh"]["file"] = mesh.name
     if isinstance(scene, Scene):
         data["joint"]["block_size"] = scene.joint.W
         if "element_size" not in data["joint"]:

@@ -66,6 +66,14 @@ def read_mesh(
     return distribute(comm, made, partitioner, strips)
 
 
+def plane_mesh_of(source: Source, comm: MPI.Comm, order: int | None) -> PlaneMesh | None:
+    """The mesh of ``source``, of this ``order`` where a model is yet to be meshed: on rank 0, None elsewhere.
+    Collective for a mesh of dolfinx; raises what a damaged file makes of it."""
+    if isinstance(source, TaggedMesh):
+        return gathered(source)
+    return _read(source, order or 2) if comm.rank == 0 else None
+
+
 def tagged(
     mesh: Mesh,
     cells: MeshTags | None = None,

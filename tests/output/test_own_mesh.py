@@ -1,0 +1,136 @@
+"""A run of a mesh given from Python: its folder holds all that it takes to go on, and to solve it again."""
+
+import json
+import shutil
+
+import basix.ufl
+import numpy as np
+import pytest
+from dolfinx.mesh import create_mesh, create_unit_square, locate_entities_boundary, meshtags
+from mpi4py import MPI
+
+import archord
+from archord.geometry.meshes.fenicsx import gathered
+from archord.geometry.meshes.plane_mesh import PlaneMesh
+from archord.geometry.meshes.read import read_mesh, tagged
+from archord.geometry.meshes.stored import store_mesh, stored_mesh
+from archord.output.restart import plan_restart
+from archord.output.run import solve_scene
+
+CURVED = np.array([[0, 0], [1, 0], [0, 1], [0.55, 0.6], [0, 0.5], [0.5, 0], [1, 1], [0.45, 1], [1, 0.55]], dtype=float)
+
+
+def square(comm):
+    """Squares of triangles with tags of its left (3) and right (8) side."""
+    mesh = create_unit_square(comm, 4, 4)
+    sides = [locate_entities_boundary(mesh, 1, lambda x, at=at: np.isclose(x[0], at)) for at in (0, 1)]
+    facets, order = np.concatenate(sides), np.argsort(np.concatenate(sides))
+    values = np.repeat([3, 8], [len(side) for side in sides]).astype(np.int32)
+    every = np.arange(mesh.topology.index_map(2).size_local + mesh.topology.index_map(2).num_ghosts, dtype=np.int32)
+    return mesh, meshtags(mesh, 2, every, np.ones_like(every)), meshtags(mesh, 1, facets[order], values[order])
+
+
+def problem(mesh, **sections):
+    return archord.Problem(
+        mesh,
+        bodies=[{"name": "plate", "cells": "1", "E": 1000.0, "nu": 0.3, "yield_stress": 5.0, "hardening": 10.0}],
+        supports=[{"name": "clamp", "on": "3", "fixed": ["x", "y"]}],
+        loads=[{"name": "pull", "on": "8", "direction": "x", "displacement": [0.02, 0.0]}],
+        **({"path": {"steps": [3, 1]}, "analysis": {"plane": "strain"}} | sections),
+    )
+
+
+def forces(folder):
+    return archord.load(folder).columns["pull force"]
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("keys", [{}, {"scale": 2.0, "order": 2, "refine": 1}])
+def test_the_run_goes_on_and_is_solved_again_from_its_folder(comm, tmp_path, keys):
+    """To the same numbers, also elsewhere, and into the folder itself."""
+    folder = comm.bcast(tmp_path)
+    scene = problem(square(comm))
+    scene = scene.model_copy(update={"mesh": scene.mesh.model_copy(update=keys)})
+    first = archord.solve(scene, folder / "first", comm=comm)
+    said = (first.folder / "scene.toml").read_text()
+    assert 'file = "mesh.npz"' in said
+    expected = forces(first.folder)
+    comm.barrier()
+    if comm.rank == 0:
+        shutil.move(folder / "first", folder / "moved")
+    comm.barrier()
+    again = archord.solve(folder / "moved" / "scene.toml", folder / "again", comm=comm)
+    assert again.columns["pull force"] == pytest.approx(expected, rel=1e-10)
+    assert not (folder / "again" / "mesh.npz").exists()
+    into_itself = archord.solve(folder / "moved" / "scene.toml", folder / "moved", force=True, comm=comm)
+    assert into_itself.columns["pull force"] == pytest.approx(expected, rel=1e-10)
+    assert (folder / "moved" / "mesh.npz").exists()
+    assert (folder / "moved" / "scene.toml").read_text() == said
+
+
+def test_the_run_is_extended_and_restarted(tmp_path):
+    """A run moved after two of its steps goes on as if nothing had been."""
+    whole = forces(archord.solve(problem(square(MPI.COMM_SELF)), tmp_path / "whole").folder)
+    short = problem(square(MPI.COMM_SELF), path={"steps": [3, 1]})
+    stopped = False
+
+    def stop(m):
+        nonlocal stopped
+        if m.step == 2 and not stopped:
+            stopped = True
+            raise KeyboardInterrupt
+
+    (tmp_path / "short").mkdir()
+    with pytest.raises(KeyboardInterrupt):
+        solve_scene(short, tmp_path / "short", MPI.COMM_SELF, on_step=stop)
+    shutil.move(tmp_path / "short", tmp_path / "moved")
+    plan = plan_restart(tmp_path / "moved")
+    assert plan.start is not None
+    solve_scene(plan.scene, tmp_path / "moved", MPI.COMM_SELF, start=plan.start)
+    assert forces(tmp_path / "moved") == pytest.approx(whole, rel=1e-10)
+    assert json.loads((tmp_path / "moved" / "run.json").read_text())["status"] == "done"
+
+
+def test_a_stored_mesh_is_the_mesh_to_the_last_bit(tmp_path):
+    """Curved cells, the names of sets in their order, points."""
+    cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]])
+    sets = {"b": np.array([1]), "a": np.array([0]), "both": np.array([0, 1])}
+    made = PlaneMesh.of_sets(
+        CURVED, cells, sets, {"z": np.array([[0, 1]]), "é": np.array([[0, 2]])}, {"p": np.array([6])}
+    )
+    with (tmp_path / "mesh.npz").open("wb") as file:
+        store_mesh(made, file)
+    found = stored_mesh(tmp_path / "mesh.npz")
+    for name in ("x", "cells", "bodies", "edges", "tags"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(made, name))
+    assert list(found.cell_sets.items()) == list(made.cell_sets.items())
+    assert list(found.facet_sets.items()) == list(made.facet_sets.items())
+    assert found.point_sets["p"].tolist() == made.point_sets["p"].tolist()
+    assert gathered(read_mesh(tmp_path / "mesh.npz", MPI.COMM_SELF)).x.tolist() == made.x.tolist()
+
+
+@pytest.mark.mpi
+def test_curved_meshes_of_dolfinx_stay_curved(comm, tmp_path):
+    folder = comm.bcast(tmp_path)
+    element = basix.ufl.element("P", "triangle", 2, shape=(2,))
+    cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]]) if comm.rank == 0 else np.zeros((0, 6), dtype=int)
+    mesh = create_mesh(comm, cells=cells, x=CURVED if comm.rank == 0 else CURVED[:0], e=element)
+    whole = gathered(tagged(mesh))
+    if comm.rank == 0:
+        with (folder / "mesh.npz").open("wb") as file:
+            store_mesh(whole, file)
+        assert sorted(map(tuple, stored_mesh(folder / "mesh.npz").x)) == sorted(map(tuple, CURVED))
+
+
+@pytest.mark.parametrize("name", ["x", "cells", "edges", "tags", "bodies", "sets"])
+def test_a_damaged_mesh_is_refused(tmp_path, name):
+    cells = np.array([[0, 1, 2, 3, 4, 5], [1, 6, 2, 7, 3, 8]])
+    path = tmp_path / "mesh.npz"
+    with path.open("wb") as file:
+        store_mesh(PlaneMesh.of_sets(CURVED, cells, {}, {"z": np.array([[0, 1]])}, {}), file)
+    arrays = dict(np.load(path))
+    lowered = [] if name in ("tags", "bodies") else [arrays[name] * 0 - 1]
+    for wrong in (arrays[name][:-1], arrays[name].astype(complex), *lowered):
+        np.savez(path, **(arrays | {name: wrong}))
+        with pytest.raises(ValueError, match=str(path)):
+            read_mesh(path, MPI.COMM_SELF)
