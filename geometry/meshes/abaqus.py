@@ -1,131 +1,137 @@
 """Meshes of Abaqus and CalculiX: nodes, plane elements, sets and surfaces of an .inp file; all else of it is skipped.
 
 meshio's reader of such files knows neither surfaces nor plane elements of second order, and forgets all but the last
-block of nodes. Lines (trusses) only name edges, as gmsh writes them.
+block of nodes. Lines (trusses) only name edges, as gmsh writes them; springs, masses and the like name nothing.
 """
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
-from archord.geometry.meshes.beside import beside
+from archord.geometry.meshes.abaqus_blocks import Options, Rows, Scope, number_of, scoped_blocks
 from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order, one_kind, outer_sides
 
-Options = dict[str, str]
-Rows = list[list[str]]
-
 _KINDS = re.compile(r"(CP[ES][3468]|T[23]D[23])[A-Z]*")  # with the number of nodes
-_UNREAD = {"PART", "INSTANCE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY"}  # they move or make nodes
-_DEEPEST = 5  # files included in each other
-
-
-def _lines(path: Path, mesh: Path, depth: int = 0) -> Iterator[str]:
-    """The lines of a file, those of keywords whole, and those of the files that it includes, which lie in the folder of
-    the ``mesh``."""
-    if depth > _DEEPEST:
-        raise ValueError(f"{path.name} includes itself")
-    text = path.read_text(encoding="utf-8", errors="replace")
-    for line in map(str.strip, re.sub(r",[ \t]*\n(?=[^*\n]*=)", ",", text).splitlines()):
-        if line and not line.startswith("**"):
-            if not line.upper().startswith("*INCLUDE"):
-                yield line
-            if file := re.match(r"\*.*,\s*INPUT\s*=([^,]*)", line, re.IGNORECASE):
-                yield from _lines(beside(mesh, file[1].strip(' "')), mesh, depth + 1)
-
-
-def _blocks(path: Path) -> list[tuple[str, Options, Rows]]:
-    """Keywords with their options, and the rows of data below them."""
-    blocks: list[tuple[str, Options, Rows]] = [("", {}, [])]
-    for line in _lines(path, path):
-        first, *others = (part.strip(' "') for part in line.strip(", ").split(","))
-        if line.startswith("*"):
-            options = {key.strip().upper(): value.strip(' "') for key, _, value in (o.partition("=") for o in others)}
-            blocks.append((first[1:].upper(), options, []))
-        else:
-            blocks[-1][2].append([first, *others])
-    return blocks
+_WITHOUT_AREA = re.compile(r"(SPRING|DASHPOT|MASS|ROTARYI|CONN|GAP|DCOUP|R2D2|RB2D2).*")
+_OTHERS = {
+    "C3D": "solid elements",
+    "SC": "shell elements",
+    "S": "shell elements",
+    "M3D": "membrane elements",
+    "CAX": "axisymmetric elements",
+    "CGAX": "axisymmetric elements",
+    "B": "beam elements",
+    "COH": "cohesive elements",
+}
+_UNREAD = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY"}  # they move or make nodes
 
 
 class _Model:
-    """By their numbers, the places of nodes and the nodes of plane elements (``cells``) and of ``lines``; the numbers
-    of sets by kind and name, as it is first written; surfaces as elements and a face."""
+    """What a file has, by keys (`Scope.key`).
+
+    The places of ``nodes``; the nodes of plane elements (``cells``) and of ``lines``; the elements ``without_area``;
+    the keys of ``sets`` by kind and name, as it is first written; ``surfaces`` as elements and a face. Sets for the
+    file's ``internal`` use have no name for others.
+    """
 
     def __init__(self, path: Path) -> None:
         self.nodes: dict[int, list[float]] = {}
         self.cells: dict[int, list[int]] = {}
         self.lines: dict[int, list[int]] = {}
+        self.without_area: set[int] = set()
         self.sets: dict[str, dict[str, list[int]]] = {"NSET": {}, "ELSET": {}}
         self.surfaces: dict[str, list[tuple[list[int], str]]] = defaultdict(list)
+        self.internal: set[str] = set()
         self._names: dict[str, str] = {}
+        self._owners: dict[tuple[str, str], int] = {}
         take = {"NODE": self._node, "ELEMENT": self._element, "SURFACE": self._surface}
-        for keyword, options, rows in _blocks(path):
+        for scope, (keyword, options, rows) in scoped_blocks(path):
             if keyword in _UNREAD or options.get("SYSTEM", "R").upper() != "R":
                 raise ValueError(
-                    f"*{keyword} is not read as it stands; write all nodes and elements out, in rectangular "
-                    "coordinates and without parts and instances (noPartsInputFile=ON)"
+                    f"*{keyword} is not read as it stands; write all nodes and elements out, in rectangular coordinates"
                 )
             if keyword in take:
-                take[keyword](options, rows)
+                take[keyword](scope, options, rows)
             elif keyword in self.sets:
-                self._set(keyword, options, rows)
+                self._set(scope, keyword, options, rows)
 
-    def _node(self, options: Options, rows: Rows) -> None:
-        numbers = [int(row[0]) for row in rows]
-        for number, (_, *place) in zip(numbers, rows, strict=True):
-            if number in self.nodes:
-                raise ValueError(f"the node {number} is there twice")
-            self.nodes[number] = [float(value) for value in (*place, "0", "0")[:3]]
-        self._add("NSET", options.get("NSET"), numbers)
+    def _node(self, scope: Scope, options: Options, rows: Rows) -> None:
+        keys = [scope.key(row[0]) for row in rows]
+        for key, (_, *place) in zip(keys, rows, strict=True):
+            if key in self.nodes:
+                raise ValueError(f"the node {number_of(key)} is there twice")
+            self.nodes[key] = scope.placed([float(value) for value in (*place, "0", "0", "0")[:3]])
+        self._add(scope, "NSET", options.get("NSET"), keys)
 
-    def _element(self, options: Options, rows: Rows) -> None:
-        kind, values = options.get("TYPE", "").upper(), [int(value) for row in rows for value in row if value]
+    def _element(self, scope: Scope, options: Options, rows: Rows) -> None:
+        kind = options.get("TYPE", "").upper()
+        if _WITHOUT_AREA.fullmatch(kind):
+            self.without_area.update(scope.key(row[0]) for row in rows)
+            return
         if not _KINDS.fullmatch(kind):
-            raise ValueError(f"elements of type {kind} are not read, only CPS and CPE of 3, 4, 6 or 8 nodes")
+            what = next((said for start, said in _OTHERS.items() if kind.startswith(start)), "elements")
+            raise ValueError(f"{what} of type {kind} are not read, only plane ones: CPS and CPE of 3, 4, 6 or 8 nodes")
+        values = [scope.key(value) for row in rows for value in row if value]
         size = 1 + int(kind[3])
         if len(values) % size:
             raise ValueError(f"elements of type {kind} have {len(values)} numbers, no multiple of {size}")
+        found = self.lines if kind.startswith("T") else self.cells
         for start in range(0, len(values), size):
-            number, *nodes = values[start : start + size]
-            if number in self.cells or number in self.lines:
-                raise ValueError(f"the element {number} is there twice")
-            (self.lines if kind.startswith("T") else self.cells)[number] = nodes
-        self._add("ELSET", options.get("ELSET"), values[::size])
+            key, *nodes = values[start : start + size]
+            if key in self.cells or key in self.lines:
+                raise ValueError(f"the element {number_of(key)} is there twice")
+            found[key] = nodes
+        self._add(scope, "ELSET", options.get("ELSET"), values[::size])
 
-    def _set(self, kind: str, options: Options, rows: Rows) -> None:
+    def _set(self, scope: Scope, kind: str, options: Options, rows: Rows) -> None:
         if "GENERATE" in options:
             there = self.nodes.keys() if kind == "NSET" else self.cells.keys() | self.lines
-            ranges = [(*map(int, row), 1)[:3] for row in rows]
-            chosen = [n for a, b, step in ranges for n in there if a <= n <= b and (n - a) % step == 0]
+            chosen = []
+            for first, last, *step in rows:
+                a, b = scope.key(first), scope.key(last)
+                every = max(int(*step), 1) if step else 1
+                chosen += [n for n in there if a <= n <= b and (n - a) % every == 0]
         else:
-            chosen = self._chosen(kind, chain(*rows))
-        self._add(kind, options.get(kind), chosen)
+            chosen = self._chosen(scope, kind, chain(*rows))
+        owner = Scope() if "INSTANCE" in options else scope
+        self._add(owner, kind, options.get(kind), chosen)
+        if "INTERNAL" in options:
+            self.internal.add(owner.qualified(options.get(kind, "")))
 
-    def _surface(self, options: Options, rows: Rows) -> None:
+    def _surface(self, scope: Scope, options: Options, rows: Rows) -> None:
         name = options.get("NAME", "")
         if options.get("TYPE", "").upper() == "NODE":
-            self._add("NSET", name, self._chosen("NSET", chain(*rows)))
-        else:
-            self.surfaces[name] += [(self._chosen("ELSET", [item]), "".join(face).upper()) for item, *face in rows]
+            self._add(scope, "NSET", name, self._chosen(scope, "NSET", (row[0] for row in rows)))
+            return
+        found = [(self._chosen(scope, "ELSET", [item]), "".join(face).upper()) for item, *face in rows]
+        self.surfaces[scope.qualified(name)] += found
 
-    def _add(self, kind: str, name: str | None, numbers: list[int]) -> None:
+    def _add(self, scope: Scope, kind: str, name: str | None, keys: list[int]) -> None:
         if name:
-            self.sets[kind].setdefault(self._names.setdefault(name.upper(), name), []).extend(numbers)
+            whole = scope.qualified(name)
+            if self._owners.setdefault((kind, whole.upper()), scope.index) != scope.index:
+                raise ValueError(f"the *{kind} {whole!r} is there twice, once as a set of an instance")
+            self.sets[kind].setdefault(self._names.setdefault(whole.upper(), whole), []).extend(keys)
 
-    def _chosen(self, kind: str, items: Iterable[str]) -> list[int]:
-        """The numbers among ``items``, and those in the sets named there."""
+    def _chosen(self, scope: Scope, kind: str, items: Iterable[str]) -> list[int]:
+        """The keys of the numbers among ``items``, and those in the sets named there, of the ``scope`` first."""
         chosen = []
         for item in filter(None, items):
-            name = self._names.get(item.upper(), item)
-            if not item.isdecimal() and name not in self.sets[kind]:
-                raise ValueError(f"there is no *{kind} {name!r}")
-            chosen += [int(item)] if item.isdecimal() else self.sets[kind][name]
+            if item.isdecimal():
+                chosen.append(scope.key(item))
+                continue
+            names = [self._names.get(name.upper(), name) for name in (scope.qualified(item), item)]
+            known = next((name for name in names if name in self.sets[kind]), None)
+            if known is None:
+                raise ValueError(f"there is no *{kind} {item!r}")
+            chosen += self.sets[kind][known]
         return chosen
 
 
@@ -139,8 +145,9 @@ def read_abaqus(path: Path) -> PlaneMesh:
     cell_sets, facet_sets, point_sets = {}, defaultdict[str, list[np.ndarray]](list), {}
     for name, numbers in model.sets["ELSET"].items():
         ends = [model.lines[number][:: len(model.lines[number]) - 1] for number in numbers if number in model.lines]
-        members = sorted(set(numbers) - model.lines.keys())
-        if members or not ends:
+        members = sorted(set(numbers) - model.lines.keys() - model.without_area)
+        named = name not in model.internal and not (numbers and model.without_area.issuperset(numbers))
+        if named and (members or not ends):
             cell_sets[name] = _places(cell, members, f"element of the set {name!r}")
         if ends:
             facet_sets[name].append(_places(node, chain(*ends), "node").reshape(-1, 2))
@@ -155,7 +162,7 @@ def read_abaqus(path: Path) -> PlaneMesh:
     x, cells = in_basix_order(np.array(list(model.nodes.values())), corners, perm_gmsh)
     boundary, _ = outer_sides(cells)
     for name, numbers in model.sets["NSET"].items():
-        if name not in facet_sets:
+        if name not in facet_sets and name not in model.internal:
             nodes = _places(node, sorted(set(numbers)), f"node of the set {name!r}")
             edges = boundary[np.isin(boundary, nodes).all(axis=1)]
             if len(edges):
@@ -172,4 +179,4 @@ def _places(known: dict[int, int], wanted: Iterable[int], what: str) -> np.ndarr
     try:
         return np.array([known[number] for number in wanted], dtype=np.int64)
     except KeyError as lost:
-        raise ValueError(f"there is no {what} with the number {lost}") from None
+        raise ValueError(f"there is no {what} with the number {number_of(lost.args[0])}") from None

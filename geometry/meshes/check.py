@@ -208,13 +208,15 @@ def _overlaps(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], allowed: float)
     for (a, (sides, behind)), (b, (around, _)) in permutations(outer.items(), 2):
         x = np.concatenate([mesh.x[sides[:, 0]], mesh.x[mesh.cells[inside[a]][behind]].mean(axis=1)])
         polygon = _polygons(mesh, around)
-        start, along = polygon[:, :-1].reshape(-1, 2), np.diff(polygon, axis=1).reshape(-1, 2)
+        start, end = polygon[:, :-1].reshape(-1, 2), polygon[:, 1:].reshape(-1, 2)
+        along = end - start
         x = x[((x > start.min(axis=0)) & (x < start.max(axis=0))).all(axis=1)]
         length = np.linalg.norm(along, axis=1)
         spare = allowed + _INTO[mesh.edges.shape[1] > 2] * _PIECES * length
         for part in np.array_split(x, 1 + len(x) * len(start) // _AT_ONCE):
             to = part[:, None] - start
-            crosses = (to[..., 1] < 0) != (to[..., 1] < along[:, 1])  # of a ray to the right: an odd number from within
+            above = part[:, None, 1] < np.stack([start[:, 1], end[:, 1]])[:, None]  # exact where edges meet
+            crosses = above[0] != above[1]  # of a ray to the right: an odd number from within
             crosses &= (to[..., 0] * along[:, 1] < to[..., 1] * along[:, 0]) == (along[:, 1] > 0)
             within = crosses.sum(axis=1) % 2 == 1
             part, to = part[within], to[within]
