@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from dolfinx.mesh import Mesh, MeshTags, meshtags
@@ -21,7 +20,7 @@ from archord.geometry.meshes.check import faults
 from archord.geometry.meshes.fenicsx import distribute, gathered, own_gmsh, strips
 from archord.geometry.meshes.plane_mesh import PlaneMesh, flat
 from archord.geometry.meshes.refine import Circle, refined
-from archord.geometry.meshes.stored import stored_mesh
+from archord.geometry.meshes.stored import store_mesh, stored_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.meshes.xdmf import read_xdmf
 from archord.report.readable import require_file
@@ -121,19 +120,32 @@ def _read_gmsh(path: Path) -> PlaneMesh:
     with path.open("rb") as file:
         if not file.read(20).startswith(_HEADERS):  # gmsh would run it as a script
             raise ValueError("is no mesh of gmsh: it must begin with $MeshFormat")
-    with ProcessPoolExecutor(1, get_context("fork")) as pool:
-        try:
-            return pool.submit(_merged, path).result()
-        except BrokenProcessPool:
-            raise ValueError("gmsh fails on this file, which must be damaged") from None
+    with TemporaryDirectory() as folder:
+        found, said = Path(folder) / "mesh.npz", Path(folder) / "error"
+        child = os.fork()  # not of multiprocessing, whose daemons, as the workers of a pool, may have no children
+        if child == 0:
+            _merge(path, found, said)
+        _, status = os.waitpid(child, 0)
+        if said.exists():
+            raise ValueError(said.read_text(encoding="utf-8"))
+        if status != 0:
+            raise ValueError("gmsh fails on this file, which must be damaged")
+        return stored_mesh(found)
 
 
-def _merged(path: Path) -> PlaneMesh:
-    for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT):
-        signal.signal(number, signal.SIG_DFL)  # PETSc's handler would end all ranks
+def _merge(path: Path, found: Path, said: Path) -> NoReturn:
+    """Write the mesh that gmsh has of ``path`` to ``found``, or to ``said`` why there is none, and end the process."""
+    status = 1
     try:
+        for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT):
+            signal.signal(number, signal.SIG_DFL)  # PETSc's handler would end all ranks
         with own_gmsh() as gmsh:
             gmsh.merge(str(path))
-            return PlaneMesh.from_gmsh(gmsh)
+            mesh = PlaneMesh.from_gmsh(gmsh)
+        with found.open("wb") as file:
+            store_mesh(mesh, file)
+        status = 0
     except Exception as error:  # of gmsh
-        raise ValueError(str(error) or "gmsh cannot read this file") from None
+        said.write_text(str(error) or "gmsh cannot read this file", encoding="utf-8")
+    finally:
+        os._exit(status)
