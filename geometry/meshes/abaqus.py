@@ -67,7 +67,12 @@ class _Model:
         for key, (_, *place) in zip(keys, rows, strict=True):
             if key in self.nodes:
                 raise ValueError(f"the node {number_of(key)} is there twice")
-            self.nodes[key] = scope.placed([float(value) for value in (*place, "0", "0", "0")[:3]])
+            try:
+                x = [float(value) for value in (*place, "0", "0", "0")[:3]]
+            except ValueError:
+                said = f"has the coordinates {', '.join(place)}, which are no numbers"
+                raise ValueError(f"the node {number_of(key)} {said}") from None
+            self.nodes[key] = scope.placed(x)
         self._add(scope, "NSET", options.get("NSET"), keys)
 
     def _element(self, scope: Scope, options: Options, rows: Rows) -> None:

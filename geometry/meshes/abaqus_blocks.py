@@ -45,10 +45,9 @@ class Scope:
 
     def key(self, number: str) -> int:
         """A node or element by its ``number`` here as one among all instances. Raises ValueError."""
-        value = int(number)
-        if not 0 <= value < _NUMBERS:
-            raise ValueError(f"{value} is no number of a node or an element")
-        return self.index * _NUMBERS + value
+        if not number.isdecimal() or int(number) >= _NUMBERS:
+            raise ValueError(f"{number!r} is no number of a node or an element")
+        return self.index * _NUMBERS + int(number)
 
     def qualified(self, name: str) -> str:
         """The ``name`` of a set here among all instances."""

@@ -20,7 +20,7 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
 _DISTORTED = 0.02  # smallest over largest jacobian of a cell that is told of; refused are those below -0.02, as the
-# corner of a cell with two sides on one arc, which is flat, comes out a little below zero
+# corner of a curved cell with two sides on one arc, which is flat, comes out a little below zero
 _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
 _INTO = 0.02, 1e-3  # of a side: how deep bodies may overlap by their sides being straight, or curved
 _PIECES = 8  # of a side, as a polygon
@@ -81,7 +81,9 @@ def _unsound(mesh: PlaneMesh) -> list[str]:
     smallest, largest = smallest_determinants(mesh)
     size = np.ptp(mesh.x[mesh.cells], axis=1).max(axis=1) ** 2
     flat = largest <= _FLAT * size
-    folded = (smallest < -_DISTORTED * largest) | _turned_at_points(mesh)
+    curved = cell_kind(mesh.cells.shape[1])[1] > 1
+    lowest = -_DISTORTED * largest if curved else np.zeros(len(largest))
+    folded = (smallest < lowest) | _turned_at_points(mesh)
     bad = np.flatnonzero(flat | folded)
     if not len(bad):
         return []

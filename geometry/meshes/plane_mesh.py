@@ -15,6 +15,7 @@ from archord.geometry.basis import TRIANGLE, Array, cell_kind, lagrange_element
 
 _FAR = 1e30  # coordinates beyond overflow
 _INCOMPLETE = 20  # gmsh's number of triangles of third order without a node inside
+SOLID = "the mesh is of solid (3D) elements, and archord is plane: mesh a plane section of the bodies"
 _THICK = 1e-6  # difference of z over the mesh's size
 
 
@@ -38,6 +39,8 @@ class PlaneMesh:
         """What gmsh's model has in physical groups. Raises ValueError if that is not one kind of cells."""
         numbers, x, _ = gmsh.model.mesh.getNodes()
         points, edges, faces = (_groups(gmsh, dim) for dim in range(3))
+        if gmsh.model.getPhysicalGroups(3) or (not faces and len(gmsh.model.mesh.getElementTypes(3))):
+            raise ValueError(SOLID)
         kind = one_kind({nodes.shape[1] for _, nodes in faces.values() if len(nodes)})
         cells = np.concatenate([nodes.reshape(-1, kind) for _, nodes in faces.values()])
         _, first, which = np.unique(cells, axis=0, return_index=True, return_inverse=True)  # old files repeat them
@@ -188,7 +191,11 @@ def one_kind(nodes: set[int]) -> int:
     """The number of ``nodes`` of all cells. Raises ValueError if there is not one."""
     if len(nodes) == 1:
         return nodes.pop()
-    held = f"cells of {' and '.join(map(str, sorted(nodes)))} nodes" if nodes else "no plane cells in named sets"
+    held = (
+        f"cells of {' and '.join(map(str, sorted(nodes)))} nodes"
+        if nodes
+        else "no plane cells in named sets (only points, lines or elements without a set)"
+    )
     raise ValueError(f"the mesh has {held}; it must have one kind: all triangles or all quadrilaterals, of one order")
 
 

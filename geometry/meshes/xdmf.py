@@ -10,8 +10,10 @@ import numpy as np
 from dolfinx.cpp.io import perm_vtk
 
 from archord.geometry.meshes.beside import beside
-from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order
+from archord.geometry.meshes.plane_mesh import SOLID, PlaneMesh, in_basix_order
 from archord.report.readable import require_memory
+
+_SOLIDS = ("tet", "hex", "wedge", "pyramid")
 
 
 def read_xdmf(path: Path) -> PlaneMesh:
@@ -21,6 +23,10 @@ def read_xdmf(path: Path) -> PlaneMesh:
     meshes = [grid for grid in grids if grid.find("Geometry/DataItem") is not None]
     if not meshes:
         raise ValueError("there is no grid with topology and geometry")
+    topology = meshes[0].find("Topology")
+    kind = "" if topology is None else topology.attrib.get("TopologyType", "").lower()
+    if kind.startswith(_SOLIDS):
+        raise ValueError(SOLID)
     x, cells = (_data(path, meshes[0], part) for part in ("Geometry", "Topology"))
     sets: dict[int, dict[str, np.ndarray]] = {1: {}, 2: {}, cells.shape[1]: {}}  # by the number of nodes
     for grid in grids:

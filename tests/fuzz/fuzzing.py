@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from archord.benchmarks.stability.run import not_finite
 from tests.forked import start
+from tests.fuzz.mesh_mutations import mutate_mesh
 from tests.fuzz.mutations import GENERAL, base_scenes, mutate
 
 _MEMORY, _FILE = 8 * 2**30, 2 * 2**30  # bytes that a case may use
@@ -46,6 +47,21 @@ def run_case(number: int, folder: Path) -> FuzzCase:
     (folder / "scene.toml").write_bytes(content)
     for mesh in GENERAL.glob("*.inp"):
         shutil.copy(mesh, folder)
+    return _solved(kind, folder)
+
+
+def run_mesh_case(number: int, folder: Path) -> FuzzCase:
+    """Solve a sound scene on the mesh of case ``number`` in ``folder``, which is made for it."""
+    rng = Random(number)
+    folder.mkdir(parents=True)
+    shutil.copy(GENERAL / "blocks.toml", folder / "scene.toml")
+    kind, text = mutate_mesh(rng, (GENERAL / "blocks.inp").read_text(encoding="utf-8"))
+    (folder / "blocks.inp").write_text(text, encoding="utf-8")
+    return _solved(kind, folder)
+
+
+def _solved(kind: str, folder: Path) -> FuzzCase:
+    """How ``archord solve`` ends in ``folder``."""
     arguments = ["solve", "scene.toml", "-o", "run"]
     process = start(arguments, folder, folder / "stdout", folder / "stderr", before=_limit_resources)
     process.join(_LIMIT)

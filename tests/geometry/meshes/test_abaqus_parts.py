@@ -100,7 +100,7 @@ def test_a_part_without_an_instance_is_in_its_place(tmp_path):
         ("10., 0., 0., 10., 0., 1., 90.", "10., 0., 0., 11., 0., 0., 90.", "not plane: z differs"),
         ("10., 0., 0., 10., 0., 1., 90.", "90.", "one of 7 to turn it"),
         ("nset=ends, instance=bar-2", "nset=Bar-1.left, instance=bar-2", "'Bar-1.left' is there twice"),
-        ("1, 5., 5., 0.", "-1, 5., 5., 0.", "-1 is no number of a node"),
+        ("1, 5., 5., 0.", "-1, 5., 5., 0.", "'-1' is no number of a node"),
     ],
 )
 def test_what_contradicts_itself_is_refused(tmp_path, old, new, said):

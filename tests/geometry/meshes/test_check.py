@@ -219,6 +219,15 @@ def test_a_fold_between_corners_and_nodes_is_found():
     assert hidden > 20
 
 
+def test_a_straight_cell_may_not_fold_at_all():
+    """However little: no arc excuses it."""
+    x = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
+    for inward, refused in ((0.505, False), (0.495, True)):
+        x[3] = inward
+        mesh = PlaneMesh.of_sets(x[[0, 1, 2, 3]], np.arange(4)[None], {}, {}, {})
+        assert bool(faults(mesh)) == refused
+
+
 def test_collapsed_cells_say_so():
     x, cells = grid(2, 1)
     cells[1, 3] = cells[1, 1]

@@ -245,6 +245,24 @@ def test_a_deck_gone_wrong_is_refused_in_a_sentence(comm, deck, old, new, said):
     assert str(refusal.value).startswith(str(path))
 
 
+def test_solids_and_lines_say_what_they_are(module, tmp_path, comm):
+    gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+    gmsh.model.occ.synchronize()
+    gmsh.model.addPhysicalGroup(3, [1], name="box")
+    gmsh.model.mesh.generate(3)
+    gmsh.write(str(tmp_path / "box.msh"))
+    with io.XDMFFile(MPI.COMM_SELF, tmp_path / "box.xdmf", "w") as file:
+        file.write_mesh(create_unit_cube(MPI.COMM_SELF, 1, 1, 1))
+    for name in ("box.msh", "box.xdmf"):
+        with pytest.raises(ValueError, match=r"of solid \(3D\) elements, and archord is plane"):
+            read_mesh(tmp_path / name, comm)
+    gmsh.model.removePhysicalGroups()
+    gmsh.model.addPhysicalGroup(1, [1], name="edge")
+    gmsh.write(str(tmp_path / "line.msh"))
+    with pytest.raises(ValueError, match=r"no plane cells in named sets \(only points, lines"):
+        read_mesh(tmp_path / "line.msh", comm)
+
+
 def test_cells_of_two_kinds_and_other_files_are_refused(module, tmp_path, comm):
     (tmp_path / "mesh.stl").touch()
     for path, said in ((tmp_path / "mesh.stl", "none of the files"), (tmp_path / "no.msh", "No such file")):
