@@ -66,10 +66,14 @@ def test_the_exponent_is_that_of_the_standard(f, fu, n):
     assert exponent(f, fu, at_strength(f)) == pytest.approx(n, abs=0.55)
 
 
-@pytest.mark.parametrize(("unit", "scale"), [("MPa", 1.0), ("N/mm2", 1.0), ("Pa", 1e6), ("kPa", 1e3), ("GPa", 1e-3)])
+SCALES = {"MPa": 1.0, "N/mm2": 1.0, "Pa": 1e6, "kPa": 1e3, "GPa": 1e-3, "psi": 145.03773773, "ksi": 0.14503773773}
+
+
+@pytest.mark.parametrize(("unit", "scale"), SCALES.items())
 def test_stresses_are_in_the_unit_asked_for(unit, scale):
     found, m = metal("S355", unit), metals()["S355"]
-    assert (found["E"], found["nu"], found["yield_stress"]) == pytest.approx((210000 * scale, 0.3, 355 * scale))
+    assert (found["E"], found["nu"], found["yield"]) == pytest.approx((210000 * scale, 0.3, 355 * scale))
+    assert found["tensile"] == pytest.approx(470 * scale)
     assert np.array(found["hardening"]) == pytest.approx(np.array(m["hardening"]) * [1, scale])
 
 
@@ -78,7 +82,7 @@ def test_stresses_are_in_the_unit_asked_for(unit, scale):
     [
         ("S335", "MPa", r"is not a known material; did you mean S355\? Materials are S235, .*, Ti-6Al-4V$"),
         ("cheese", "MPa", "is not a known material; Materials are S235"),
-        ("S355", "psi", "needs a units.stress that is one of MPa, N/mm2, Pa, kPa, GPa, not psi"),
+        ("S355", "bar", "needs a units.stress that is one of MPa, N/mm2, Pa, kPa, GPa, psi, ksi, not bar"),
     ],
 )
 def test_unknown_names_and_units_are_refused(name, unit, said):
