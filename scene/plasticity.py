@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from archord.materials.hardening import Hardening, LinearHardening, SwiftHardening, TabularHardening, VoceHardening
-from archord.materials.named import metal
+from archord.materials.named import metal, metals
 from archord.scene.keys import Fault, Pair, Positive, Section, key, require
 
 ROUNDED = 1e-3  # how far a yield stress may be rounded beside a table, relatively
@@ -51,6 +51,8 @@ def filled(data: Any, unit: str) -> Any:
     test says. Raises `Fault`."""
     if not isinstance(data, dict):
         return data
+    if isinstance(data.get("material"), int) and str(data["material"]) in metals():
+        data = data | {"material": str(data["material"])}  # as --set reads 4340
     if isinstance(data.get("material"), str) and not data.get("rigid"):
         data = _brought(data, unit) | data
     with suppress(TypeError, ValueError, LookupError, OverflowError):  # what is no table is refused later

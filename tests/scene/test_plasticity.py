@@ -126,3 +126,9 @@ def test_inches_beside_metric_stresses_are_doubted():
         for scene in (joint(STEEL, units=units), lug | {"units": units, "load": {"displacement": 0.01}}):
             found = [doubt for doubt in parse_any(scene).doubts if "the unit of force" in doubt]
             assert len(found) == doubted
+
+
+def test_a_metal_whose_name_is_a_number_needs_no_quotes(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(resolved(parse_scene(joint(STEEL))))
+    assert load_scene(path, ["block.material=4340"]) == load_scene(path, ['block.material="4340"'])
