@@ -5,7 +5,7 @@ per unit thickness where the scene has none. The applied force is ``load`` for t
 ``load * factor`` for the ultimate ones.
 
 By hand, of a plate of width ``W``, edge distance ``e``, thickness ``t``, with a hole of diameter ``D`` and a pin of
-diameter ``d``, and the proof strength or the tensile strength for ``f``:
+diameter ``d``, or a bushing pressed in (``d = D``), and the proof strength or the tensile strength for ``f``:
 
     net section   f (W - D) t
     bearing       1.5 f d t                               EN 1993-1-8, table 3.10
@@ -26,6 +26,7 @@ from archord.materials.material import Array
 from archord.report.table import Table
 from archord.scene.errors import InputError
 from archord.scene.sections import Solid
+from archord.scene.shapes import LugShape
 
 if TYPE_CHECKING:
     from archord.postprocess.run import Run
@@ -116,7 +117,9 @@ def margins(
         for kind, (strength, _) in strengths.items()
         for name, allowable in by_hand(lug, strength, run.scene.thickness).items()
     ]
-    notes = [f"bearing by hand is {_BEARING:g} times the strength on the pin's diameter"]
+    notes = [
+        f"bearing by hand is {_BEARING:g} times the strength on the diameter of the {'hole' if lug.wall else 'pin'}"
+    ]
     if plate.yield_stress is None:
         notes.append("the lug of this run is elastic: it has no yield, and no margins by finite elements")
     else:
@@ -153,13 +156,14 @@ def _by_elements(
     return checks, notes
 
 
-def by_hand(lug: dict[str, Any], strength: float, thickness: float) -> dict[str, float]:
-    """Forces at which the sections of a ``lug``, of the keys of its shape, reach a ``strength``."""
-    R, bore = lug["radius"], lug["radius"] + lug["clearance"]
-    planes = 2 * (lug["edge_distance"] - bore * math.cos(_SPREAD))
+def by_hand(lug: LugShape, strength: float, thickness: float) -> dict[str, float]:
+    """Forces at which the sections of a ``lug`` reach a ``strength``; what bears on it is the pin or the bushing."""
+    edge, bore = lug.arguments()["edge_distance"], lug.hole
+    bearing = bore if lug.wall else lug.radius
+    planes = 2 * (edge - bore * math.cos(_SPREAD))
     return {
-        "net section": strength * (lug["width"] - 2 * bore) * thickness,
-        "bearing": _BEARING * strength * 2 * R * thickness,
+        "net section": strength * (lug.width - 2 * bore) * thickness,
+        "bearing": _BEARING * strength * 2 * bearing * thickness,
         "shear-out": planes * thickness * strength / math.sqrt(3),
     }
 
@@ -228,7 +232,7 @@ def _end_of_curve(plate: Solid) -> float | None:
     return last if table and last > 0 else None
 
 
-def _lug_of(run: Run) -> tuple[dict[str, Any], str, Any]:
+def _lug_of(run: Run) -> tuple[LugShape, str, Any]:
     """The lug's shape, the name of the load that pulls it, and its body. Raises `InputError`."""
     shape = getattr(getattr(run.scene, "mesh", None), "shape", None)
     if getattr(shape, "kind", "") != "lug":
@@ -243,7 +247,7 @@ def _lug_of(run: Run) -> tuple[dict[str, Any], str, Any]:
             f"{run.folder}: the pin never pulls at the lug's end: the force of {pulls[0]!r} is never above 0."
         )
     plate = next(body for body in run.scene.body if (body.cells or body.name) == "lug")
-    return run.scene.mesh.shape.arguments(), pulls[0], plate
+    return run.scene.mesh.shape, pulls[0], plate
 
 
 def margin_text(found: Margins) -> str:
@@ -257,7 +261,7 @@ def margin_text(found: Margins) -> str:
     for check in found.checks:
         above = "> " if check.bound else ""
         margin = "not known" if check.margin is None else f"{above}{check.margin:+.3f}"
-        table.add(check.kind, check.by, check.name, f"{above}{check.allowable:.5g}", margin)
+        table.add(check.kind, check.by, check.name, f"{above}{check.allowable:.6g}", margin)
     lines += ["", str(table), ""]
     for kind in ("yield", "ultimate"):
         hand, fe = found.weakest(kind, "hand"), _compared(found, kind)

@@ -18,6 +18,7 @@ from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import parse_any
 from archord.scene.parts import Body
+from archord.scene.shapes import LugShape
 from tests.output.run_files import solved
 
 STEEL = {"E": 210000.0, "nu": 0.3}
@@ -46,11 +47,14 @@ def runs(tmp_path_factory):
 
 def test_hand_formulas_are_those_of_the_sections():
     """A plate of width 40 and edge distance 20 with a hole of 20.2 and a pin of 20, 5 thick, at 100 MPa."""
-    found = by_hand(SHAPE | {"edge_distance": 20.0}, 100.0, 5.0)
+    found = by_hand(LugShape(**SHAPE, edge_distance=20.0), 100.0, 5.0)
     assert found["net section"] == pytest.approx(100 * (40 - 20.2) * 5)
     assert found["bearing"] == pytest.approx(1.5 * 100 * 20 * 5)
     planes = 2 * (20 - 10.1 * math.cos(math.radians(40))) * 5
     assert found["shear-out"] == pytest.approx(planes * 100 / math.sqrt(3))
+    bushed = by_hand(LugShape(**SHAPE, wall=2.0, interference=0.1), 100.0, 5.0)
+    assert bushed["net section"] == pytest.approx(100 * (40 - 24) * 5)
+    assert bushed["bearing"] == pytest.approx(1.5 * 100 * 24 * 5)
 
 
 def test_strengths_are_those_of_the_tension_test_behind_the_curve():
