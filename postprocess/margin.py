@@ -236,7 +236,10 @@ def _lug_of(run: Run) -> tuple[LugShape, str, Any]:
     """The lug's shape, the name of the load that pulls it, and its body. Raises `InputError`."""
     shape = getattr(getattr(run.scene, "mesh", None), "shape", None)
     if getattr(shape, "kind", "") != "lug":
-        raise InputError(f"{run.folder}: is no run of a [lug], whose sections the hand formulas know.")
+        raise InputError(
+            f"{run.folder}: is no run of a [lug], whose sections the hand formulas know "
+            "(of a [clevis] solve each plate as one)."
+        )
     pulls = [load.name for load in run.scene.load if load.direction == "x"]
     if len(pulls) != 1 or len(run.scene.load) != 1:
         names = ", ".join(load.name for load in run.scene.load)

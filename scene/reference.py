@@ -19,6 +19,7 @@ _GENERAL: dict[str, Any] = {name: info for name, info in ProblemScene.model_fiel
 _GENERAL["mesh.circle"] = Mesh.model_fields["circle"]
 # sections of presets; the load is the same for all
 _LUG = {name: PRESETS["lug"].model_fields[name] for name in ("lug", "plate", "bushing")}
+_CLEVIS = {name: PRESETS["clevis"].model_fields[name] for name in ("clevis", "inner", "outer")}
 _RINGS = {name: PRESETS["bushing"].model_fields[name] for name in ("bushing", "sleeve", "housing", "load")}
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 _KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false", "array": "list"}
@@ -54,11 +55,12 @@ def reference() -> str:
         "and output are those of joints. Headings in double brackets may stand any number of times.\n",
         *_tables(_GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}),
         "## Presets\n",
-        "A scene with `[lug]` (and `[plate]`, perhaps `[bushing]`), or with `[bushing]` (and `[[sleeve]]`, `[housing]`) "
-        "and no `[lug]`, stands for a general one, which `archord scene --expand` prints. The section pin is that of "
-        "joints, plate, bushing, sleeves and housing have materials like it, and the other sections are those of "
-        "general scenes.\n",
+        "A scene with `[lug]` (and `[plate]`, perhaps `[bushing]`), `[clevis]` (and `[inner]`, `[outer]`), or "
+        "`[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a general one, which "
+        "`archord scene --expand` prints. The section pin is that of joints, plates, bushing, sleeves and housing have materials like it, and "
+        "the other sections are those of general scenes.\n",
         *_tables(_LUG, dict.fromkeys(("plate", "bushing"), _JOINT["block"])),
+        *_tables(_CLEVIS, dict.fromkeys(("inner", "outer"), _JOINT["block"])),
         *_tables(_RINGS, dict.fromkeys(("sleeve", "housing"), _JOINT["block"])),
     ]
     return "\n".join(parts)

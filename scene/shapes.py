@@ -1,4 +1,4 @@
-"""Presets: a lug, perhaps with a bushing, and a pin in sleeves, in a few words; what general scene they stand for."""
+"""Presets: a lug, perhaps with a bushing, a clevis, and a pin in sleeves; what general scene they stand for."""
 
 from __future__ import annotations
 
@@ -126,6 +126,63 @@ class LugShape(Lug):
     def hole(self) -> float:
         """Radius of the hole in the plate."""
         return super().hole + (self.wall or 0.0) - self.interference
+
+
+class PlateOutline(Section):
+    """The outline of one plate of a clevis."""
+
+    width: Positive = key("width W", "length", example=40.0)
+    edge_distance: Positive | None = key("from hole's centre to the loaded end; W/2 if absent", "length", other=20.0)
+    length: Positive | None = key("from the hole's centre to the clamp; 1.5 W if absent", "length", default=None)
+    end: Literal["round", "square"] = key("the loaded end: an arc of radius W/2, or straight", default="round")
+
+    def lug(self, clevis: Clevis) -> Lug:
+        """The plate as a lug, unchecked."""
+        outline = self.model_dump(include={*PlateOutline.model_fields})
+        return Lug.model_construct(radius=clevis.radius, clearance=clevis.clearance, **outline)
+
+    def outline(self, clevis: Clevis) -> dict[str, Any]:
+        """What draws it."""
+        found = self.lug(clevis).arguments()
+        return {name: found[name] for name in PlateOutline.model_fields}
+
+
+class ClevisPlate(PlateOutline, Solid):
+    """The inner plate of a clevis, or each of its two outer ones."""
+
+    thickness: Positive = key("thickness of this plate", "length", example=10.0)
+
+
+class Clevis(Shape):
+    """A pin through one inner and two outer plates, and how finely they are meshed."""
+
+    clearance: float = key("hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1)
+
+    @model_validator(mode="after")
+    def _clearance(self) -> Clevis:
+        between = f"must be between {-_DEEPEST:g} and 0.5 times the radius"
+        require(-_DEEPEST <= self.clearance / self.radius <= 0.5, "clearance", between)
+        return self
+
+
+class ClevisShape(Clevis):
+    """A clevis with what a preset says elsewhere."""
+
+    inner: PlateOutline
+    outer: PlateOutline
+    pin: PinPart = "half"
+    kind: Literal["clevis"] = "clevis"
+
+    @model_validator(mode="after")
+    def _plates(self) -> ClevisShape:
+        for name in ("inner", "outer"):
+            getattr(self, name).lug(self).check(place=(name,))
+        return self
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws it: lengths, and what is drawn."""
+        plates = {name: getattr(self, name).outline(self) for name in ("inner", "outer")}
+        return super().arguments() | plates
 
 
 class Bushing(Shape):
@@ -262,6 +319,50 @@ class LugScene(Preset):
         return self._pulled(shape, solids, "clamp", surfaces, [self.lug.clearance, -sleeve.interference], laws)
 
 
+class ClevisScene(Preset):
+    """A pin through one inner plate and two outer ones: the plane problem of the inner plate, under the force P, beside
+    the one of an outer plate, under P/2, each per unit of its own thickness."""
+
+    clevis: Clevis = Field(description="radius of the pin, clearance in all plates, and mesh")
+    inner: ClevisPlate = Field(description="geometry and material of the inner plate")
+    outer: ClevisPlate = Field(description="geometry and material of each of the two outer plates")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ClevisScene:
+        self._require_whole("clevis.clearance", self.clevis.clearance)
+        for name, plate in self._plates.items():
+            plate.lug(self.clevis).check(place=(name,))
+        said = "is not for a clevis: its plates share a force, and the displacement is the sum of both; give force"
+        require(self.load.displacement is None, "load.displacement", said)
+        require(not self.pin.rigid, "pin.rigid", "must be false in a clevis")
+        said = "is not for a clevis, whose plates have a thickness each"
+        require(self.analysis.thickness is None, "analysis.thickness", said)
+        return self
+
+    @property
+    def _plates(self) -> dict[str, ClevisPlate]:
+        return {"inner": self.inner, "outer": self.outer}
+
+    def general(self) -> dict[str, Any]:
+        """The general scene that it stands for."""
+        parts: dict[str, list[dict[str, Any]]] = {"interaction": [], "support": [], "load": []}
+        shape = self.clevis.arguments() | {"kind": "clevis"}
+        overlap = max(-self.clevis.clearance, 0.0)
+        bodies: dict[str, Solid] = {}
+        for (name, plate), share in zip(self._plates.items(), (1.0, 0.5), strict=True):
+            shape[name] = plate.outline(self.clevis)
+            surfaces = [f"{name} pin", f"{name} hole"]
+            contact = {"name": f"pin in {name}", "surfaces": surfaces, "overlap": overlap}
+            place = {"diameter": f"{name} flat"}.get(self.load.at, f"{name} centre")
+            forces = [share / plate.thickness * force for force in self.load.stages]
+            parts["load"].append({"name": f"{name} pull", "on": place, "direction": "x", "force": forces})
+            parts["support"].append({"name": f"{name} clamp", "on": f"{name} clamp", "fixed": ["x", "y"]})
+            parts["interaction"].append(contact)
+            bodies |= {f"{name} pin": self.pin, name: plate}
+        parts["support"].append({"name": "axis", "on": "axis", "fixed": ["y"]})
+        return _general(self, shape, 2, bodies, **parts, path={"steps": self.load.steps})
+
+
 class BushingScene(Preset):
     """A pin, sleeves around it and a housing; they touch on the load axis at first if the load is a force."""
 
@@ -303,7 +404,7 @@ def _general(
         parts["interaction"] = [
             part if part.get("law") == "tied" else part | {"friction": friction} for part in parts["interaction"]
         ]
-    bodies = solids if pin.rigid else {"pin": pin, **solids}
+    bodies = solids if pin.rigid or pin in solids.values() else {"pin": pin, **solids}
     parts |= {
         "mesh": {"shape": shape | {"pin": "none" if pin.rigid else "whole" if pin.whole else "half"}},
         "body": [{"name": n} | s.model_dump(exclude_none=True, include=_MATERIAL) for n, s in bodies.items()],
@@ -331,4 +432,8 @@ def general_joint(scene: Scene) -> dict[str, Any]:
     return _general(scene, shape, 2, {"block": scene.block}, **parts)
 
 
-PRESETS: dict[str, type[LugScene] | type[BushingScene]] = {"lug": LugScene, "bushing": BushingScene}
+PRESETS: dict[str, type[LugScene] | type[ClevisScene] | type[BushingScene]] = {
+    "lug": LugScene,
+    "clevis": ClevisScene,
+    "bushing": BushingScene,
+}

@@ -48,7 +48,16 @@ OTHERS = {"units": {"length": "m", "stress": "Pa"}, "analysis": {"thickness": 5.
 BUSHED = LUG | {"bushing": {"thickness": 2.0, "interference": 0.01, "E": 110000.0, "nu": 0.34}}
 
 
-@pytest.mark.parametrize("data", [LUG, BUSHED, BUSHING, LUG | OTHERS, BUSHED | OTHERS, BUSHING | OTHERS])
+CLEVIS = {
+    "clevis": {"radius": 9.9, "clearance": 0.1, "element_size": 1.5, "growth": 0.5},
+    "inner": STEEL | {"thickness": 20.0, "width": 40.0, "length": 60.0},
+    "outer": {"E": 70000.0, "nu": 0.33, "thickness": 8.0, "width": 48.0, "end": "square"},
+    "pin": STEEL,
+    "load": {"force": [30000.0, 60000.0], "steps": 1},
+}
+
+
+@pytest.mark.parametrize("data", [LUG, BUSHED, CLEVIS, BUSHING, LUG | OTHERS, BUSHED | OTHERS, BUSHING | OTHERS])
 def test_a_preset_is_the_general_scene_that_it_prints(data):
     scene = parse_any(data)
     assert isinstance(scene, ProblemScene)
@@ -136,6 +145,19 @@ def test_radii_of_a_bushing_make_its_fits():
             "is not a known key; did you mean pin.whole? Keys are radius, element_size, growth, cl",
         ),
         (LUG, "lug.kind", "lug", 'lug.kind = "lug" is not a known key; Keys are '),
+        (CLEVIS, "outer.thickness", None, "outer.thickness is missing."),
+        (CLEVIS, "outer.width", 20.1, "outer.width = 20.1 must leave a ligament of at least 0.02 R beside the hole."),
+        (CLEVIS, "clevis.clearance", 6.0, "clevis.clearance = 6.0 must be between -0.03 and 0.5 times the radius."),
+        (CLEVIS, "clevis.clearance", -0.1, "needs pin.whole = true, as half a pin cannot be pressed in."),
+        (
+            CLEVIS,
+            "load",
+            {"displacement": 0.1},
+            "load.displacement = 0.1 is not for a clevis: its plates share a force",
+        ),
+        (CLEVIS, "analysis", {"thickness": 5.0}, "analysis.thickness = 5.0 is not for a clevis, whose plates have a"),
+        (CLEVIS, "pin", {"rigid": True}, "pin.rigid = true must be false in a clevis."),
+        (CLEVIS, "plate", STEEL, "plate is not a known key"),
         (BUSHING, "bushing.pin", "whole", "did you mean pin.whole?"),
         (
             BUSHING,
@@ -313,3 +335,26 @@ def test_the_fit_of_a_bushing_in_a_wide_lug_is_that_of_lame():
     pressure = system.contact.pair_of(side).pressure
     assert (side.weight * pressure).sum() / side.weight.sum() == pytest.approx(lame, rel=5e-3)
     assert system.drive_force("pull") == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}], ids=["half", "whole"])
+def test_each_plate_of_a_clevis_is_a_lug_of_its_own(pin):
+    """The inner one under P, an outer one under P/2, each with its thickness; forces balance at their clamps."""
+    analysis = {"plane": "stress"}
+    scene = parse_any(CLEVIS | {"pin": pin, "analysis": analysis})
+    assert [load.force for load in scene.load] == [[1500.0, 3000.0], [1875.0, 3750.0]]
+    both = System(general_problem(scene, MPI.COMM_SELF))
+    both.solve(scene.targets)
+    moved = dict(zip(both.drive_names, both.driven()[0], strict=True))
+    for name, share in (("inner", 1.0), ("outer", 0.5)):
+        plate = dict(CLEVIS[name])
+        thickness = plate.pop("thickness")
+        metal = {key: plate.pop(key) for key in ("E", "nu")}
+        load = {"force": [share * force for force in CLEVIS["load"]["force"]], "steps": 1}
+        data = {"lug": CLEVIS["clevis"] | plate, "plate": metal, "pin": pin, "load": load}
+        alone = parse_any(data | {"analysis": analysis | {"thickness": thickness}})
+        system = System(general_problem(alone, MPI.COMM_SELF))
+        system.solve(alone.targets)
+        assert moved[f"{name} pull"] == pytest.approx(system.driven()[0][0], rel=2e-3)
+        pull = share * 60000.0 / thickness
+        assert both.reaction(f"{name} clamp")[0] == pytest.approx(-pull, rel=1e-6)
