@@ -57,8 +57,8 @@ def reference() -> str:
         "## Presets\n",
         "A scene with `[lug]` (and `[plate]`, perhaps `[bushing]`), `[clevis]` (and `[inner]`, `[outer]`), or "
         "`[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a general one, which "
-        "`archord scene --expand` prints. The section pin is that of joints, plates, bushing, sleeves and housing have materials like it, and "
-        "the other sections are those of general scenes.\n",
+        "`archord scene --expand` prints. The section pin is that of joints, plates, bushing, sleeves and "
+        "housing have materials like it, and the other sections are those of general scenes.\n",
         *_tables(_LUG, dict.fromkeys(("plate", "bushing"), _JOINT["block"])),
         *_tables(_CLEVIS, dict.fromkeys(("inner", "outer"), _JOINT["block"])),
         *_tables(_RINGS, dict.fromkeys(("sleeve", "housing"), _JOINT["block"])),

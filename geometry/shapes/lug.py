@@ -53,8 +53,8 @@ def draw_plate(sketch: Sketch, plate: Plate, body: str, up: int, at: float = 0.0
     clamp = sketch.path(body, (back, 0), (back, up * side))
     last = sketch.path(body, corner, (tip, 0), on=apex)
     sides = sketch.path(body, (back, up * side), corner)
-    paths = {"hole": arc, "clamp": clamp, "sides": sides, "end": last}
-    sketch.face(body, axis=axis, **{f"{before}{name}": lines for name, lines in paths.items()})
+    paths = {f"{before}hole": arc, "axis": axis, f"{before}clamp": clamp}
+    sketch.face(body, **paths, **{f"{before}sides": sides, f"{before}end": last})
 
 
 def size_around(x: float, r: float, size: float, growth: float) -> str:
