@@ -66,6 +66,7 @@ class Progress:
 
     def __init__(self, scene: AnyScene, silent: bool) -> None:
         self.silent, self.by_mesh, self.iterations = silent, scene.analysis.accuracy is not None, 0
+        self.materials = scene.materials
         self.moving: Any = None
         if not silent and on_terminal():
             from rich.progress import Progress as Moving
@@ -77,6 +78,7 @@ class Progress:
         self.title, self.columns, last, self.unit = _shown(scene)
         if self.by_mesh:
             self.print(f"{self.title}: {scene.accurate} to {scene.analysis.accuracy:g} of its largest value")
+            self.strengths()
             costs = f"substeps     dofs  {last:>10s}  error of mesh  error of steps  seconds"
             sizes = "elements/R" if isinstance(scene, Scene) or scene.mesh.shape else "size/file"
             self.print(f" mesh  {sizes:>10s}  growth  {costs}")
@@ -107,10 +109,17 @@ class Progress:
         if not self.silent:
             print(text, flush=True)
 
+    def strengths(self) -> None:
+        """Say where each body yields."""
+        for name, found in self.materials.items():
+            if found["yield_stress"] is not None:
+                self.print(f"{name} {found['strength']}")
+
     def start(self, system: Any) -> None:
         """Say what is going to be solved."""
         ranks = f"{system.comm.size} rank{'s' if system.comm.size > 1 else ''}"
         self.print(f"{self.title}: {system.n_cells} {system.cell_kind}, {system.n_dofs} dofs, {ranks}")
+        self.strengths()
         self.headings()
 
     def level(self, level: Level) -> None:

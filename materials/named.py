@@ -8,7 +8,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-_PER_MPA = {"MPa": 1.0, "N/mm2": 1.0, "Pa": 1e6, "kPa": 1e3, "GPa": 1e-3}
+_PSI = 6.894757293168361e-3  # one pound-force (4.4482216152605 N) on a square inch (25.4 mm), in MPa
+_PER_MPA = {
+    "MPa": 1.0,
+    "N/mm2": 1.0,
+    "Pa": 1e6,
+    "kPa": 1e3,
+    "GPa": 1e-3,
+    "psi": 1 / _PSI,
+    "ksi": 1e-3 / _PSI,
+}
 
 
 @cache
@@ -18,13 +27,15 @@ def metals() -> dict[str, dict[str, Any]]:
 
 
 def metal(name: str, unit: str) -> dict[str, Any]:
-    """``E``, ``nu``, ``yield_stress`` and ``hardening``, points (PEEQ, true stress), of the metal ``name`` in a
-    ``unit`` of stress. Raises ValueError for a name or a unit that is not known."""
+    """The metal ``name`` in a ``unit`` of stress: ``E``, ``nu``, the listed strengths ``yield`` (or
+    0.2 % proof) and ``tensile``, and ``hardening``, points (PEEQ, true stress) from first yield on.
+    Raises ValueError for a name or a unit that is not known."""
     if name not in metals():
         hint = "".join(f"did you mean {near}? " for near in difflib.get_close_matches(name, metals(), 1))
         raise ValueError(f"is not a known material; {hint}Materials are {', '.join(metals())}")
     if unit not in _PER_MPA:
         raise ValueError(f"needs a units.stress that is one of {', '.join(_PER_MPA)}, not {unit}")
     found, scale = metals()[name], _PER_MPA[unit]
+    scaled = {key: scale * found[key] for key in ("E", "yield", "tensile")}
     points = [[peeq, scale * stress] for peeq, stress in found["hardening"]]
-    return {"E": scale * found["E"], "nu": found["nu"], "yield_stress": points[0][1], "hardening": points}
+    return scaled | {"nu": found["nu"], "hardening": points}

@@ -39,13 +39,13 @@ class GeneralAccount:
         timer = timer or Timer()
         with timer("mesh"):
             problem = general_problem(scene, comm)
-        self.scene, self._warnings = scene, list[str]()
+        self.scene, self._warnings = scene, scene.doubts
         with as_input_error(scene):
             if scene.mesh.shape is None:
                 from archord.presets.held import check, require_facing  # with scipy, which solves of presets do without
 
                 with timer("mesh"):
-                    self._warnings = check(scene, problem)
+                    self._warnings += check(scene, problem)
             self.system = System(problem, timer=timer)
             self.per_step = (*per_step(self.system), "slip")
             require_mirrored(scene, self.system)
@@ -140,7 +140,8 @@ class GeneralAccount:
             source["sha256"] = sha256(Path(mesh.file).read_bytes()).hexdigest()
         shares = {i.interaction.name: [pair.share for pair in i.pairs] for i in self.system.contact.interfaces}
         bodies = {body.name: list(problem.mesh.cell_sets[body.cells or body.name]) for body in problem.bodies}
-        return {"mesh": sizes(self.system) | source, "model": {"contact_shares": shares}, "bodies": bodies}
+        found = {"mesh": sizes(self.system) | source, "model": {"contact_shares": shares}, "bodies": bodies}
+        return found | {"materials": self.scene.materials}
 
     def warnings(self) -> list[str]:
         """What to warn of before the first step."""

@@ -117,7 +117,8 @@ class JointAccount:
     def facts(self) -> dict[str, dict[str, Any]]:
         """Sizes of the mesh and what was made of the scene, for run.json."""
         shares = [pair.share for pair in self.system.contact.pairs]
-        return {"mesh": sizes(self.system), "model": {"E_star": self.scene.E_star, "contact_shares": shares}}
+        model = {"E_star": self.scene.E_star, "contact_shares": shares}
+        return {"mesh": sizes(self.system), "model": model, "materials": self.scene.materials}
 
     def warnings(self) -> list[str]:
         """The scene's doubts, and a warning if the parabolic facets depart too much from their circles for the

@@ -14,6 +14,7 @@ from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh, unknown
 from archord.geometry.shapes.bushing import bushing
+from archord.geometry.shapes.clevis import clevis
 from archord.geometry.shapes.lug import lug
 from archord.materials.material import Array
 from archord.presets.joint import core_density, joint_mesh
@@ -23,7 +24,12 @@ from archord.scene.problem import GIVEN, LIVE, ProblemScene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
 from archord.solver.system import System
 
-_SHAPES: dict[str, Callable[..., TaggedMesh]] = {"lug": lug, "bushing": bushing, "joint": joint_mesh}
+_SHAPES: dict[str, Callable[..., TaggedMesh]] = {
+    "lug": lug,
+    "clevis": clevis,
+    "bushing": bushing,
+    "joint": joint_mesh,
+}
 _AXES = {"x": 0, "y": 1, "rotation": 2}
 
 

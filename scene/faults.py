@@ -12,7 +12,7 @@ from archord.scene.keys import Fault, Section, toml_value
 _MOST_SENTENCES = 20
 _ELSEWHERE = {"lug.pin": "pin.whole", "bushing.pin": "pin.whole", "bushing.rings": "[[sleeve]] and [housing]"}
 _ELSEWHERE |= {"load.steps": "path.steps"}
-_KINDS = {"number", "list", "law", "lug", "bushing", "joint"}  # of values, in pydantic's places
+_KINDS = {"number", "list", "law", "lug", "clevis", "bushing", "joint"}  # of values, in pydantic's places
 _PHRASES = {
     "missing": "is missing",
     "extra_forbidden": "is not a known key; {hint}{kind} are {known}",

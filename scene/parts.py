@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from archord.scene.keys import Name, Pair, Positive, Section, given, key, require
 from archord.scene.sections import Loading, NotNegative, Solid, StepCounts, Steps, Targets
-from archord.scene.shapes import BushingShape, JointShape, LugShape
+from archord.scene.shapes import BushingShape, ClevisShape, JointShape, LugShape
 
 Freedom = Literal["x", "y", "rotation"]
 Surfaces = Annotated[list[Name], Field(min_length=1, max_length=2)]
@@ -38,7 +38,7 @@ class Mesh(Section):
     order: Literal[1, 2, 3] | None = key("order of the geometry, that of the file if absent; 2 for circles", other=2)
     refine: int = key("how often every cell is cut in four", default=0, ge=0, le=6)
     circle: list[Circle] = Field(default_factory=list, description="circles that facet sets lie on")
-    shape: Annotated[LugShape | BushingShape | JointShape, Field(discriminator="kind")] | None = Field(
+    shape: Annotated[LugShape | ClevisShape | BushingShape | JointShape, Field(discriminator="kind")] | None = Field(
         None, description="the shape of a preset, as `archord scene --expand` prints it"
     )
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from typing import Annotated, Any
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from archord.materials.hardening import Hardening, LinearHardening, SwiftHardening, TabularHardening, VoceHardening
-from archord.materials.named import metal
+from archord.materials.named import metal, metals
 from archord.scene.keys import Fault, Pair, Positive, Section, key, require
 
+ROUNDED = 1e-3  # how far a yield stress may be rounded beside a table, relatively
 _LAWS = {"Voce": {"saturation", "rate"}, "Swift": {"offset", "exponent"}, "a tension test": {"engineering"}}
 
 
@@ -44,27 +46,58 @@ HardeningKey = Annotated[
 
 
 def filled(data: Any, unit: str) -> Any:
-    """The keys ``data`` of a solid with those that they leave open: those of the metal that ``material`` names, in the
-    ``unit`` of stress, whose hardening goes with its own yield stress alone; and the yield stress that a table or a
-    tension test says. Raises `Fault`."""
+    """The keys ``data`` of a solid with those that they leave open: what the metal brings that
+    ``material`` names, in the ``unit`` of stress, and the yield stress that a table or a tension
+    test says. Raises `Fault`."""
     if not isinstance(data, dict):
         return data
-    if isinstance(name := data.get("material"), str) and not data.get("rigid"):
-        try:
-            found = metal(name, unit)
-        except ValueError as error:
-            raise Fault(("material",), str(error)) from None
-        if "hardening" in data or "yield_stress" in data:
-            del found["hardening"]
-        data = found | data
-    hardening = data.get("hardening")
-    with suppress(TypeError, ValueError, IndexError, KeyError):  # what is no table is refused later
-        if isinstance(hardening, dict):
-            strain, stress = hardening["engineering"][0]
-            return {"yield_stress": stress * (1 + strain)} | data
-        if hardening is not None:
-            return {"yield_stress": hardening[0][1]} | data
+    if isinstance(data.get("material"), int) and str(data["material"]) in metals():
+        data = data | {"material": str(data["material"])}  # as --set reads 4340
+    if isinstance(data.get("material"), str) and not data.get("rigid"):
+        data = _brought(data, unit) | data
+    with suppress(TypeError, ValueError, LookupError, OverflowError):  # what is no table is refused later
+        begin = first_yield(data.get("hardening"))
+        said = data.get("yield_stress")
+        near = [math.isclose(said, stress, rel_tol=ROUNDED) for stress in begin if said is not None]
+        if begin and (said is None or any(near)):
+            return data | {"yield_stress": begin[-1]}
     return data
+
+
+def _brought(data: dict[str, Any], unit: str) -> dict[str, Any]:
+    """What the metal brings that ``data`` names: its whole curve from first yield on; or the listed
+    yield strength, where the scene says how the metal hardens from there; or its elasticity alone,
+    where the scene says the yield stress, too. Raises `Fault`."""
+    try:
+        found = metal(data["material"], unit)
+    except ValueError as error:
+        raise Fault(("material",), str(error)) from None
+    elastic = {"E": found["E"], "nu": found["nu"]}
+    hardening = data.get("hardening")
+    if "yield_stress" in data or _begins(hardening):
+        return elastic
+    if "hardening" in data:
+        return elastic | {"yield_stress": found["yield"]}
+    said = "would add to the curve of the material, which is all of its hardening: give hardening, too (0.0 for none)"
+    require(not data.get("back_stresses"), ("back_stresses",), said)
+    curve = found["hardening"]
+    return elastic | {"yield_stress": curve[0][1], "hardening": curve}
+
+
+def _begins(hardening: Any) -> bool:
+    """Whether this hardening says itself where it begins: a table, or a tension test."""
+    return isinstance(hardening, list) or (isinstance(hardening, dict) and "engineering" in hardening)
+
+
+def first_yield(hardening: Any) -> tuple[float, ...]:
+    """The stress at which a table begins; of a tension test the engineering stress and the true
+    one; of others ()."""
+    if not _begins(hardening):
+        return ()
+    if isinstance(hardening, list):
+        return (float(hardening[0][1]),)
+    strain, stress = hardening["engineering"][0]
+    return float(stress), float(stress * (1 + strain))
 
 
 def hardening_law(yield_stress: float, hardening: Any, E: float) -> Hardening:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from archord.materials.named import metals
 from archord.report.table import Table
@@ -17,8 +17,10 @@ from archord.scene.shapes import PRESETS
 _JOINT: dict[str, Any] = {name: info for name, info in Scene.model_fields.items() if name != "format"}
 _GENERAL: dict[str, Any] = {name: info for name, info in ProblemScene.model_fields.items() if name != "format"}
 _GENERAL["mesh.circle"] = Mesh.model_fields["circle"]
-_OWN = ("lug", "plate", "bushing", "sleeve", "housing", "load")  # sections of presets
-_PRESETS = {name: scene.model_fields[name] for scene in PRESETS.values() for name in _OWN if name in scene.model_fields}
+# sections of presets; the load is the same for all
+_LUG = {name: PRESETS["lug"].model_fields[name] for name in ("lug", "plate", "bushing")}
+_CLEVIS = {name: PRESETS["clevis"].model_fields[name] for name in ("clevis", "inner", "outer")}
+_RINGS = {name: PRESETS["bushing"].model_fields[name] for name in ("bushing", "sleeve", "housing", "load")}
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 _KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false", "array": "list"}
 
@@ -53,10 +55,13 @@ def reference() -> str:
         "and output are those of joints. Headings in double brackets may stand any number of times.\n",
         *_tables(_GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}),
         "## Presets\n",
-        "A scene with `[lug]` (and `[plate]`) or `[bushing]` (and `[[sleeve]]`, `[housing]`) stands for a general one, "
-        "which `archord scene --expand` prints. The section pin is that of joints, plate, sleeves and housing have "
-        "materials like it, and the other sections are those of general scenes.\n",
-        *_tables(_PRESETS, dict.fromkeys(("plate", "sleeve", "housing"), _JOINT["block"])),
+        "A scene with `[lug]` (and `[plate]`, perhaps `[bushing]`), `[clevis]` (and `[inner]`, `[outer]`), or "
+        "`[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a general one, which "
+        "`archord scene --expand` prints. The section pin is that of joints, plates, bushing, sleeves and "
+        "housing have materials like it, and the other sections are those of general scenes.\n",
+        *_tables(_LUG, dict.fromkeys(("plate", "bushing"), _JOINT["block"])),
+        *_tables(_CLEVIS, dict.fromkeys(("inner", "outer"), _JOINT["block"])),
+        *_tables(_RINGS, dict.fromkeys(("sleeve", "housing"), _JOINT["block"])),
     ]
     return "\n".join(parts)
 
@@ -77,7 +82,7 @@ def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
 
 
 def _heading(section: str, info: Any) -> str:
-    return f"[[{section}]]" if get_args(info.annotation) else f"[{section}]"
+    return f"[[{section}]]" if get_origin(info.annotation) is list else f"[{section}]"
 
 
 def materials() -> str:

@@ -60,9 +60,19 @@ class Checked(Section):
         return self.analysis.thickness or 1.0
 
     @property
-    def doubts(self) -> list[str]:
+    def doubts(self: Any) -> list[str]:
         """What to warn of before anything is solved."""
-        return []
+        return self.units.doubts
+
+    @property
+    def materials(self: Any) -> dict[str, dict[str, Any]]:
+        """The numbers that each body is solved with, by its name: E, nu, the yield stress, and in
+        words how it hardens."""
+        unit, solids = self.units.stress, self.solids.items()
+        return {
+            name: solid.model_dump(include={"E", "nu", "yield_stress"}) | {"strength": solid.strength(unit)}
+            for name, solid in solids
+        }
 
     @property
     def plastic(self: Any) -> bool:
@@ -122,12 +132,13 @@ class Scene(Checked):
         if self.force_controlled:
             stiffest = _STIFFEST_STUCK if self.analysis.friction else _STIFFEST
             farthest, least = farthest / (stiffest * self.E_star * self.thickness), "at least "
+        said = super().doubts
         if farthest <= self.small or self.joint.is_ring:
-            return []
+            return said
         moved, error = f"load.{self.load.kind} moves the pin by {least}{farthest:.2g} R", self.too_low * farthest
         fall = ", and may let it fall where it should rise" if farthest > _FAR else ""
-        said = f"{moved}: small-strain theory makes P about {100 * error:.2g} % too low there{fall}"
-        return [f'{said}; analysis.strain = "large" is for that']
+        small = f"{moved}: small-strain theory makes P about {100 * error:.2g} % too low there{fall}"
+        return [*said, f'{small}; analysis.strain = "large" is for that']
 
     @property
     def too_low(self) -> float:

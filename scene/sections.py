@@ -31,6 +31,20 @@ Targets = Annotated[Annotated[float, Tag("number")] | Annotated[list[float], Fie
 BackStress = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 
 
+_FORCES = {  # units of stress and length, and of the force that is stress times length squared
+    ("MPa", "mm"): "N",
+    ("N/mm2", "mm"): "N",
+    ("Pa", "m"): "N",
+    ("GPa", "mm"): "kN",
+    ("kPa", "m"): "kN",
+    ("MPa", "m"): "MN",
+    ("psi", "in"): "lbf",
+    ("ksi", "in"): "kip",
+}
+_INCHES = {"in": "in", "inch": "in"}
+_LENGTHS = ("mm", "cm", "m", "um", *_INCHES, "ft")
+
+
 class Units(Section):
     """Names of the scene's units, for headings; they must be consistent (force = stress times length squared)."""
 
@@ -39,10 +53,22 @@ class Units(Section):
 
     def force_of(self, thickness: float | None) -> str:
         """Unit of force of a joint of this thickness, per unit thickness without."""
-        newton = (self.stress, self.length) in (("MPa", "mm"), ("Pa", "m"))
+        known = _FORCES.get((self.stress, _INCHES.get(self.length, self.length)))
         if thickness is None:
-            return f"N/{self.length}" if newton else f"{self.stress} {self.length}"
-        return "N" if newton else f"{self.stress} {self.length}2"
+            return f"{known}/{self.length}" if known else f"{self.stress} {self.length}"
+        return known or f"{self.stress} {self.length}2"
+
+    @property
+    def doubts(self) -> list[str]:
+        """What to warn of: inches beside metric stresses or the other way round, as a default may
+        do it."""
+        imperial = self.stress in ("psi", "ksi"), self.length in (*_INCHES, "ft")
+        if imperial[0] == imperial[1] or self.length not in _LENGTHS:
+            return []
+        cure = 'units.length = "in"' if imperial[0] else 'units.stress = "psi" or "ksi"'
+        force = self.force_of(1.0)
+        given = f"units.stress = {self.stress!r} with units.length = {self.length!r}"
+        return [f"{given} makes {force} the unit of force; {cure} would make it lbf or kip"]
 
     def energy_of(self, thickness: float | None) -> str:
         """Unit of energy of a joint of this thickness, per unit thickness without."""
@@ -81,7 +107,9 @@ class Solid(Section):
                 first, rise = (float(np.max(of(np.zeros(1)))) for of in (self.law.stress, self.law.slope))
             except ValueError as error:
                 raise Fault(("hardening",), f"is no hardening law: {error}") from None
-            said = f"must begin at yield_stress ({self.yield_stress:g})"
+            test = getattr(self.hardening, "engineering", None)
+            true = f", the true stress of {test[0][1]:g}" if test else ""
+            said = f"must begin at yield_stress ({self.yield_stress:g}), not at {first:g}{true}"
             require(math.isclose(first, self.yield_stress, rel_tol=1e-9), "hardening", said)
             require(rise >= 0, "hardening", "must not soften: saturation must be at least yield_stress")
         return self
@@ -90,6 +118,23 @@ class Solid(Section):
     def perfectly_plastic(self) -> bool:
         """Whether the yield stress is a constant."""
         return self.hardening == 0 and not self.back_stresses
+
+    def strength(self, unit: str) -> str:
+        """Where the solid yields, in a ``unit`` of stress, and how it hardens, in words; "elastic"
+        if it does not."""
+        if self.yield_stress is None:
+            return "elastic"
+        said = [f"yields at {self.yield_stress:g} {unit}"]
+        if self.perfectly_plastic:
+            said.append("perfectly plastic")
+        elif not isinstance(self.hardening, float):
+            last = self.law.knots()[-1]
+            said.append(f"hardens to {self.law.stress(last):g} {unit} at PEEQ {last:g}")
+        elif self.hardening:
+            said.append(f"hardens by {self.hardening:g} {unit} times PEEQ")
+        if self.back_stresses:
+            said.append(f"back stresses: {len(self.back_stresses)}")
+        return ", ".join(said)
 
     @property
     def law(self) -> Hardening:

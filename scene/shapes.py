@@ -1,8 +1,8 @@
-"""Presets: a lug, and a pin in sleeves, in a few words; what general scene they stand for."""
+"""Presets: a lug, perhaps with a bushing, a clevis, and a pin in sleeves; what general scene they stand for."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
@@ -12,6 +12,7 @@ from archord.scene.keys import Pair, Positive, Section, key, require
 from archord.scene.scene import Checked, Scene, plain
 from archord.scene.sections import (
     Loading,
+    NotNegative,
     Pin,
     PresetAnalysis,
     ProblemOutput,
@@ -61,10 +62,21 @@ class Lug(Shape):
 
     @model_validator(mode="after")
     def _lug(self) -> Lug:
-        a, R = self.arguments(), self.radius
-        hole, half = R + self.clearance, self.width / 2
         between = f"must be between {-_DEEPEST:g} and 0.5 times the radius"
-        require(-_DEEPEST <= self.clearance / R <= 0.5, "clearance", between)
+        require(-_DEEPEST <= self.clearance / self.radius <= 0.5, "clearance", between)
+        self.check()
+        return self
+
+    @property
+    def hole(self) -> float:
+        """Radius of the hole in the plate."""
+        return self.radius + self.clearance
+
+    def check(self, hole: float | None = None, place: tuple[str, ...] = ()) -> None:
+        """Raise `Fault` below ``place`` for a plate in which a ``hole`` of this radius, by default its own, leaves no
+        ligament."""
+        a, R, half = self.arguments(), self.radius, self.width / 2
+        hole = hole or self.hole
         behind = a["length"] - max(hole, half - a["edge_distance"])
         ligaments = {
             "width": (half - hole, "beside the hole"),
@@ -72,9 +84,9 @@ class Lug(Shape):
             "length": (behind, "behind the hole and the end's arc"),
         }
         for name, (ligament, where) in ligaments.items():
-            require(ligament >= _THINNEST * R, name, f"must leave a ligament of at least {_THINNEST:g} R {where}")
-            require(a[name] <= _FARTHEST * R, name, f"must not exceed {_FARTHEST:g} R")
-        return self
+            said = f"must leave a ligament of at least {_THINNEST:g} R {where}"
+            require(ligament >= _THINNEST * R, (*place, name), said)
+            require(a[name] <= _FARTHEST * R, (*place, name), f"must not exceed {_FARTHEST:g} R")
 
     def arguments(self) -> dict[str, Any]:
         """What draws it: lengths, and what is drawn."""
@@ -82,11 +94,95 @@ class Lug(Shape):
         return super().arguments() | lengths
 
 
+class LugBushing(Solid):
+    """A bushing pressed into the hole of a lug: the pin lies in it with the clearance of the section lug."""
+
+    thickness: Positive = key("thickness of its wall", "length", example=2.0)
+    interference: NotNegative = key("its outer radius - radius of the hole in the plate", "length", default=0.0)
+    bonded: bool = key("bonded to the plate, without an interference", default=False)
+    touching: bool = key("the pin touches it on the load axis at first, as under a force", default=False)
+
+    def check(self, lug: Lug, place: tuple[str, ...] = ()) -> float:
+        """The radius of the hole that it needs in the plate of ``lug``. Raises `Fault` below ``place``."""
+        R, outer = lug.radius, lug.radius + lug.clearance + self.thickness
+        require(self.thickness >= _THINNEST * R, (*place, "thickness"), f"must be at least {_THINNEST:g} R")
+        said = f"must not exceed {_DEEPEST:g} of its outer radius"
+        require(self.interference <= _DEEPEST * outer, (*place, "interference"), said)
+        fits = not (self.bonded and self.interference)
+        require(fits, (*place, "interference"), "is not for a bonded bushing")
+        return outer - self.interference
+
+
 class LugShape(Lug):
     """A lug with what a preset says elsewhere."""
 
     pin: PinPart = "half"
     kind: Literal["lug"] = "lug"
+    wall: Positive | None = key("thickness of a bushing's wall, if there is one", "length", default=None)
+    interference: NotNegative = key("the bushing's outer radius - radius of the hole", "length", default=0.0)
+    touching: bool = key("the pin touches on the load axis at first, or is concentric", default=True)
+
+    @property
+    def hole(self) -> float:
+        """Radius of the hole in the plate."""
+        return super().hole + (self.wall or 0.0) - self.interference
+
+
+class PlateOutline(Section):
+    """The outline of one plate of a clevis."""
+
+    width: Positive = key("width W", "length", example=40.0)
+    edge_distance: Positive | None = key("from hole's centre to the loaded end; W/2 if absent", "length", other=20.0)
+    length: Positive | None = key("from the hole's centre to the clamp; 1.5 W if absent", "length", default=None)
+    end: Literal["round", "square"] = key("the loaded end: an arc of radius W/2, or straight", default="round")
+
+    def lug(self, clevis: Clevis) -> Lug:
+        """The plate as a lug, unchecked."""
+        outline = self.model_dump(include={*PlateOutline.model_fields})
+        return Lug.model_construct(radius=clevis.radius, clearance=clevis.clearance, **outline)
+
+    def outline(self, clevis: Clevis) -> dict[str, Any]:
+        """What draws it."""
+        found = self.lug(clevis).arguments()
+        return {name: found[name] for name in PlateOutline.model_fields}
+
+
+class ClevisPlate(PlateOutline, Solid):
+    """The inner plate of a clevis, or each of its two outer ones."""
+
+    thickness: Positive = key("thickness of this plate", "length", example=10.0)
+
+
+class Clevis(Shape):
+    """A pin through one inner and two outer plates, and how finely they are meshed."""
+
+    clearance: float = key("hole radius - pin radius: up to 0.5 R, negative for an interference", "length", example=0.1)
+
+    @model_validator(mode="after")
+    def _clearance(self) -> Clevis:
+        between = f"must be between {-_DEEPEST:g} and 0.5 times the radius"
+        require(-_DEEPEST <= self.clearance / self.radius <= 0.5, "clearance", between)
+        return self
+
+
+class ClevisShape(Clevis):
+    """A clevis with what a preset says elsewhere."""
+
+    inner: PlateOutline
+    outer: PlateOutline
+    pin: PinPart = "half"
+    kind: Literal["clevis"] = "clevis"
+
+    @model_validator(mode="after")
+    def _plates(self) -> ClevisShape:
+        for name in ("inner", "outer"):
+            getattr(self, name).lug(self).check(place=(name,))
+        return self
+
+    def arguments(self) -> dict[str, Any]:
+        """What draws it: lengths, and what is drawn."""
+        plates = {name: getattr(self, name).outline(self) for name in ("inner", "outer")}
+        return super().arguments() | plates
 
 
 class Bushing(Shape):
@@ -167,15 +263,22 @@ class Preset(Checked):
         require(fits, name, "needs pin.whole = true, as half a pin cannot be pressed in")
 
     def _pulled(
-        self, shape: dict[str, Any], solids: Mapping[str, Solid], held: str, surfaces: list[str], gaps: list[float]
+        self,
+        shape: dict[str, Any],
+        solids: Mapping[str, Solid],
+        held: str,
+        surfaces: list[str],
+        gaps: list[float],
+        laws: Sequence[str] = (),
     ) -> dict[str, Any]:
         """The general scene of ``solids``, from the pin outward, with the edge ``held``; of their ``surfaces`` the
-        first faces the second at the first of the ``gaps``, the third the fourth, ..."""
+        first faces the second at the first of the ``gaps`` by the first of the ``laws``, the third the fourth, ..."""
         half, touching = (shape.get(name, True) for name in ("half", "touching"))
         rigid, names, contacts = self.pin.rigid, ["pin", *solids], list[dict[str, Any]]()
         for k, gap in enumerate(gaps):
             facing = {"name": f"{names[k]} in {names[k + 1]}", "surfaces": surfaces[2 * k : 2 * k + 2]}
-            contacts.append(facing | {"overlap": max(-gap, 0.0)})
+            law = {"law": laws[k]} if laws else {}
+            contacts.append(facing | law | {"overlap": max(-gap, 0.0)})
         if rigid:
             disc = {"centre": [touching * sum(max(gap, 0.0) for gap in gaps), 0.0], "radius": shape["radius"]}
             contacts[0] |= {"surfaces": [surfaces[1]], "rigid": disc}
@@ -193,16 +296,71 @@ class LugScene(Preset):
 
     lug: Lug = Field(description="geometry and mesh")
     plate: Solid = Field(description="material of the lug")
+    bushing: LugBushing | None = Field(None, description="a bushing pressed into the hole of a lug")
 
     @model_validator(mode="after")
     def _consistent(self) -> LugScene:
         self._require_whole("lug.clearance", self.lug.clearance)
+        if self.bushing is not None:
+            self.lug.check(self.bushing.check(self.lug, ("bushing",)), ("lug",))
         return self
 
     def general(self) -> dict[str, Any]:
         """The general scene that it stands for."""
         shape = self.lug.arguments() | {"kind": "lug"}
-        return self._pulled(shape, {"lug": self.plate}, "clamp", ["pin", "hole"], [self.lug.clearance])
+        sleeve = self.bushing
+        if sleeve is None:
+            return self._pulled(shape, {"lug": self.plate}, "clamp", ["pin", "hole"], [self.lug.clearance])
+        touching = sleeve.touching or self.load.force is not None
+        shape |= {"wall": sleeve.thickness, "interference": sleeve.interference, "touching": touching}
+        solids = {"bushing": sleeve, "lug": self.plate}
+        surfaces = ["pin", "bushing inside", "bushing outside", "hole"]
+        laws = ["frictionless", "tied" if sleeve.bonded else "frictionless"]
+        return self._pulled(shape, solids, "clamp", surfaces, [self.lug.clearance, -sleeve.interference], laws)
+
+
+class ClevisScene(Preset):
+    """A pin through one inner plate and two outer ones: the plane problem of the inner plate, under the force P, beside
+    the one of an outer plate, under P/2, each per unit of its own thickness."""
+
+    clevis: Clevis = Field(description="radius of the pin, clearance in all plates, and mesh")
+    inner: ClevisPlate = Field(description="geometry and material of the inner plate")
+    outer: ClevisPlate = Field(description="geometry and material of each of the two outer plates")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ClevisScene:
+        self._require_whole("clevis.clearance", self.clevis.clearance)
+        for name, plate in self._plates.items():
+            plate.lug(self.clevis).check(place=(name,))
+        said = "is not for a clevis: its plates share a force, and the displacement is the sum of both; give force"
+        require(self.load.displacement is None, "load.displacement", said)
+        require(not self.pin.rigid, "pin.rigid", "must be false in a clevis")
+        said = "is not for a clevis, whose plates have a thickness each"
+        require(self.analysis.thickness is None, "analysis.thickness", said)
+        return self
+
+    @property
+    def _plates(self) -> dict[str, ClevisPlate]:
+        return {"inner": self.inner, "outer": self.outer}
+
+    def general(self) -> dict[str, Any]:
+        """The general scene that it stands for."""
+        parts: dict[str, list[dict[str, Any]]] = {"interaction": [], "support": [], "load": []}
+        shape = self.clevis.arguments() | {"kind": "clevis"}
+        overlap = max(-self.clevis.clearance, 0.0)
+        bodies: dict[str, Solid] = {}
+        for (name, plate), share in zip(self._plates.items(), (1.0, 0.5), strict=True):
+            shape[name] = plate.outline(self.clevis)
+            surfaces = [f"{name} pin", f"{name} hole"]
+            contact = {"name": f"pin in {name}", "surfaces": surfaces, "overlap": overlap}
+            place = {"diameter": f"{name} flat"}.get(self.load.at, f"{name} centre")
+            forces = [share / plate.thickness * force for force in self.load.stages]
+            parts["load"].append({"name": f"{name} pull", "on": place, "direction": "x", "force": forces})
+            parts["support"].append({"name": f"{name} clamp", "on": f"{name} clamp", "fixed": ["x", "y"]})
+            parts["interaction"].append(contact)
+            bodies |= {f"{name} pin": self.pin, name: plate}
+        parts["support"].append({"name": "axis", "on": "axis", "fixed": ["y"]})
+        return _general(self, shape, 2, bodies, **parts, path={"steps": self.load.steps})
 
 
 class BushingScene(Preset):
@@ -243,8 +401,10 @@ def _general(
     for name in ("integration", "coarse_start", "friction"):  # of presets alone
         said["analysis"].pop(name, None)
     if friction := scene.analysis.friction:
-        parts["interaction"] = [interaction | {"friction": friction} for interaction in parts["interaction"]]
-    bodies = solids if pin.rigid else {"pin": pin, **solids}
+        parts["interaction"] = [
+            part if part.get("law") == "tied" else part | {"friction": friction} for part in parts["interaction"]
+        ]
+    bodies = solids if pin.rigid or pin in solids.values() else {"pin": pin, **solids}
     parts |= {
         "mesh": {"shape": shape | {"pin": "none" if pin.rigid else "whole" if pin.whole else "half"}},
         "body": [{"name": n} | s.model_dump(exclude_none=True, include=_MATERIAL) for n, s in bodies.items()],
@@ -272,4 +432,8 @@ def general_joint(scene: Scene) -> dict[str, Any]:
     return _general(scene, shape, 2, {"block": scene.block}, **parts)
 
 
-PRESETS: dict[str, type[LugScene] | type[BushingScene]] = {"lug": LugScene, "bushing": BushingScene}
+PRESETS: dict[str, type[LugScene] | type[ClevisScene] | type[BushingScene]] = {
+    "lug": LugScene,
+    "clevis": ClevisScene,
+    "bushing": BushingScene,
+}

@@ -52,7 +52,9 @@ def test_solve_prints_steps_and_writes_the_run(tmp_path):
     nothing is printed but by PETSC_OPTIONS: PETSc is finalized, and its output flushed, before the process ends."""
     first = archord("solve", SCENE, *COARSE, cwd=tmp_path)
     assert first.stderr == ""
-    assert [line.split()[0] for line in first.stdout.splitlines()[2:]] == ["1", "2", "3", "4", "4"]
+    lines = first.stdout.splitlines()
+    assert lines[1:3] == [f"{body} yields at 230.769 MPa, perfectly plastic" for body in ("pin", "block")]
+    assert [line.split()[0] for line in lines[4:]] == ["1", "2", "3", "4", "4"]
     history = (tmp_path / "runs" / "steel_pin" / "history.csv").read_text()
     said = "runs/steel_pin: is not empty; choose another folder with -o, or overwrite a run in it with --force.\n"
     assert archord("solve", SCENE, *COARSE, cwd=tmp_path, code=2).stderr == said
@@ -100,7 +102,8 @@ def test_an_accuracy_is_reached_mesh_by_mesh(tmp_path):
     levels = json.loads((tmp_path / "runs" / "steel_pin" / "run.json").read_text())["accuracy"]["levels"]
     lines = result.stdout.splitlines()
     assert "P to 0.05 of its largest value" in lines[0]
-    assert [line.split()[4] for line in lines[2 : 2 + len(levels)]] == [str(level["dofs"]) for level in levels]
+    assert lines[1:3] == [f"{body} yields at 230.769 MPa, perfectly plastic" for body in ("pin", "block")]
+    assert [line.split()[4] for line in lines[4 : 4 + len(levels)]] == [str(level["dofs"]) for level in levels]
     assert [line.split()[0] for line in lines[-5:-1]] == ["1", "2", "3", "4"]
     assert "estimated error of P" in lines[-1]
     again = archord("solve", SCENE, *asked, "--restart", cwd=tmp_path, code=2)

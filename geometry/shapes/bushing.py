@@ -39,7 +39,7 @@ def bushing(
     `lug`), "sleeve 1 inside", "sleeve 1 outside", ..., "bore", "outer edge" and "axis" (y = 0).
     """
     rings = [(inner / radius, outer / radius) for inner, outer in rings]
-    size = min(element_size / radius, *(_SLENDER / _LAYERS * (outer - inner) for inner, outer in rings))
+    size = min(element_size / radius, *(longest_edge(outer - inner) for inner, outer in rings))
     within = [1.0, *(outer for _, outer in rings)]
     gaps = [touching * max(inner - r, 0.0) for (inner, _), r in zip(rings, within, strict=False)]
     shifts = [sum(gaps[i:]) for i in range(len(rings) + 1)]
@@ -49,16 +49,37 @@ def bushing(
     sketch.pin(shifts[0], 1, pin)
     sketch.sizes["pin"] = f"{size!r} + {growth!r} * Abs({around(shifts[0])} - 1)"
     for body, pair, (inner, outer), x in zip(names[1:], sets, rings, shifts[1:], strict=True):
-        ends = [((x + r, 0.0), (x, r), (x - r, 0.0)) for r in (inner, outer)]
-        circles = [Circle(name, (x, 0.0), r) for name, r in zip(pair, (inner, outer), strict=True)]
-        arcs = {on.facets: sketch.path(body, *places, on=on) for on, places in zip(circles, ends, strict=True)}
-        across = sketch.path(body, ends[0][0], ends[1][0]) + sketch.path(body, ends[0][2], ends[1][2])
-        face = sketch.face(body, **arcs, axis=across)
-        r, layers = around(x), (outer - inner) / (size * inner)
-        away = f"{r} - {inner!r}" if body == "housing" else f"Min(Abs({r} - {inner!r}), Abs({r} - {outer!r}))"
+        draw_ring(sketch, body, pair, (inner, outer), x, 1, size)
+        r = around(x)
+        nearest = between(x, inner, outer)
+        away = f"{r} - {inner!r}" if body == "housing" else nearest
         sketch.sizes[body] = f"{size!r} * {r} + {growth!r} * Abs({away})"
-        if layers < _THIN:
-            sketch.parts |= dict.fromkeys(across, max(_LAYERS, layers))
-            sketch.grid[face] = [sketch.point(body, ends[i][j]) for j in (0, 2) for i in (0, 1)]
     sketch.parts |= {line: math.pi / 2 / size for name in sketch.circles for line in sketch.lines[name]}
     return mesh_joint(comm, sketch, radius=radius, **options)
+
+
+def longest_edge(wall: float) -> float:
+    """How long elements along a wall of this thickness may be."""
+    return _SLENDER / _LAYERS * wall
+
+
+def between(x: float, inner: float, outer: float) -> str:
+    """The distance to the nearer of two circles about (x, 0), for sizes."""
+    r = around(x)
+    return f"Min(Abs({r} - {inner!r}), Abs({r} - {outer!r}))"
+
+
+def draw_ring(
+    sketch: Sketch, body: str, sets: Sequence[str], radii: Sequence[float], x: float, up: int, size: float
+) -> None:
+    """Draw the half of a ring about (x, 0) above (``up`` = 1) or below the axis, between an inner and an outer radius,
+    whose arcs go to two ``sets``; a wall of few elements of ``size`` is cut into a grid."""
+    ends = [((x + r, 0.0), (x, up * r), (x - r, 0.0)) for r in radii]
+    circles = [Circle(name, (x, 0.0), r) for name, r in zip(sets, radii, strict=True)]
+    arcs = {on.facets: sketch.path(body, *places, on=on) for on, places in zip(circles, ends, strict=True)}
+    across = sketch.path(body, ends[0][0], ends[1][0]) + sketch.path(body, ends[0][2], ends[1][2])
+    face = sketch.face(body, **arcs, axis=across)
+    layers = (radii[1] - radii[0]) / (size * radii[0])
+    if layers < _THIN:
+        sketch.parts |= dict.fromkeys(across, max(_LAYERS, layers))
+        sketch.grid[face] = [sketch.point(body, ends[i][j]) for j in (0, 2) for i in (0, 1)]

@@ -64,19 +64,21 @@ class Sketch:
             self.lines[name] += [line for line in paths[name] if line not in self.lines[name]]
         return len(self.loops)
 
-    def pin(self, x: float, up: int, part: PinPart) -> None:
-        """The quarters, above or below the axis, of a pin of radius 1 about (x, 0)."""
+    def pin(self, x: float, up: int, part: PinPart, before: str = "") -> None:
+        """The quarters, above or below the axis, of a pin of radius 1 about (x, 0); the names of its body and its sets
+        have ``before`` in front."""
+        pin = f"{before}pin"
         for to in {"half": (1,), "whole": (1, -1), "none": ()}[part]:
-            arc = self.path("pin", (x + to, 0), (x, up), on=Circle("pin", (x, 0.0), 1.0))
-            flat, axis = self.path("pin", (x, up), (x, 0)), self.path("pin", (x, 0), (x + to, 0))
-            self.face("pin", pin=arc, flat=flat, axis=axis)
+            arc = self.path(pin, (x + to, 0), (x, up), on=Circle(pin, (x, 0.0), 1.0))
+            flat, axis = self.path(pin, (x, up), (x, 0)), self.path(pin, (x, 0), (x + to, 0))
+            self.face(pin, **{pin: arc, f"{before}flat": flat, "axis": axis})
 
 
 def mesh_joint(
     comm: MPI.Comm, sketch: Sketch, *, radius: float, degree: int = 2, refinements: int = 0, partitioner=None
 ) -> TaggedMesh:
-    """Mesh a ``sketch``, times ``radius``, with all nodes of arcs on their circles; the centre of the pin, if there is
-    one, becomes the point set "centre".
+    """Mesh a ``sketch``, times ``radius``, with all nodes of arcs on their circles; the centre of each pin becomes a
+    point set: that of "pin" the set "centre", that of "inner pin" the set "inner centre".
 
     The mesh is made with larger elements, which are then cut in four as often as ``refinements`` says: much quicker.
     ``partitioner`` is a dolfinx cell partitioner (tests cut meshes in unusual ways). Collective; rank 0 meshes.
@@ -113,8 +115,9 @@ def mesh_joint(
     how = {"order": degree, "refinements": refinements, "partitioner": partitioner}
     joint = gmsh_to_mesh(comm, build, list(sketch.circles.values()), **how, key=tuple(vars(sketch).items()))
     joint.mesh.geometry.x[:] *= radius
-    centre = radius * np.array([sketch.circles["pin"].centre]) if "pin" in sketch.circles else None
-    return joint if centre is None else replace(joint, point_sets={"centre": centre})
+    pins = {name: circle.centre for name, circle in sketch.circles.items() if name.split()[-1] == "pin"}
+    centres = {name.removesuffix("pin") + "centre": radius * np.array([at]) for name, at in pins.items()}
+    return replace(joint, point_sets=centres) if centres else joint
 
 
 def around(x: float) -> str:

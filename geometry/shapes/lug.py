@@ -1,4 +1,5 @@
-"""A straight lug: a plate with a hole near its end, a clamp at the other, and a pin that pulls at it in +x.
+"""A straight lug: a plate with a hole near its end, a clamp at the other, and a pin that pulls at it in +x, in the hole
+itself or in a bushing that is pressed into the hole.
 
 The hole's centre is the origin. The pin's centre is (dR, 0), so pin and hole touch at (R + dR, 0); for an interference
 both are drawn into each other around the origin. The plate reaches from the clamp x = -length to the apex x = edge
@@ -8,16 +9,64 @@ distance of its end, and from y = -width/2 to width/2.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Literal
 
 from mpi4py import MPI
 
 from archord.geometry.meshes.refine import Circle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
+from archord.geometry.shapes.bushing import between, draw_ring, longest_edge
 from archord.geometry.shapes.joint_mesh import PinPart, Sketch, around, mesh_joint
 
-_ACROSS = 3  # elements across the narrowest ligament, at least
+ACROSS = 3  # elements across the narrowest ligament, at least
+_SLEEVE = ["bushing inside", "bushing outside"]
 _CORNER = 2.0  # size at the clamp's corners, where the stress is singular, over that on the arcs
+
+
+@dataclass(frozen=True)
+class Plate:
+    """Outline of a plate in radii of the pin: radius of the ``hole``, half the width (``side``), from the hole's centre
+    to the apex (``tip``) and to the clamp (``back``), and whether the end is round."""
+
+    hole: float
+    side: float
+    tip: float
+    back: float
+    round: bool
+
+    @property
+    def ligament(self) -> float:
+        """The narrowest distance from the hole to an edge."""
+        return min(self.side, self.tip) - self.hole
+
+
+def draw_plate(sketch: Sketch, plate: Plate, body: str, up: int, at: float = 0.0, before: str = "") -> None:
+    """Draw the half of a ``plate`` above (``up`` = 1) or below the axis, with the hole's centre at (``at``, 0); the
+    names of its sets but the axis have ``before`` in front."""
+    hole, side, tip, back = plate.hole, plate.side, at + plate.tip, at - plate.back
+    round_hole = Circle(f"{before}hole", (at, 0.0), hole)
+    apex = Circle(f"{before}end", (tip - side, 0.0), side) if plate.round else None
+    corner = (tip - side if apex else tip, up * side)
+    arc = sketch.path(body, (at + hole, 0), (at, up * hole), (at - hole, 0), on=round_hole)
+    axis = sketch.path(body, (at - hole, 0), (back, 0)) + sketch.path(body, (tip, 0), (at + hole, 0))
+    clamp = sketch.path(body, (back, 0), (back, up * side))
+    last = sketch.path(body, corner, (tip, 0), on=apex)
+    sides = sketch.path(body, (back, up * side), corner)
+    paths = {f"{before}hole": arc, "axis": axis, f"{before}clamp": clamp}
+    sketch.face(body, **paths, **{f"{before}sides": sides, f"{before}end": last})
+
+
+def size_around(x: float, r: float, size: float, growth: float) -> str:
+    """An element size on the circle of radius ``r`` about (x, 0) that grows away from it."""
+    return f"{size!r} + {growth!r} * Abs({around(x)} - {r!r})"
+
+
+def plate_size(plate: Plate, size: float, growth: float, at: float = 0.0) -> str:
+    """The element size in a plate with its hole about (``at``, 0): growing from the hole and the clamp's corners."""
+    off = f"Sqrt((x - {at!r} + {plate.back!r})^2 + (Abs(y) - {plate.side!r})^2)"
+    clamped = f"{_CORNER * size!r} + {growth!r} * {off}"
+    return f"Min({size_around(at, plate.hole, size, growth)}, {clamped})"
 
 
 def lug(
@@ -33,30 +82,44 @@ def lug(
     end: Literal["round", "square"] = "round",
     half: bool = True,
     pin: PinPart = "half",
+    wall: float | None = None,
+    interference: float = 0.0,
+    touching: bool = True,
     **options,
 ) -> TaggedMesh:
-    """Mesh the bodies "pin" and "lug", with ``options`` as for `mesh_joint`. Lengths share one unit.
+    """Mesh the bodies "pin" and "lug", and "bushing" if it has a ``wall``, with ``options`` as for
+    `mesh_joint`. Lengths share one unit.
 
     A round end is an arc of radius width/2, wherever its apex lies. ``element_size`` is the edge length on the arcs of
     pin and hole, shorter if less than three would lie across the narrowest ligament; away from the arcs it grows by
     ``growth`` per unit of distance. Sets: "pin", "hole", "end", "sides", "clamp", "axis" (y = 0) and "flat", the pin's
     line x = dR, which halves a whole pin and bounds the front half of a ``half`` one. The half y >= 0 is meshed or all.
+
+    A bushing has the sets "bushing inside" and "bushing outside". The clearance is then between the pin
+    and the bushing, whose outer radius exceeds the hole's by the ``interference``. A pin that is not
+    ``touching`` is concentric.
     """
-    hole, side, tip, back = (v / radius for v in (radius + clearance, width / 2, edge_distance, length))
-    size, x = min(element_size / radius, (min(side, tip) - hole) / _ACROSS), max(hole - 1, 0.0)
-    apex = Circle("end", (tip - side, 0.0), side) if end == "round" else None
-    sketch = Sketch(("pin", "lug"), ("pin", "hole", "flat", "clamp", "axis", "end", "sides"))
+    bore, side, tip, back = (v / radius for v in (radius + clearance, width / 2, edge_distance, length))
+    outer = bore + (wall or 0.0) / radius
+    hole = outer - interference / radius
+    plate = Plate(hole, side, tip, back, end == "round")
+    size, x = min(element_size / radius, plate.ligament / ACROSS), touching * max(bore - 1, 0.0)
+    bodies, sets = ["pin", "lug"], ["pin", "hole", "flat", "clamp", "axis", "end", "sides"]
+    if wall:
+        size = min(size, longest_edge(outer - bore))
+        bodies.insert(1, "bushing")
+        sets += _SLEEVE
+    sketch = Sketch(bodies, sets)
     for up in (1,) if half else (1, -1):
-        arc = sketch.path("lug", (hole, 0), (0, up * hole), (-hole, 0), on=Circle("hole", (0.0, 0.0), hole))
-        axis = sketch.path("lug", (-hole, 0), (-back, 0)) + sketch.path("lug", (tip, 0), (hole, 0))
-        corner = (tip - side if apex else tip, up * side)
-        clamp, sides = sketch.path("lug", (-back, 0), (-back, up * side)), [(-back, up * side), corner]
-        last = sketch.path("lug", corner, (tip, 0), on=apex)
-        sketch.face("lug", hole=arc, axis=axis, clamp=clamp, sides=sketch.path("lug", *sides), end=last)
+        draw_plate(sketch, plate, "lug", up)
         sketch.pin(x, up, pin)
-    growing = f"{size!r} + {growth!r} * Abs({{}} - {{!r}})"
-    clamped = f"{_CORNER * size!r} + {growth!r} * Sqrt((x + {back!r})^2 + (Abs(y) - {side!r})^2)"
-    sketch.sizes["pin"] = growing.format(around(x), 1.0)
-    sketch.sizes["lug"] = f"Min({growing.format(around(0), hole)}, {clamped})"
-    sketch.parts |= dict.fromkeys(sketch.lines["pin"] + sketch.lines["hole"], math.pi / 2 / size)
+        if wall:
+            draw_ring(sketch, "bushing", _SLEEVE, (bore, outer), 0.0, up, size)
+    sketch.sizes["pin"] = size_around(x, 1.0, size, growth)
+    sketch.sizes["lug"] = plate_size(plate, size, growth)
+    arcs = sketch.lines["pin"] + sketch.lines["hole"]
+    if wall:
+        sketch.sizes["bushing"] = f"{size!r} * {around(0)} + {growth!r} * {between(0.0, bore, outer)}"
+        arcs += [line for name in _SLEEVE for line in sketch.lines[name]]
+    sketch.parts |= dict.fromkeys(arcs, math.pi / 2 / size)
     return mesh_joint(comm, sketch, radius=radius, **options)

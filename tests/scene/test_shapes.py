@@ -45,7 +45,19 @@ def changed(data: dict, place: str, value) -> dict:
 OTHERS = {"units": {"length": "m", "stress": "Pa"}, "analysis": {"thickness": 5.0, "accuracy": 1e-3}}
 
 
-@pytest.mark.parametrize("data", [LUG, BUSHING, LUG | OTHERS, BUSHING | OTHERS])
+BUSHED = LUG | {"bushing": {"thickness": 2.0, "interference": 0.01, "E": 110000.0, "nu": 0.34}}
+
+
+CLEVIS = {
+    "clevis": {"radius": 9.9, "clearance": 0.1, "element_size": 1.5, "growth": 0.5},
+    "inner": STEEL | {"thickness": 20.0, "width": 40.0, "length": 60.0},
+    "outer": {"E": 70000.0, "nu": 0.33, "thickness": 8.0, "width": 48.0, "end": "square"},
+    "pin": STEEL,
+    "load": {"force": [30000.0, 60000.0], "steps": 1},
+}
+
+
+@pytest.mark.parametrize("data", [LUG, BUSHED, CLEVIS, BUSHING, LUG | OTHERS, BUSHED | OTHERS, BUSHING | OTHERS])
 def test_a_preset_is_the_general_scene_that_it_prints(data):
     scene = parse_any(data)
     assert isinstance(scene, ProblemScene)
@@ -67,6 +79,9 @@ def test_ten_lines_of_a_lug_say_all_of_it():
         "end": "round",
         "half": True,
         "pin": "half",
+        "wall": None,
+        "interference": 0.0,
+        "touching": True,
     }
     assert [body.name for body in scene.body] == ["pin", "lug"]
     assert [(s.on, s.fixed) for s in scene.support] == [("clamp", ["x", "y"]), ("axis", ["y"])]
@@ -108,6 +123,19 @@ def test_radii_of_a_bushing_make_its_fits():
         (LUG, "load.at", "centre", 'load.at = "centre" must be "diameter" for a displacement.'),
         (LUG, "load.steps", [1, 2], "path.steps = [1, 2] must have one number for each of the 1 stages."),
         (LUG, "plate", None, "plate is missing."),
+        (BUSHED, "bushing.thickness", None, "bushing.thickness is missing."),
+        (BUSHED, "bushing.thickness", 0.1, "bushing.thickness = 0.1 must be at least 0.02 R."),
+        (
+            BUSHED,
+            "bushing.thickness",
+            9.9,
+            "lug.width = 40.0 must leave a ligament of at least 0.02 R beside the hole.",
+        ),
+        (BUSHED, "bushing.interference", 0.5, "must not exceed 0.03 of its outer radius."),
+        (BUSHED, "bushing.interference", -0.1, "bushing.interference = -0.1 must be at least 0."),
+        (BUSHED, "bushing.bonded", True, "bushing.interference = 0.01 is not for a bonded bushing."),
+        (BUSHED, "bushing.radius", 9.9, "bushing.radius = 9.9 is not a known key"),
+        (BUSHED, "lug.clearance", -0.1, "needs pin.whole = true, as half a pin cannot be pressed in."),
         (LUG, "block", STEEL, "block is not a known key"),
         (LUG, "pin", {"rigid": True, "whole": True}, "pin.whole = true is not for a rigid pin."),
         (
@@ -117,6 +145,19 @@ def test_radii_of_a_bushing_make_its_fits():
             "is not a known key; did you mean pin.whole? Keys are radius, element_size, growth, cl",
         ),
         (LUG, "lug.kind", "lug", 'lug.kind = "lug" is not a known key; Keys are '),
+        (CLEVIS, "outer.thickness", None, "outer.thickness is missing."),
+        (CLEVIS, "outer.width", 20.1, "outer.width = 20.1 must leave a ligament of at least 0.02 R beside the hole."),
+        (CLEVIS, "clevis.clearance", 6.0, "clevis.clearance = 6.0 must be between -0.03 and 0.5 times the radius."),
+        (CLEVIS, "clevis.clearance", -0.1, "needs pin.whole = true, as half a pin cannot be pressed in."),
+        (
+            CLEVIS,
+            "load",
+            {"displacement": 0.1},
+            "load.displacement = 0.1 is not for a clevis: its plates share a force",
+        ),
+        (CLEVIS, "analysis", {"thickness": 5.0}, "analysis.thickness = 5.0 is not for a clevis, whose plates have a"),
+        (CLEVIS, "pin", {"rigid": True}, "pin.rigid = true must be false in a clevis."),
+        (CLEVIS, "plate", STEEL, "plate is not a known key"),
         (BUSHING, "bushing.pin", "whole", "did you mean pin.whole?"),
         (
             BUSHING,
@@ -242,3 +283,78 @@ def test_a_pin_pulls_at_its_bushing(pin):
     system = pulled(BUSHING, pin=pin)
     assert system.drive_force("pull") > 1e4
     assert system.drive_force("pull") == pytest.approx(-system.reaction("outer edge")[0], rel=1e-6)
+
+
+def test_a_bushing_of_a_lug_makes_a_fit_in_the_plate():
+    """The pin lies in it with the clearance; it is drawn into the plate by its interference."""
+    scene = parse_any(BUSHED)
+    assert scene.mesh.shape.hole == pytest.approx(10.0 + 2.0 - 0.01)
+    assert [body.name for body in scene.body] == ["pin", "bushing", "lug"]
+    assert [i.surfaces for i in scene.interaction] == [["pin", "bushing inside"], ["bushing outside", "hole"]]
+    assert [i.overlap for i in scene.interaction] == pytest.approx([0.0, 0.01])
+    rubbed = parse_any(BUSHED | {"analysis": {"friction": 0.1}}).interaction
+    assert [i.friction for i in rubbed] == [0.1, 0.1]
+    glued = changed(changed(BUSHED, "bushing.interference", None), "bushing.bonded", True)
+    found = parse_any(glued | {"analysis": {"friction": 0.1}}).interaction
+    assert [(i.law, i.friction) for i in found] == [("frictionless", 0.1), ("tied", 0.0)]
+    shapes = [parse_any(data).mesh.shape for data in (BUSHED, BUSHED | {"load": {"force": 1.0}})]
+    assert [shape.touching for shape in shapes] == [False, True]
+
+
+@pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}, {"rigid": True}], ids=["half", "whole", "rigid"])
+def test_a_pin_pulls_at_a_lug_through_its_bushing(pin):
+    """With the force at the clamp, and the whole lug carries what twice its half does."""
+    half = pulled(BUSHED, pin=pin)
+    whole = pulled(changed(BUSHED, "lug.half", False), pin=pin)
+    assert half.drive_force("pull") > 100
+    assert half.drive_force("pull") == pytest.approx(-half.reaction("clamp")[0], rel=1e-6)
+    assert whole.drive_force("pull") == pytest.approx(half.drive_force("pull"), rel=2e-3)
+    assert whole.drive_force("pull") == pytest.approx(-whole.reaction("clamp")[0], rel=1e-6)
+
+
+def test_a_bonded_bushing_of_the_same_metal_is_a_plain_lug():
+    """Whose hole is the bushing's bore."""
+    bushing = STEEL | {"thickness": 2.0, "bonded": True, "touching": True}
+    bonded = pulled(LUG | {"bushing": bushing}, analysis={"plane": "stress"})
+    plain = pulled(LUG, analysis={"plane": "stress"})
+    assert bonded.drive_force("pull") == pytest.approx(plain.drive_force("pull"), rel=5e-3)
+
+
+def test_the_fit_of_a_bushing_in_a_wide_lug_is_that_of_lame():
+    """Before the pin touches, in a plate of 60 radii in plane stress: the pressure of a ring in an infinite plate."""
+    E, nu, plate, a, wall, fit = 110000.0, 0.34, 70000.0, 10.0, 2.0, 0.01
+    lug = {"radius": 9.9, "clearance": 0.1, "width": 600.0, "length": 600.0, "element_size": 0.8, "growth": 0.3}
+    bushing = {"thickness": wall, "interference": fit, "E": E, "nu": nu}
+    data = {"lug": lug, "bushing": bushing, "pin": STEEL, "plate": {"E": plate, "nu": 0.33}}
+    scene = parse_any(data | {"load": {"displacement": 0.01, "steps": 1}, "analysis": {"plane": "stress"}})
+    system = System(general_problem(scene, MPI.COMM_SELF))
+    system.solve(scene.targets)
+    b = a + wall
+    lame = fit / (b / plate * 1.33 + b / E * ((b**2 + a**2) / (b**2 - a**2) - nu))
+    side = system.sides["hole"]
+    pressure = system.contact.pair_of(side).pressure
+    assert (side.weight * pressure).sum() / side.weight.sum() == pytest.approx(lame, rel=5e-3)
+    assert system.drive_force("pull") == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("pin", [STEEL, STEEL | {"whole": True}], ids=["half", "whole"])
+def test_each_plate_of_a_clevis_is_a_lug_of_its_own(pin):
+    """The inner one under P, an outer one under P/2, each with its thickness; forces balance at their clamps."""
+    analysis = {"plane": "stress"}
+    scene = parse_any(CLEVIS | {"pin": pin, "analysis": analysis})
+    assert [load.force for load in scene.load] == [[1500.0, 3000.0], [1875.0, 3750.0]]
+    both = System(general_problem(scene, MPI.COMM_SELF))
+    both.solve(scene.targets)
+    moved = dict(zip(both.drive_names, both.driven()[0], strict=True))
+    for name, share in (("inner", 1.0), ("outer", 0.5)):
+        plate = dict(CLEVIS[name])
+        thickness = plate.pop("thickness")
+        metal = {key: plate.pop(key) for key in ("E", "nu")}
+        load = {"force": [share * force for force in CLEVIS["load"]["force"]], "steps": 1}
+        data = {"lug": CLEVIS["clevis"] | plate, "plate": metal, "pin": pin, "load": load}
+        alone = parse_any(data | {"analysis": analysis | {"thickness": thickness}})
+        system = System(general_problem(alone, MPI.COMM_SELF))
+        system.solve(alone.targets)
+        assert moved[f"{name} pull"] == pytest.approx(system.driven()[0][0], rel=2e-3)
+        pull = share * 60000.0 / thickness
+        assert both.reaction(f"{name} clamp")[0] == pytest.approx(-pull, rel=1e-6)

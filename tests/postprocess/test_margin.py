@@ -1,0 +1,160 @@
+"""Margins of safety: closed forms by hand, the steps of a run by finite elements, and what is said of both."""
+
+import math
+
+import numpy as np
+import pytest
+
+from archord.cli import run as command
+from archord.postprocess.margin import (
+    by_hand,
+    load_at,
+    margin_text,
+    margins,
+    proof_strength,
+    tensile_strength,
+)
+from archord.postprocess.run import Run
+from archord.scene.errors import InputError
+from archord.scene.file import parse_any
+from archord.scene.parts import Body
+from archord.scene.shapes import LugShape
+from tests.output.run_files import solved
+
+STEEL = {"E": 210000.0, "nu": 0.3}
+SHAPE = {"radius": 10.0, "clearance": 0.1, "width": 40.0, "length": 50.0}
+COARSE = {"element_size": 2.5, "growth": 1.0}
+CURVE = [[0.0, 450.0], [0.1, 550.0]]
+
+
+def lug(load: dict, plate: dict, **sections) -> dict:
+    return {"lug": SHAPE | COARSE, "pin": STEEL, "plate": STEEL | plate, "load": load} | sections
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """A lug in plane stress, 5 mm thick, that is pulled twice and let go; and one that stays elastic."""
+    cycle = {"displacement": [0.4, 0.0, 0.45, 0.0], "steps": [10, 2, 2, 2]}
+    thick = {"analysis": {"plane": "stress", "thickness": 5.0}}
+    scenes = {
+        "cycled": lug(cycle, {"hardening": CURVE}, **thick),
+        "elastic": lug({"displacement": 0.1, "steps": 1}, {}),
+        "pushed": lug({"displacement": -0.05, "steps": 1}, {"hardening": CURVE}),
+    }
+    found = solved({name: parse_any(s) for name, s in scenes.items()}, tmp_path_factory.mktemp("runs"))
+    return {name: Run(folder) for name, folder in found.items()}
+
+
+def test_hand_formulas_are_those_of_the_sections():
+    """A plate of width 40 and edge distance 20 with a hole of 20.2 and a pin of 20, 5 thick, at 100 MPa."""
+    found = by_hand(LugShape(**SHAPE, edge_distance=20.0), 100.0, 5.0)
+    assert found["net section"] == pytest.approx(100 * (40 - 20.2) * 5)
+    assert found["bearing"] == pytest.approx(1.5 * 100 * 20 * 5)
+    planes = 2 * (20 - 10.1 * math.cos(math.radians(40))) * 5
+    assert found["shear-out"] == pytest.approx(planes * 100 / math.sqrt(3))
+    bushed = by_hand(LugShape(**SHAPE, wall=2.0, interference=0.1), 100.0, 5.0)
+    assert bushed["net section"] == pytest.approx(100 * (40 - 24) * 5)
+    assert bushed["bearing"] == pytest.approx(1.5 * 100 * 24 * 5)
+
+
+def test_strengths_are_those_of_the_tension_test_behind_the_curve():
+    """0.2 % proof and largest engineering stress; of metals with a plateau the yield strength; of named ones the listed
+    strengths."""
+    power = Body(name="lug", **STEEL, yield_stress=200.0, hardening={"offset": 0.002, "exponent": 0.2})
+    assert tensile_strength(power) == pytest.approx(200 / 0.002**0.2 * 0.2**0.2 * math.exp(-0.198), rel=0.01)
+    for name, proof, tensile in (("S355", 355, 470), ("CuSn12-C", 150, 300), ("Ti-6Al-4V", 827, 896)):
+        metal = Body(name="lug", material=name)
+        assert proof_strength(metal) == pytest.approx(proof, rel=1e-3)
+        assert tensile_strength(metal) == pytest.approx(tensile, rel=2e-3)
+    flat = Body(name="lug", **STEEL, yield_stress=200.0)
+    assert (proof_strength(flat), tensile_strength(flat)) == (200.0, 200.0)
+
+
+@pytest.mark.parametrize(
+    ("force", "peeq", "limit", "expected"),
+    [
+        ([10, 20, 30], [0.0, 0.01, 0.03], 0.02, (25.0, True)),
+        ([10, 20, 30], [0.0, 0.01, 0.03], 0.0, (10.0, True)),
+        ([10, 20, 30], [0.0, 0.01, 0.03], 0.05, (30.0, False)),
+        ([10, 30, 0], [0.0, 0.01, 0.01], 0.05, (30.0, False)),  # let go: the largest, not the last
+        ([30, 0, 30, 0, 30], [0.01, 0.01, 0.02, 0.02, 0.03], 0.025, (30.0, True)),  # in a later cycle
+        ([20, 0, 30], [0.01, 0.01, 0.03], 0.01, (20.0, True)),
+        ([10, 20], [0.02, 0.03], 0.01, (5.0, True)),  # within the first step
+        ([0, 10], [0.01, 0.02], 0.0, (0.0, True)),  # in a press fit
+    ],
+)
+def test_the_force_at_a_plastic_strain_is_the_largest_reached(force, peeq, limit, expected):
+    found = load_at(np.array(force, dtype=float), np.array(peeq), limit)
+    assert found == (pytest.approx(expected[0]), expected[1])
+
+
+def test_margins_of_a_cycled_lug(runs):
+    """By finite elements from the largest force, though the last row has none; in the total force of 5 mm."""
+    run = runs["cycled"]
+    largest = max(run.columns["pull force"])
+    assert run.columns["pull force"][-1] == pytest.approx(0.0, abs=1e-6 * largest)
+    found = margins(run, 0.5 * largest, factor=1.5)
+    assert found.unit == "N"
+    checks = {(check.kind, check.by, check.name): check for check in found.checks}
+    net = checks["yield", "hand", "net section"]
+    assert net.allowable == pytest.approx(found.strengths["yield"][0] * (40 - 20.2) * 5)
+    assert net.margin == pytest.approx(net.allowable / (0.5 * largest) - 1)
+    assert checks["ultimate", "hand", "bearing"].applied == pytest.approx(0.75 * largest)
+    ultimate = checks["ultimate", "FE", "PEEQ of 0.1"]
+    assert (ultimate.bound, ultimate.allowable) == (True, largest)
+    assert ultimate.margin == pytest.approx(1 / 0.75 - 1)
+    first, limit = (checks["yield", "FE", name].allowable for name in ("first yield", "PEEQ of 0.01"))
+    assert 0 < first < limit <= largest
+    assert "> +0.333" in margin_text(found)
+
+
+def test_nothing_is_extrapolated(runs):
+    """Beyond the largest force that was solved there is no margin of a limit that was not reached."""
+    largest = max(runs["cycled"].columns["pull force"])
+    found = margins(runs["cycled"], 2 * largest)
+    assert [check.margin for check in found.checks if check.bound] == [None]
+    assert "not known" in margin_text(found)
+    assert f"is beyond the largest force that was solved, {largest:.5g}" in margin_text(found)
+
+
+def test_an_elastic_lug_has_hand_formulas_alone(runs, capsys):
+    folder = str(runs["elastic"].folder)
+    assert command(["margin", folder, "--load", "1000"]) == 2
+    said = "the lug is elastic: it has no yield; give --proof and --tensile for the hand formulas"
+    assert said in capsys.readouterr().err
+    assert command(["margin", folder, "--load", "1000", "--proof", "300"]) == 0
+    printed = capsys.readouterr().out
+    assert "it has no yield, and no margins by finite elements" in printed
+    assert " FE " not in printed
+    assert "[N/mm]" in printed
+
+
+def test_the_command_prints_what_the_function_finds(runs, capsys):
+    """From the folder; ``--help`` explains."""
+    folder = str(runs["cycled"].folder)
+    assert command(["margin", folder, "--load", "9000", "--factor", "1.5"]) == 0
+    assert capsys.readouterr().out == margin_text(margins(runs["cycled"], 9000.0, factor=1.5)) + "\n"
+    assert command(["margin", "--help"]) == 0
+    assert "net section, bearing" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "said"),
+    [
+        ("cycled", ["--load", "0"], "--load 0: must be a positive number."),
+        ("cycled", ["--load", "nan"], "--load nan: must be a positive number."),
+        ("cycled", ["--load", "1", "--factor", "-1"], "--factor -1: must be a positive number."),
+        ("pushed", ["--load", "1"], "the pin never pulls at the lug's end"),
+    ],
+)
+def test_what_has_no_margin_is_refused(runs, capsys, name, asked, said):
+    assert command(["margin", str(runs[name].folder), *asked]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_runs_of_other_problems_are_refused(tmp_path):
+    shape = {"radius": 10.0, "relative_clearance": 0.01, "relative_element_size": 0.2}
+    joint = {"joint": shape, "pin": STEEL, "block": STEEL, "load": {"displacement": 0.2, "steps": 1}}
+    run = Run(solved({"joint": parse_any(joint)}, tmp_path)["joint"])
+    with pytest.raises(InputError, match=r"is no run of a \[lug\]"):
+        margins(run, 1.0)
