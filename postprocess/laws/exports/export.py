@@ -27,7 +27,8 @@ Tables = dict[str, Any]  # int, float or list[float] by the names of algorithm.p
 
 _STATE = """The force P and dP/d(delta) follow from the displacement delta and from one number that the joint remembers:
 deepest, the largest delta of all accepted steps, 0 at first. Trial steps leave it as it is. Beyond RANGE, the end of
-the tables, curves go on straight."""
+the tables, the force goes on straight, which is a guess; stiffness, expected error, pressure, angle and residual
+clearance are nan there, and all are nan of nan."""
 _ELASTIC = "The joint does not yield: it comes back along its first loading, and deepest changes nothing."
 
 
@@ -115,13 +116,13 @@ def export_curve(curve: JointCurve, target: Path) -> str:
     if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) or name in _TAKEN:
         raise ValueError(f"{target.name}: {name} cannot name a law; letters, digits and _ can, but for words in use")
     tables = _tables(curve)
-    wanted = ["force", "residual", "expected_error"]
+    wanted = ["force", "deeper", "residual", "expected_error"]
     wanted += [
         f for f, key in (("peak_pressure", "PEAK"), ("contact_angle", "ANGLE")) if np.isfinite(tables[key]).all()
     ]
     flags = {"WITH_TOUCH": curve.touch.size > 0, "WITH_WAY_BACK": curve.yields, "WITH_TOE": bool(curve.toe.any())}
     functions, used = select(wanted, flags)
-    tables = {key: values for key, values in tables.items() if key in {*used, "RANGE"}}
+    tables = {key: values for key, values in tables.items() if key in {*used, "RANGE", "REACH"}}
     _check(tables)
     title = str(curve.about.get("title", "law of a pin joint"))
     return Template(_TEMPLATES[form.template].lstrip()).substitute(
@@ -131,7 +132,7 @@ def export_curve(curve: JointCurve, target: Path) -> str:
         about=form.text(curve.about),
         tables="\n".join(_table(form, name, key, values) for key, values in tables.items()),
         functions="\n\n".join(form.function(node, name) for node in functions),
-        handles="\n".join(f"    the_law.{function} = @{function};" for function in wanted),
+        handles="\n".join(f"    the_law.{function} = @{function};" for function in wanted if function != "deeper"),
     )
 
 
@@ -156,7 +157,14 @@ def _tables(curve: JointCurve) -> Tables:
         "ERROR": curve.error,
         "BACK_ERROR": curve.back_error,
     }
-    numbers = {"LAST": len(curve.x) - 1, "RANGE": float(length * curve.x[-1]), "LENGTH": length, "FORCE": force}
+    numbers = {
+        "LAST": len(curve.x) - 1,
+        "RANGE": float(length * curve.x[-1]),
+        "REACH": float(length * curve.reach),
+        "LENGTH": length,
+        "FORCE": force,
+        "WIDEST": float(curve.widest),
+    }
     return numbers | {key: values.tolist() for key, values in arrays.items()}
 
 

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,14 @@ import numpy as np
 import pytest
 
 from archord.postprocess.laws.exports.export import export_curve
+from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from tests.postprocess.laws.curves import yielding_curve
 from tests.postprocess.laws.modelica import functions_of
 
 COLUMNS = ("load", "stiffness", "error", "residual", "peak", "angle")
+EXTREMES = (0.0, -0.0, -1.0, 0.7, 1.0, 1 + 1e-8, 1.2, -np.inf, np.inf, np.nan)  # over the range
 FUNCTIONS = ("force", "expected_error", "residual", "peak_pressure", "contact_angle")
 C_CLIENT = """
 #include <stdio.h>
@@ -40,12 +44,16 @@ int main(void) {
     if (state.outside || state.deepest != 0.9 * law_RANGE) return 1;
     law_advance(&state, 1.1 * law_RANGE);
     law_advance(&state, 0.0);
-    return state.outside && state.deepest == 1.1 * law_RANGE ? 0 : 2;
+    if (!state.outside || state.deepest != 1.1 * law_RANGE) return 2;
+    law_advance(&state, NAN);
+    law_advance(&state, 0.0);
+    return isnan(state.deepest) ? 0 : 3;
 }
 """
 OCTAVE_CLIENT = """
 addpath('.'); warning('off', 'archord:outside');
 law = law(); about = jsondecode(law.about); assert(law.advance(1, 2) == 2 && law.in_range(law.range));
+assert(isnan(law.advance(0.1, NaN)) && isnan(law.advance(NaN, 0.1)) && ~law.in_range(NaN));
 file = fopen('in', 'r'); in = fread(file, [2 Inf], 'double'); fclose(file);
 out = zeros(6, columns(in));
 for k = 1:columns(in)
@@ -76,12 +84,14 @@ pytestmark = pytest.mark.filterwarnings("ignore:archord. beyond")
 
 
 def inputs(curve: JointCurve, n: int = 10_000) -> np.ndarray:
-    """Pairs of displacement and deepest displacement ``(n, 2)``: open, first touch, through the table and beyond."""
+    """Pairs of displacement and deepest displacement ``(n + 100, 2)``: open, first touch, through the table and beyond;
+    and every pair of `EXTREMES`."""
     rng = np.random.default_rng(19)
     delta, deepest = curve.limit * rng.uniform([-0.05, -0.05], [1.3, 1.2], (n, 2)).T
     delta[: n // 10] = curve.limit * 10 ** rng.uniform(-12, -1, n // 10)
     deepest[n // 20 : n // 5] = 1.2 * np.abs(delta[n // 20 : n // 5])
-    return np.stack([delta, deepest], axis=1)
+    usual = np.stack([delta, deepest], axis=1)
+    return np.concatenate([usual, curve.limit * np.array(list(product(EXTREMES, repeat=2)))])
 
 
 def check(curve: JointCurve, pairs: np.ndarray, values: np.ndarray) -> None:
@@ -92,11 +102,11 @@ def check(curve: JointCurve, pairs: np.ndarray, values: np.ndarray) -> None:
     wanted = (state.load, state.stiffness, state.error, curve.residual(deepest), first.peak_pressure, first.angle)
     for name, ours, theirs in zip(COLUMNS, values.T, wanted, strict=True):
         if name == "stiffness":
-            far = np.abs(delta - curve.residual(deepest)) > 1e-7 * curve.limit
-            far |= delta >= deepest
+            near = np.abs(delta - curve.residual(deepest)) <= 1e-7 * curve.limit
+            far = ~near | (delta >= deepest)
             np.testing.assert_allclose(ours[far], theirs[far], rtol=1e-9, err_msg=name)
         else:
-            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max() + 1e-16, err_msg=name)
+            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.nanmax(np.abs(theirs)) + 1e-16, err_msg=name)
 
 
 def evaluate(law: dict[str, Any], pairs: np.ndarray) -> np.ndarray:
@@ -132,7 +142,8 @@ def test_python_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> N
     assert law.advance(0.1, 0.2) == 0.2
     assert law.in_range(curve.limit)
     assert not law.in_range(1.001 * curve.limit)
-    assert np.isnan(law.force(float("nan"))[0])
+    assert np.isnan([law.advance(0.1, np.nan), law.advance(np.nan, 0.1)]).all()
+    assert not law.in_range(np.nan)
 
 
 def test_c_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
@@ -143,7 +154,8 @@ def test_c_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
     write(curve, tmp_path / "law.h")
     (tmp_path / "main.c").write_text(C_CLIENT)
     strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2"]
-    subprocess.run([compiler, *strict, "main.c", "-o", "law", "-lm"], cwd=tmp_path, check=True)
+    careful = ["-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
+    subprocess.run([compiler, *strict, *careful, "main.c", "-o", "law", "-lm"], cwd=tmp_path, check=True)
     pairs = inputs(curve)
     done = subprocess.run([tmp_path / "law"], input=pairs.tobytes(), capture_output=True, check=True)
     check(curve, pairs, np.frombuffer(done.stdout).reshape(-1, 6))
@@ -168,6 +180,37 @@ def test_modelica_says_what_the_table_says(curve: JointCurve, tmp_path: Path) ->
     assert package.endswith("end Law;\n")
     pairs = inputs(curve)
     check(curve, pairs, evaluate(functions_of(package), pairs))
+
+
+def test_beyond_its_range_a_law_is_a_force_alone(curve: JointCurve) -> None:
+    """The force goes on along its tangent; what else is said there is nan, and so is everything of nan."""
+    end, step = curve.limit, 1e-6 * curve.limit
+    beyond = np.array([1 + 1e-8, 1.2, 100.0]) * end
+    state, edge = curve.at(beyond), curve.at([end])
+    np.testing.assert_allclose(state.load, edge.load + edge.stiffness * (beyond - end), rtol=1e-9)
+    assert np.isnan(state[1:]).all()
+    assert np.isfinite(edge).all()
+    assert np.isfinite(curve.at([end * (1 + 1e-12)])).all()
+    for delta, deepest in ((np.nan, 0.0), (0.5 * end, np.nan), (-step, np.nan), (np.inf, 0.0)):
+        assert np.isnan(curve.at([delta], [deepest])).all()
+    assert np.isnan(curve.residual([np.nan])).all()
+    assert np.isnan(curve.displacement([np.nan])).all()
+    back = curve.at([0.5 * end, -step], [1.2 * end])
+    assert np.isfinite(back.load).all()
+    assert np.isnan([back.stiffness[0], back.error[0], curve.residual([1.2 * end])[0]]).all() == curve.yields
+    np.testing.assert_array_equal([values[1] for values in back], 0.0)
+
+
+def test_no_contact_is_wider_than_the_hole(tmp_path: Path) -> None:
+    """A quarter of a circle, in the table and in what is exported of it; a ring's may be wider, where its nodes are."""
+    joint = LawJoint(10.0, 0.05, 1e5, pin_share=0.68, plane="strain", nu=0.0, pin_nu=0.49)
+    curve = general_law(joint)
+    delta = np.linspace(0, curve.limit, 3000)
+    law = load(write(curve, tmp_path / "law.py"))
+    assert curve.at(delta).angle.max() == np.pi / 2
+    assert max(map(law.contact_angle, delta.tolist())) == np.pi / 2
+    wide = replace(curve, angle=2 * curve.angle, dangle=2 * curve.dangle)
+    assert wide.at(delta).angle.max() == pytest.approx(np.pi, rel=1e-3)
 
 
 def test_a_joint_that_does_not_yield_needs_no_way_back(tmp_path: Path) -> None:
