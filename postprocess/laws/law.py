@@ -57,6 +57,7 @@ class Law:
     unfit: Callable[[LawJoint], str] = lambda joint: ""  # why the law does not hold for the whole joint
     needs: tuple[str, ...] = ()
     gives: tuple[str, ...] = ("displacement", "pressure", "contact angle")
+    coefficients: tuple[str, ...] = ()  # fitted ones among k and c
     plastic: bool = False  # whether it knows yielding, without hardening
 
     @property

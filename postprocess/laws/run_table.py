@@ -104,7 +104,7 @@ def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> 
     tables: dict[str, Any] = {"x": nodes, "toe": np.zeros(len(nodes)), "touch": np.empty(0)}
     for name, cubic in cubics.items():
         tables[name], tables[f"d{name}"] = cubic.at(nodes)
-    return tables | {"length": steps.length, "force": steps.force, "pressure": steps.pressure}
+    return tables | steps.units
 
 
 def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:

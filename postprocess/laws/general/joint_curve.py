@@ -27,6 +27,7 @@ from archord.postprocess.laws.general.joint import Array
 _ITERATIONS = 6  # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
 _INSIDE = 1 + 1e-9  # of the last node, but for round-off
 _NUMBER = 1e300  # beyond it nothing is a displacement
+_NEWER = ("length_unit", "force_unit", "pin_length")  # which files of earlier versions lack
 _BEND = np.sqrt(2) - 1
 _BRACKETED = 60  # iterations at most of Newton's method for an inverse, which bisects where it must
 
@@ -54,7 +55,8 @@ class JointCurve:
     ``dangle`` of eps/sqrt(y): nearly constant at first touch; nan where unknown. Beyond the last node curves go on
     along their tangents. Expected errors are of 9 in 10 joints, straight between nodes: ``error`` that of y on loading,
     over y, ``back_error`` on the way back, over the largest y. ``about`` says what it is the law of and where it comes
-    from.
+    from, ``length_unit`` and ``force_unit`` name the units of displacement and force, and ``pin_length`` is the length
+    of the pin that carries the force: 1 where forces are per unit length.
     """
 
     x: Array
@@ -76,6 +78,9 @@ class JointCurve:
     force: Any = 1.0
     pressure: Any = 1.0
     about: dict[str, Any] = field(default_factory=dict)
+    length_unit: str = "unit of R"
+    force_unit: str = "unit of E* times unit of R"
+    pin_length: float = 1.0
 
     @property
     def yields(self) -> bool:
@@ -220,7 +225,9 @@ class JointCurve:
         try:
             data = json.loads(text)
             given: dict[str, Any] = {
-                f.name: np.array(data[f.name], float) if f.type == "Array" else data[f.name] for f in fields(cls)
+                f.name: np.array(data[f.name], float) if f.type == "Array" else data[f.name]
+                for f in fields(cls)
+                if f.name in data or f.name not in _NEWER
             }
         except (KeyError, TypeError) as error:
             raise ValueError(f"is no table of a joint's law: {error}") from None

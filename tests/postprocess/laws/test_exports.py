@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import json
 import re
 import shutil
 import subprocess
@@ -16,10 +17,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from archord.cli import run
 from archord.postprocess.laws.exports.export import export_curve
 from archord.postprocess.laws.general.general_law import general_law
 from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.scene.file import load_scene
 from tests.postprocess.laws.curves import yielding_curve
 from tests.postprocess.laws.modelica import functions_of
 
@@ -106,7 +109,8 @@ def check(curve: JointCurve, pairs: np.ndarray, values: np.ndarray) -> None:
             far = ~near | (delta >= deepest)
             np.testing.assert_allclose(ours[far], theirs[far], rtol=1e-9, err_msg=name)
         else:
-            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.nanmax(np.abs(theirs)) + 1e-16, err_msg=name)
+            largest = np.nanmax(np.abs(theirs))
+            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * largest + 1e-16, err_msg=name)
 
 
 def evaluate(law: dict[str, Any], pairs: np.ndarray) -> np.ndarray:
@@ -271,3 +275,45 @@ def test_the_examples_of_the_documentation_run(tmp_path: Path) -> None:
         if program == "./main" or shutil.which(program):
             done = subprocess.run([program, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True)
             np.testing.assert_allclose([float(word) for word in done.stdout.split()], wanted, rtol=1e-10)
+
+
+@pytest.mark.parametrize(("thickness", "unit", "pin"), [(None, "N/mm", 1.0), (25.0, "N", 25.0)])
+def test_every_export_tells_the_unit_of_force_and_the_length(thickness, unit, pin, tmp_path: Path) -> None:
+    """In its head and as constants, alike in all languages; a force over its length is that of the unit length."""
+    sets = [] if thickness is None else ["--set", f"analysis.thickness={thickness}"]
+    files = {suffix: tmp_path / f"law.{suffix}" for suffix in ("py", "h", "mo", "m", "json")}
+    exports = [word for file in files.values() for word in ("--export", str(file))]
+    scene = str(Path(__file__).parents[3] / "scenes" / "steel_pin.toml")
+    assert run(["law", "--scene", scene, *sets, *exports]) == 0
+    law, told = load(files["py"]), json.loads(files["json"].read_text())
+    assert ("mm", unit, pin) == (law.LENGTH_UNIT, law.FORCE_UNIT, law.PIN_LENGTH)
+    assert (told["length_unit"], told["force_unit"], told["pin_length"]) == ("mm", unit, pin)
+    constants = {
+        "h": 'static const char law_{} = "{}";',
+        "mo": '  constant String {} = "{}";',
+        "m": "    T.{} = '{}';",
+    }
+    for suffix, form in constants.items():
+        text = files[suffix].read_text()
+        brackets = "[]" if suffix == "h" else ""
+        assert form.format(f"FORCE_UNIT{brackets}", unit) in text
+        assert form.format(f"LENGTH_UNIT{brackets}", "mm") in text
+        assert re.search(rf"PIN_LENGTH = {pin}", text)
+    rule = "do not multiply them by the length" if thickness else "multiply them by the pin's length"
+    for file in files.values():
+        words = " ".join(file.read_text().split())
+        assert f"force P in {unit}, " in words
+        assert rule in words
+    curve = JointCurve.from_json(files["json"].read_text())
+    scene_law = general_law(LawJoint.from_scene(load_scene(scene)))
+    assert law.force(0.05)[0] / pin == pytest.approx(float(scene_law.at(0.05).load), rel=1e-12)
+    assert float(curve.at(0.05).load) / curve.pin_length == pytest.approx(float(scene_law.at(0.05).load), rel=1e-12)
+
+
+def test_files_of_earlier_versions_are_read() -> None:
+    """They named no units."""
+    curve = curves()["yielding"]
+    data = json.loads(curve.to_json())
+    for name in ("length_unit", "force_unit", "pin_length"):
+        del data[name]
+    assert JointCurve.from_json(json.dumps(data)).pin_length == 1
