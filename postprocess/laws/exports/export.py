@@ -6,9 +6,11 @@ that does not yield, the logarithmic law of first touch, pressure and angle wher
 
 from __future__ import annotations
 
+import builtins
 import json
 import keyword
 import re
+import sys
 import textwrap
 import tomllib
 from collections.abc import Callable
@@ -103,7 +105,12 @@ _FORMS = {
     ),
 }
 _TEMPLATES = tomllib.loads(Path(__file__).with_name("templates.toml").read_text(encoding="utf-8"))
-_TAKEN = {*FUNCTIONS, *keyword.kwlist, "math", "tables"}
+_WORDS = {
+    name: {*words.split()}
+    for name, words in tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8")).items()
+} | {"python": {*keyword.kwlist, *sys.stdlib_module_names, *dir(builtins)}}
+_SPOKEN = {"python": "Python", "c": "C or C++", "modelica": "Modelica", "octave": "Matlab and Octave"}
+_LONGEST = 63  # characters of a name in Matlab, and those that C99 tells apart
 
 
 def export_curve(curve: JointCurve, target: Path) -> str:
@@ -120,8 +127,7 @@ def export_curve(curve: JointCurve, target: Path) -> str:
     if target.suffix == ".json":
         return replace(curve, about=curve.about | {"forces": _units(curve)}).to_json()
     name, form = target.stem, _FORMS[target.suffix]
-    if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) or name in _TAKEN:
-        raise ValueError(f"{target.name}: {name} cannot name a law; letters, digits and _ can, but for words in use")
+    _check_name(target, form.template)
     tables = _tables(curve)
     wanted = ["force", "deeper", "residual", "expected_error"]
     wanted += [
@@ -142,6 +148,22 @@ def export_curve(curve: JointCurve, target: Path) -> str:
         functions="\n\n".join(form.function(node, name) for node in functions),
         handles="\n".join(f"    the_law.{function} = @{function};" for function in wanted if function != "deeper"),
     )
+
+
+def _check_name(target: Path, language: str) -> None:
+    """Raise ValueError if the stem of ``target`` cannot name a law in the ``language``."""
+    name = target.stem
+    fault = None
+    if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
+        fault = "a name begins with a letter a to z, and has letters, digits and _"
+    elif len(name) > _LONGEST:
+        fault = f"it has {len(name)} characters, and a name has at most {_LONGEST}"
+    elif name in FUNCTIONS:
+        fault = "the file has a function of this name"
+    elif name in _WORDS[language]:
+        fault = f"it is a name that {_SPOKEN[language]} has already"
+    if fault:
+        raise ValueError(f"{target.name}: {name} cannot name a law: {fault}; choose another name for the file")
 
 
 def _tables(curve: JointCurve) -> Tables:

@@ -245,15 +245,34 @@ def test_exports_that_cannot_be(tmp_path: Path) -> None:
     for name in ("law.for", "law"):
         with pytest.raises(ValueError, match=r"\.py, \.h, \.mo, \.m or \.json"):
             export_curve(curve, tmp_path / name)
-    for name in ("lug-pin.h", "2.py", "force.m", "class.py"):
-        with pytest.raises(ValueError, match="cannot name a law"):
+    names = "lug-pin.h 2.py force.m class.py math.py print.py math.h time.h string.h namespace.h restrict.h Bolzen_ä.py"
+    names += " model.mo end.mo Real.mo Modelica.mo sqrt.mo max.m function.m endif.m parfor.m plot.m the_law.m _x.h"
+    for name in [*names.split(), f"{'x' * 64}.m", "a b.h"]:
+        with pytest.raises(ValueError, match=f"^{re.escape(name)}: .* cannot name a law: .*; choose another name"):
             export_curve(curve, tmp_path / name)
+    for name in ("function.json", "model.h", "end.h", "int_.h", f"{'x' * 63}.m", "Class.py", "real.mo"):
+        assert export_curve(curve, tmp_path / name)
     with pytest.raises(ValueError, match="several"):
         export_curve(replace(curve, y=np.stack([curve.y, curve.y])), tmp_path / "law.h")
     with pytest.raises(ValueError, match="gaps in its tables cannot be exported: LOAD"):
         export_curve(replace(curve, y=np.full(61, np.nan)), tmp_path / "law.h")
     with pytest.raises(ValueError, match="does not rise"):
         export_curve(replace(curve, back=0 * curve.back), tmp_path / "law.h")
+
+
+def test_what_octave_has_cannot_name_a_law(tmp_path: Path) -> None:
+    """Its keywords; and all functions that an export calls."""
+    if not shutil.which("octave-cli"):
+        pytest.skip("octave-cli is not here")
+    keywords = "printf('%s ', iskeyword(){:});"
+    done = subprocess.run(["octave-cli", "--norc", "--eval", keywords], capture_output=True, text=True, check=True)
+    program = re.sub("%.*", "", export_curve(curves()["yielding"], tmp_path / "lug.m"))
+    called = re.findall(r"[^@\w.]([a-z_]\w*)\(", program)
+    assert {"sqrt", "min", "warning"} <= {*called}
+    variables = {"f", "df", "lug"}
+    for name in {*done.stdout.split(), *called} - variables:
+        with pytest.raises(ValueError, match="cannot name a law"):
+            export_curve(curves()["yielding"], tmp_path / f"{name}.m")
 
 
 def test_the_examples_of_the_documentation_run(tmp_path: Path) -> None:
