@@ -233,15 +233,29 @@ def _joint(
         return _joint_of_scene(scene, overrides, values, needed)
     if overrides:
         raise InputError("--set: changes a scene; give one with --scene.")
-    required = dict.fromkeys(("radius", "clearance", "E_star"), "every law") | needed
-    missing = [f"{_option(name)} (for {law})" for name, law in required.items() if name not in values]
+    missing = [name for name in ("radius", "clearance", "E_star", *needed) if name not in values]
     if missing:
-        raise InputError(f"{', '.join(missing)}: missing; give them all, or the --scene of a joint.")
+        raise InputError(_ask_for(missing, needed))
     for name, other in (("plane", "nu"), ("nu", "plane")):
         if name in values and other not in values:
             raise InputError(f"{_option(name)}: says nothing without {_option(other)}; give both or none.")
     strength = values.pop("yield_stress", None)
     return LawJoint(**values, pin_yield=strength, block_yield=strength), {}, 1.0
+
+
+def _ask_for(missing: list[str], needed: dict[str, str]) -> str:
+    """The sentence that asks for all that is ``missing`` of a joint; ``needed`` has the law by parameter."""
+    names = ", ".join(map(_option, missing))
+    by_law: dict[str, list[str]] = {}
+    for name in missing:
+        if name in needed:
+            by_law.setdefault(needed[name], []).append(name)
+    if sum(map(len, by_law.values())) == len(missing):
+        said = [f"{law}: this law needs {' and '.join(own)}." for law, own in by_law.items()]
+        return f"{' '.join(said)} Give {names}, or the --scene of a joint."
+    why = [f"{law} needs {' and '.join(map(_option, own))}" for law, own in by_law.items()]
+    said = [f"{names}: missing", *why, "give all, or the --scene of a joint"]
+    return f"{'; '.join(said)}."
 
 
 def _joint_of_scene(
@@ -274,7 +288,7 @@ def _joint_of_scene(
     coefficients = {name: values[name] for name in ("k", "c") if name in values}
     joint = dataclasses.replace(LawJoint.from_scene(found), **coefficients)
     if "length" in needed and joint.length is None:
-        raise InputError(f"{path}: {needed['length']} needs the length of the joint; give --length.")
+        raise InputError(f"{needed['length']}: this law needs length. Give --length.")
     return joint, units, found.thickness
 
 
@@ -387,6 +401,6 @@ def _write(texts: list[tuple[Path | None, str]], inputs: list[Path], force: bool
     if len({target.resolve() for target, _ in named}) < len(named):
         raise InputError(f"{named[0][0]}: is named for two files; choose different ones.")
     for target, text in named:
-        with writing(target):
-            target.write_text(text, encoding="utf-8", newline="")
+        with writing(target) as new:
+            new.write_text(text, encoding="utf-8", newline="")
     return [target for target, _ in named]
