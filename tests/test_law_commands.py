@@ -250,6 +250,17 @@ def test_options_beside_a_scene_change_the_scene(options, sets, tmp_path, capsys
     assert capsys.readouterr().out != outs[0][0]
 
 
+def test_fixed_pairs_of_points_are_told(capsys):
+    """By the law of solved joints alone: their pairs follow the deformed curves."""
+    words = ["law", "archord", "paper", "--scene", ELASTIC, "--points", "1"]
+    assert run(words) == 0
+    assert "kinematics" not in capsys.readouterr().err
+    assert run([*words, "--set", "analysis.kinematics=reference"]) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "kinematics" in line]
+    assert len(told) == 1
+    assert told[0].startswith("archord: warning: archord: is a law of closest points on the deformed curves; with")
+
+
 def test_a_rigid_pin_keeps_its_nu(capsys):
     rigid = str(Path(SCENE).with_name("rigid_pin.toml"))
     assert run(["law", "paper", "--scene", rigid, "--points", "1", "--nu", "0.1"]) == 0

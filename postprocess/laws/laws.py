@@ -63,6 +63,7 @@ _FUNCTIONS: dict[str, dict[str, Any]] = {
         "unfit": general.outside,
         "needs": ("plane", "nu"),
         "plastic": True,
+        "solved": True,
     },
     "paper": {"state": chord.parabola, **_WINKLER},
     "paper-plastic": {"state": chord.plastic_winkler, **_PLASTIC},
