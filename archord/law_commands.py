@@ -14,14 +14,31 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from archord.options import argument, file, flag, overrides
 from archord.scene.errors import InputError
 
 if TYPE_CHECKING:
     from archord.postprocess.laws.general.joint import LawJoint
+    from archord.postprocess.laws.law import Law
+    from archord.scene.scene import Scene
 
 _LINE = 400  # points of a line of the picture
+# Options of `archord law` by those beside which they say nothing.
+_IDLE = {
+    "exports": ("by_load", "deepest", "plot", "to", "points", "extrapolate"),
+    "plot": ("points",),
+    "deepest": ("by_load",),
+}
+# What options change in a scene.
+_KEYS = {
+    "radius": "joint.radius",
+    "clearance": "joint.clearance",
+    "length": "analysis.thickness",
+    "plane": "analysis.plane",
+}
+_OF_BODIES = ("nu", "yield_stress")
 
 
 @contextmanager
@@ -56,11 +73,11 @@ def laws() -> int:
 )
 @file("--scene", "take the joint from this scene file", None)
 @overrides()
-@click.option("--radius", type=float, help="radius of the pin")
+@click.option("--radius", type=float, help="radius of the pin; this and the next change the joint of a scene")
 @click.option("--clearance", type=float, help="radius of the hole less that of the pin")
-@click.option("--E-star", "E_star", type=float, help="contact modulus E*")
+@click.option("--E-star", "E_star", type=float, help="contact modulus E*; not beside a scene")
 @click.option("--yield-stress", type=float, help="yield stress")
-@click.option("--length", type=float, help="length of the joint, for the laws that need one")
+@click.option("--length", type=float, help="length of the joint, for the laws that need one; a scene's thickness")
 @click.option("--k", type=float, help="Winkler's coefficient [0.85]")
 @click.option("--c", type=float, help="plateau of the pressure over the yield stress [1]")
 @click.option("--plane", help="plane of the joint: strain or stress")
@@ -102,19 +119,22 @@ def law(
     from archord.postprocess.laws.laws import default_law, find_law
     from archord.scene.file import files_read
 
+    _refuse_contradictions()
     chosen = [find_law(name) for name in dict.fromkeys(names)]
     if not 0 < to < math.inf:
         raise InputError(f"--to {to:g}: must be a positive number.")
     if not 1 <= points <= 100000:
         raise InputError(f"--points {points}: must be between 1 and 100000.")
-    joint, units, thickness = _joint(scene, overrides, given)
+    needed = {name: law.name for law in chosen for name in law.needs}
+    if (exports or deepest) and not chosen:
+        needed = dict.fromkeys(("plane", "nu"), "archord")
+    joint, units, thickness = _joint(scene, overrides, given, needed)
     chosen = chosen or [default_law(joint)]
+    _refuse_unused(chosen, given)
     if exports or deepest:
         option = "--export" if exports else "--deepest"
         if [entry.name for entry in chosen] != ["archord"]:
             raise InputError(f"{option}: is for the law archord alone, which needs plane and nu.")
-        if by_load or (exports and (deepest or plot)):
-            raise InputError(f"{option}: does not go with {'--by-load' if by_load else '--deepest or --plot'}.")
         if not 0 <= deepest <= chosen[0].limit(joint) / joint.clearance:
             raise InputError(f"--deepest {deepest:g}: must be from 0 to 3 clearances, the range of the law.")
         if exports:
@@ -156,7 +176,9 @@ def _export(
         LAWS["archord"].check(joint)
     law = general_law(joint)
     about = law.about | {"units": {name: units[name] for name in ("length", "force", "stress") if name in units}}
-    law = dataclasses.replace(law, force=law.force * thickness, about=about)
+    if units:
+        law = dataclasses.replace(law, length_unit=units["length"], force_unit=units["force"])
+    law = dataclasses.replace(law, force=law.force * thickness, pin_length=thickness, about=about)
     print(*_write([(file, export_curve(law, file)) for file in exports], inputs, force), sep="\n")
     _warn(*(str(warning.message) for warning in caught))
     return 0
@@ -167,42 +189,127 @@ def _warn(*messages: str) -> None:
         print(f"archord: warning: {message}.", file=sys.stderr)
 
 
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _refuse_contradictions() -> None:
+    """Raise `InputError` for options beside one that leaves them without effect."""
+    context = click.get_current_context()
+    typed = {
+        parameter.name: parameter.opts[0]
+        for parameter in context.command.params
+        if parameter.name and context.get_parameter_source(parameter.name) is ParameterSource.COMMANDLINE
+    }
+    for option, idle in _IDLE.items():
+        clash = [typed[name] for name in idle if name in typed]
+        if option in typed and clash:
+            raise InputError(f"{typed[option]}: does not go with {' or '.join(clash)}.")
+    if "force" in typed and "exports" not in typed:
+        raise InputError("--force: overwrites exports, and there is no --export.")
+
+
+def _refuse_unused(chosen: list[Law], given: dict[str, Any]) -> None:
+    """Raise `InputError` for a coefficient that no law among the ``chosen`` has."""
+    from archord.postprocess.laws.laws import LAWS
+
+    for name in ("k", "c"):
+        if given[name] is not None and not any(name in law.coefficients for law in chosen):
+            laws = ", ".join(law.name for law in LAWS.values() if name in law.coefficients)
+            raise InputError(
+                f"--{name} {given[name]:g}: is for {laws} alone; {chosen[0].name} has no such coefficient."
+            )
+
+
 def _joint(
-    scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any]
+    scene: Path | None, overrides: tuple[str, ...], given: dict[str, Any], needed: dict[str, str]
 ) -> tuple[LawJoint, dict[str, str], float]:
-    """The joint of the scene, or of the options, which come before it; the names of the units; and the thickness."""
+    """The joint of the scene, which the options given change as ``--set`` would, or of the options alone; the names of
+    the units; and the thickness. ``needed`` has the law by each parameter that one needs."""
     from archord.postprocess.laws.general.joint import LawJoint
 
     values = {name: value for name, value in given.items() if value is not None}
-    if "nu" in values:
-        values["pin_nu"] = None  # one for both
-    strength = values.pop("yield_stress", None)
     if scene is not None:
-        from archord.scene.file import load_scene
-        from archord.scene.scene import Scene
-
-        loaded = load_scene(scene, overrides)
-        if not isinstance(loaded, Scene):
-            raise InputError(f"{scene}: must be the scene of a [joint]; this is a general one.")
-        units, thick = loaded.units.model_dump(), loaded.analysis.thickness
-        units["force"] = loaded.units.force_of(thick)
-        units["stiffness"] = units["stress"] if thick is None else f"{units['force']}/{units['length']}"
-        joint = dataclasses.replace(LawJoint.from_scene(loaded), **values)
-        return _yielding(joint, strength), units, loaded.thickness
+        return _joint_of_scene(scene, overrides, values, needed)
     if overrides:
         raise InputError("--set: changes a scene; give one with --scene.")
-    missing = [f"--{name.replace('_', '-')}" for name in ("radius", "clearance", "E_star") if name not in values]
+    missing = [name for name in ("radius", "clearance", "E_star", *needed) if name not in values]
     if missing:
-        raise InputError(f"{', '.join(missing)}: missing; give radius, clearance and E* of the joint, or a --scene.")
-    return _yielding(LawJoint(**values), strength), {}, 1.0
+        raise InputError(_ask_for(missing, needed))
+    for name, other in (("plane", "nu"), ("nu", "plane")):
+        if name in values and other not in values:
+            raise InputError(f"{_option(name)}: says nothing without {_option(other)}; give both or none.")
+    strength = values.pop("yield_stress", None)
+    return LawJoint(**values, pin_yield=strength, block_yield=strength), {}, 1.0
 
 
-def _yielding(joint: LawJoint, strength: float | None) -> LawJoint:
-    """``joint`` with the yield ``strength``, if one is given, in those of its bodies that yield, or in both."""
-    if strength is None:
-        return joint
-    pin = strength if joint.yielding != "block" and joint.pin_share else None
-    return dataclasses.replace(joint, pin_yield=pin, block_yield=None if joint.yielding == "pin" else strength)
+def _ask_for(missing: list[str], needed: dict[str, str]) -> str:
+    """The sentence that asks for all that is ``missing`` of a joint; ``needed`` has the law by parameter."""
+    names = ", ".join(map(_option, missing))
+    by_law: dict[str, list[str]] = {}
+    for name in missing:
+        if name in needed:
+            by_law.setdefault(needed[name], []).append(name)
+    if sum(map(len, by_law.values())) == len(missing):
+        said = [f"{law}: this law needs {' and '.join(own)}." for law, own in by_law.items()]
+        return f"{' '.join(said)} Give {names}, or the --scene of a joint."
+    why = [f"{law} needs {' and '.join(map(_option, own))}" for law, own in by_law.items()]
+    said = [f"{names}: missing", *why, "give all, or the --scene of a joint"]
+    return f"{'; '.join(said)}."
+
+
+def _joint_of_scene(
+    path: Path, overrides: tuple[str, ...], values: dict[str, Any], needed: dict[str, str]
+) -> tuple[LawJoint, dict[str, str], float]:
+    """As `_joint`, of the scene ``path``."""
+    from archord.postprocess.laws.general.joint import LawJoint
+
+    if "E_star" in values:
+        said = "does not go with --scene, which has E* of E and nu of its bodies; change these by --set"
+        raise InputError(f"--E-star {values['E_star']:g}: {said}.")
+    before = _law_scene(path, overrides)
+    changes = {f"{key}={value}": name for name, value in values.items() for key in _keys(before, name)}
+    typed = {change: f"{_option(name)} {values[name]}" for change, name in changes.items()}
+    set_keys = {override.partition("=")[0].strip(): override for override in overrides}
+    for change, option in typed.items():
+        same = set_keys.get(change.partition("=")[0])
+        if same:
+            raise InputError(f"{option}: does not go with --set {same}; give one of them.")
+    try:
+        found = _law_scene(path, (*overrides, *changes))
+    except InputError as error:
+        said = str(error)
+        for change, option in typed.items():
+            said = said.replace(f"--set {change}:", f"{option}:")
+        raise InputError(said) from None
+    thick = found.analysis.thickness
+    units = found.units.model_dump() | {"force": found.units.force_of(thick)}
+    units["stiffness"] = units["stress"] if thick is None else f"{units['force']}/{units['length']}"
+    coefficients = {name: values[name] for name in ("k", "c") if name in values}
+    joint = dataclasses.replace(LawJoint.from_scene(found), **coefficients)
+    if "length" in needed and joint.length is None:
+        raise InputError(f"{needed['length']}: this law needs length. Give --length.")
+    return joint, units, found.thickness
+
+
+def _law_scene(path: Path, overrides: tuple[str, ...]) -> Scene:
+    from archord.scene.file import load_scene
+    from archord.scene.scene import Scene
+
+    found = load_scene(path, overrides)
+    if not isinstance(found, Scene):
+        raise InputError(f"{path}: must be the scene of a [joint]; this is a general one.")
+    return found
+
+
+def _keys(scene: Scene, name: str) -> list[str]:
+    """The keys of a scene that the option ``name`` changes: a yield stress in the bodies that yield, or in both."""
+    if name not in _OF_BODIES:
+        return [_KEYS[name]] if name in _KEYS else []
+    bodies = list(scene.solids)
+    if name == "yield_stress":
+        bodies = [body for body in bodies if scene.solids[body].yield_stress is not None] or bodies
+    return [f"{body}.{name}" for body in bodies]
 
 
 @click.command()
@@ -294,6 +401,6 @@ def _write(texts: list[tuple[Path | None, str]], inputs: list[Path], force: bool
     if len({target.resolve() for target, _ in named}) < len(named):
         raise InputError(f"{named[0][0]}: is named for two files; choose different ones.")
     for target, text in named:
-        with writing(target):
-            target.write_text(text, encoding="utf-8", newline="")
+        with writing(target) as new:
+            new.write_text(text, encoding="utf-8", newline="")
     return [target for target, _ in named]

@@ -139,7 +139,7 @@ def export_deck(scene: Path, output: Path | None, overrides: tuple[str, ...], fo
         text = deck(system, deck_mesh(system), checked.targets, f"{scene.stem} in {checked.units.length}")
     except ValueError as error:
         raise InputError(f"{scene}: {error}.") from error
-    with writing(path):
-        path.write_text(text, encoding="utf-8")
+    with writing(path) as new:
+        new.write_text(text, encoding="utf-8")
     print(path)
     return 0

@@ -31,6 +31,7 @@ from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
 from archord.postprocess.laws.laws import LAWS
 from archord.report.figure import new_figure, save
+from archord.report.files import replacing
 from archord.report.table import Table
 
 FOLDER = Path(__file__).with_suffix("")
@@ -176,7 +177,8 @@ def draw(runs, target):
     energy.set(xlabel="crank angle [degrees]", ylabel="N mm", title="energies of the yielding joint")
     for axes, place in ((impacts, "upper left"), (orbit, "center"), (energy, "upper left")):
         axes.legend(fontsize=8, loc=place)
-    save(figure, target)
+    with replacing(target) as new:
+        save(figure, new)
 
 
 def laws():

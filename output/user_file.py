@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from archord.output.folder import CHECKPOINT, FILES, MESH
+from archord.report.files import is_device, replacing
 from archord.scene.errors import InputError
 
 
@@ -27,15 +28,17 @@ def check_target(path: Path, inputs: Iterable[Path] = (), *, force: bool = True)
         fault = "it is an input of the command"
     if fault:
         raise InputError(f"{path}: cannot be written: {fault}.")
-    if path.is_file() and not force:
+    if path.is_file() and not force and not is_device(path):
         raise InputError(f"{path}: is there already; choose another file, or overwrite it with --force.")
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """`check_target` before the writing of ``path``, and `InputError` for what the system refuses all the same."""
+def writing(path: Path) -> Iterator[Path]:
+    """A path to write to, which takes the place of ``path`` when all has gone well (`replacing`); else ``path`` is what
+    it was. Raises `InputError` as `check_target`, and for what the system refuses all the same."""
     check_target(path)
     try:
-        yield
+        with replacing(path) as new:
+            yield new
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}.") from None

@@ -111,7 +111,7 @@ def _without_mesh(scene: Scene) -> tuple:
     g, analysis = scene.joint, scene.analysis
     sizes = (g.radius, g.dR / g.radius, g.W / g.radius, g.growth, g.size_ratio, scene.targets[-1])
     bodies = scene.pin.model_dump_json(), scene.block.model_dump_json()
-    how = analysis.plane, analysis.kinematics, analysis.integration
+    how = analysis.plane, analysis.strain, analysis.kinematics, analysis.integration, f"{analysis.friction:.9g}"
     return *(f"{size:.9g}" for size in sizes), *scene.load.stage_steps, "to", *scene.load.stages, *bodies, *how
 
 

@@ -39,8 +39,8 @@ def export_csv(run: Run, folder: Path, *, force: bool = False) -> list[Path]:
         tables[folder / "contact.csv"] = contact
     _check_new(tables, folder, force)
     for file, table in tables.items():
-        with writing(file):
-            with_headings(table).to_csv(file, index=False, float_format="%.12g", lineterminator="\n")
+        with writing(file) as new:
+            with_headings(table).to_csv(new, index=False, float_format="%.12g", lineterminator="\n")
     return list(tables)
 
 
@@ -54,8 +54,8 @@ def export_vtk(run: Run, folder: Path, step: int | None = None, *, force: bool =
     _check_new(files, folder, force)
     at = [times(run.path)[n - 1] for n in steps]
     for file, (grid, values) in files.items():
-        with writing(file):
-            whole = VtkHdf(file, grid, len(steps))
+        with writing(file) as new:
+            whole = VtkHdf(new, grid, len(steps))
             for k, n in enumerate(steps, 1):
                 whole.write(at[:k], values(n))
     return list(files)

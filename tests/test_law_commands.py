@@ -219,3 +219,92 @@ def test_an_export_of_a_small_block_warns(tmp_path, capsys):
     assert run(["law", "--scene", SCENE, "--set", "joint.block_size=100", "--export", str(target)]) == 0
     assert "the joint is softer" in capsys.readouterr().err
     assert target.exists()
+
+
+ELASTIC = str(Path(SCENE).with_name("elastic_pin.toml"))
+
+
+@pytest.mark.parametrize(
+    ("options", "sets"),
+    [
+        (["--plane", "stress"], ["analysis.plane=stress"]),
+        (["--nu", "0.1"], ["pin.nu=0.1", "block.nu=0.1"]),
+        (["--radius", "2", "--nu", "0"], ["joint.radius=2", "pin.nu=0", "block.nu=0"]),
+        (["--clearance", "0.01"], ["joint.clearance=0.01"]),
+        (["--yield-stress", "0.004"], ["pin.yield_stress=0.004", "block.yield_stress=0.004"]),
+        (["--length", "25"], ["analysis.thickness=25"]),
+    ],
+)
+def test_options_beside_a_scene_change_the_scene(options, sets, tmp_path, capsys):
+    """As --set does: E* follows from them, in tables and in exports."""
+    outs = []
+    for k, words in enumerate((options, [word for key in sets for word in ("--set", key)])):
+        export = tmp_path / f"joint{k}.json"
+        assert run(["law", "--scene", ELASTIC, "--points", "3", *words]) == 0
+        table = capsys.readouterr().out
+        assert run(["law", "--scene", ELASTIC, "--export", str(export), *words]) == 0
+        capsys.readouterr()
+        outs.append((table, export.read_text()))
+    assert outs[0] == outs[1]
+    assert run(["law", "--scene", ELASTIC, "--points", "3"]) == 0
+    assert capsys.readouterr().out != outs[0][0]
+
+
+def test_fixed_pairs_of_points_are_told(capsys):
+    """By the law of solved joints alone: their pairs follow the deformed curves."""
+    words = ["law", "archord", "paper", "--scene", ELASTIC, "--points", "1"]
+    assert run(words) == 0
+    assert "kinematics" not in capsys.readouterr().err
+    assert run([*words, "--set", "analysis.kinematics=reference"]) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "kinematics" in line]
+    assert len(told) == 1
+    assert told[0].startswith("archord: warning: archord: is a law of closest points on the deformed curves; with")
+
+
+def test_a_rigid_pin_keeps_its_nu(capsys):
+    rigid = str(Path(SCENE).with_name("rigid_pin.toml"))
+    assert run(["law", "paper", "--scene", rigid, "--points", "1", "--nu", "0.1"]) == 0
+    said = capsys.readouterr().out
+    assert run(["law", "paper", "--scene", rigid, "--points", "1", "--set", "block.nu=0.1"]) == 0
+    assert capsys.readouterr().out == said
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--scene", ELASTIC, "--E-star", "2"], "--E-star 2: does not go with --scene"),
+        (["--scene", ELASTIC, "--nu", "0.2", "--set", "pin.nu=0.3"], "--nu 0.2: does not go with --set pin.nu=0.3"),
+        (["--scene", ELASTIC, "--clearance", "1", "--set", "joint.relative_clearance=0.1"], "does not go with"),
+        (["--scene", ELASTIC, "--radius", "-1"], "--radius -1.0: joint.radius must be greater than 0"),
+        (["--scene", ELASTIC, "--k", "0.9"], "--k 0.9: is for paper, paper-plastic, winkler alone"),
+        (["paper", *JOINT, "--c", "2"], "--c 2: is for paper-plastic alone; paper has no such coefficient"),
+        (["--scene", ELASTIC, "--export", "x.h", "--to", "3"], "--export: does not go with --to"),
+        (["--scene", ELASTIC, "--export", "x.h", "--extrapolate"], "--export: does not go with --extrapolate"),
+        (["--scene", ELASTIC, "--plot", "x.png", "--points", "3"], "--plot: does not go with --points"),
+        (["--scene", ELASTIC, "--force"], "--force: overwrites exports, and there is no --export"),
+        (["lankarani-nikravesh", "--scene", ELASTIC], "lankarani-nikravesh: this law needs length. Give --length"),
+        ([*JOINT, "--nu", "0.3"], "--nu: says nothing without --plane"),
+    ],
+)
+def test_options_that_contradict_each_other_are_refused(words, said, tmp_path, monkeypatch, refused):
+    """None comes silently before another."""
+    monkeypatch.chdir(tmp_path)
+    assert said in refused(["law", *words])
+    assert not list(tmp_path.iterdir())
+
+
+def test_all_that_is_missing_is_asked_for_at_once(refused):
+    """In one sentence, for all laws that are named, or for the one that an export needs."""
+    every = "--radius, --clearance, --E-star"
+    scene = "or the --scene of a joint.\n"
+    for words, said in (
+        ([], f"{every}: missing; give all, {scene}"),
+        (
+            ["paper-plastic", "dubowsky-freudenstein"],
+            f"{every}, --yield-stress, --length: missing; paper-plastic needs --yield-stress; dubowsky-freudenstein "
+            f"needs --length; give all, {scene}",
+        ),
+        (["--export", "x.h"], f"{every}, --plane, --nu: missing; archord needs --plane and --nu; give all, {scene}"),
+        (["archord", *JOINT], f"archord: this law needs plane and nu. Give --plane, --nu, {scene}"),
+    ):
+        assert refused(["law", *words]) == said

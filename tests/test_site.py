@@ -48,6 +48,22 @@ def test_readme_is_short_and_its_scene_and_program_are_right():
     assert "scenes/steel_pin.toml" in program
 
 
+def test_readme_lists_the_file_that_it_names_and_its_law_can_be_exported(tmp_path):
+    """To the letter; and the law says so of a metal that hardens, as the README does."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    [file] = re.findall(r"A scene is a short TOML file \(\[(\S+)\]", text)
+    [listed] = code("README.md", "toml")
+    assert listed.strip() == (ROOT / file).read_text(encoding="utf-8").strip()
+    [words] = re.findall(r"^    docker/run archord (law .*--export \S+)", text, re.M)
+    law = [sys.executable, "-m", "archord", *words.replace("scenes/", f"{ROOT}/scenes/").split()]
+    subprocess.run(law, cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "joint.h").exists()
+    metal = ["--set", "pin.material=S355", "--set", "block.material=S235", "--force"]
+    done = subprocess.run([*law, *metal], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "hardens" in done.stderr
+
+
 @pytest.mark.parametrize(("page", "displacement"), [("README.md", 2.0), ("docs/tutorial.md", (2.0, 0.0))])
 def test_the_scene_of_a_page_is_a_scene(page, displacement, tmp_path):
     file = tmp_path / "scene.toml"

@@ -14,7 +14,7 @@ from archord.benchmarks.cost.work_precision_codes import ANGLES, CASES, OURS, Po
 from archord.benchmarks.timing import Said, Timing, time_all
 from archord.geometry.basis import Array
 from archord.report.figure import new_figure, save
-from archord.report.files import write_report
+from archord.report.files import replacing, write_report
 from archord.report.table import Table
 
 Pairs = list[tuple[float, float]]
@@ -181,4 +181,5 @@ def draw(case: str, lines: Sequence[Line], file: Path) -> None:
             ax.set_ylim(bottom=bottom)
             ax.grid(True, linewidth=0.4)
     figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4, title=given["title"])
-    save(figure, file, dots=80)
+    with replacing(file) as new:
+        save(figure, new, dots=80)

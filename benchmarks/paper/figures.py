@@ -23,7 +23,7 @@ from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.laws import find_law
 from archord.postprocess.pictures.joint import field_panel
 from archord.report.figure import new_figure, save
-from archord.report.files import write_rows
+from archord.report.files import replacing, write_rows
 
 Part = dict[str, Any]  # columns by heading; a number or a text holds for all rows
 X, Y = "delta/dR", "P/(E* dR)"
@@ -73,7 +73,10 @@ def write(parts: list[Part], folder: Path, name: str) -> list[Path]:
     axes.set(xlabel=layout["x"], ylabel=layout["y"], title=layout["title"])
     canvas.legend(loc="outside right upper", frameon=False)
     axes.grid(alpha=0.3)
-    return [table, save(canvas, folder / f"{name}.png")]
+    picture = folder / f"{name}.png"
+    with replacing(picture) as new:
+        save(canvas, new)
+    return [table, picture]
 
 
 def kind_of(part: Part) -> str:
@@ -205,4 +208,6 @@ def draw_zones(runs: Runs, file: Path) -> Path:
         for stage, axes in zip(STAGES, row, strict=True):
             field_panel(axes, run, int(np.argmin(np.abs(run.curve.delta / run.curve.dR - stage))) + 1)
             axes.set_title(f"plane {plane}, {axes.get_title()}", fontsize="medium")
-    return save(figure, file)
+    with replacing(file) as new:
+        save(figure, new)
+    return file

@@ -14,6 +14,7 @@ from archord.benchmarks.paper.figures import FIGURES, LAYOUTS, draw_zones, write
 from archord.benchmarks.paper.runs import JOINTS, PLANES, Runs, cases, solve_missing
 from archord.output.folder import claim_folder
 from archord.output.ranks import agreed
+from archord.report.files import replacing
 from archord.scene.errors import InputError
 
 
@@ -49,7 +50,8 @@ def reproduce(
     if len(wanted) == len(FIGURES):
         pictures = [file.name for file in files if file.suffix == ".png"]
         files.append(folder / "report.md")
-        files[-1].write_text(report(runs, judged(runs, tables).markdown(), pictures), encoding="utf-8")
+        with replacing(files[-1]) as new:
+            new.write_text(report(runs, judged(runs, tables).markdown(), pictures), encoding="utf-8")
     return files
 
 

@@ -243,8 +243,11 @@ def check_compatible(runs: list[RunCurve]) -> None:
         for body, solid in (("pin", run.scene.pin), ("block", run.scene.block)):
             if not solid.perfectly_plastic:
                 said = f" = {solid.hardening:g}" if isinstance(solid.hardening, float) and solid.hardening else ""
-                raise InputError(f"{run.name}: {body}.hardening{said} does not fit: the law is for perfect plasticity, "
-                                 "hardening = 0.")  # fmt: skip
+                key = "back_stresses" if solid.back_stresses and solid.hardening == 0 else f"hardening{said}"
+                raise InputError(
+                    f"{run.name}: {body}.{key} does not fit: the law is for perfect plasticity, hardening = 0; "
+                    "archord fit RUN --table FILE keeps the run's own P(delta)."
+                )
     first = runs[0]
     for run in runs[1:]:
         own, wanted = (LawJoint.from_scene(each.scene) for each in (run, first))
@@ -254,6 +257,10 @@ def check_compatible(runs: list[RunCurve]) -> None:
             fault = f"analysis.plane = {run.plane!r} does not fit: {first.name} is in plane {first.plane}"
         elif not np.allclose(ours, theirs, rtol=1e-6, atol=1e-9):
             fault = f"the Poisson's ratios or the ratio of the moduli are not those of {first.name}"
+        elif own.large_strain != wanted.large_strain:
+            fault = f"analysis.strain = {run.scene.analysis.strain!r} does not fit: {first.name} has the other"
+        elif own.fixed_pairs != wanted.fixed_pairs:
+            fault = f"analysis.kinematics = {run.scene.analysis.kinematics!r} does not fit: {first.name} has the other"
         elif own.whole != wanted.whole:
             fault = f"pin.whole = {str(own.whole).lower()} does not fit: {first.name} has the other"
         elif softer > _LIKE:
@@ -262,3 +269,10 @@ def check_compatible(runs: list[RunCurve]) -> None:
                      f"about {softer:.1%}")  # fmt: skip
         if fault:
             raise InputError(f"{run.name}: {fault}; one law is for one kind of joint: fit them separately.")
+    yielding = [(run.name, LawJoint.from_scene(run.scene).yielding) for run in runs]
+    yielding = [(name, bodies) for name, bodies in yielding if bodies != "none"]
+    for name, bodies in yielding[1:]:
+        like, others = yielding[0]
+        if bodies != others:
+            said = f"yield stresses ({bodies}) do not fit: {like} has them otherwise ({others})"
+            raise InputError(f"{name}: {said}; one law is for one kind of joint: fit them separately.")

@@ -98,5 +98,6 @@ def draw_fit(calibration: Calibration, target: Path) -> Path:
     for axis in figure.axes:
         axis.set(xlabel="δ / ΔR", xlim=(0, None))
         axis.grid(alpha=0.3)
-    with writing(target):
-        return save(figure, target)
+    with writing(target) as new:
+        save(figure, new)
+    return target

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+import warnings
 from pathlib import Path
 from string import Template
 from typing import Annotated
@@ -14,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.general.joint import Array, LawJoint
-from archord.postprocess.laws.law import LawState, rising_root
+from archord.postprocess.laws.law import ROUND_OFF, LawRangeWarning, LawState, rising_root
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -24,8 +25,9 @@ class FittedLaw(BaseModel):
     and ``sigY``.
 
     Errors are standard errors with the mesh's in quadrature. ``fitted_range`` is that of ``delta/dR``; outside it the
-    law extrapolates. ``rms`` and ``largest`` are of ``law/run - 1`` of P in that range (None: unknown). Lengths,
-    stresses and forces per unit thickness in the named units. Raises ValueError for values that no joint has.
+    law extrapolates, beyond its end with a `LawRangeWarning`. ``rms`` and ``largest`` are of ``law/run - 1`` of P in
+    that range (None: unknown). Lengths, stresses and forces per unit thickness in the named units. Raises ValueError
+    for values that no joint has.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -52,22 +54,31 @@ class FittedLaw(BaseModel):
             raise ValueError("c and sigY belong together; give both or none")
         return self
 
+    def _asked(self, delta: ArrayLike) -> LawState:
+        """`_state`, with a warning beyond the range, if it is known."""
+        farthest = float(np.max(delta, initial=0.0)) / self.dR
+        end = self.fitted_range[1]
+        if end and farthest > end * (1 + ROUND_OFF):
+            said = f"delta = {farthest:.4g} dR is beyond the {end:g} dR that the law was fitted to: it extrapolates"
+            warnings.warn(LawRangeWarning(said), stacklevel=3)
+        return self._state(delta)
+
     def _state(self, delta: ArrayLike) -> LawState:
         joint = LawJoint(self.R, self.dR, self.E_star, block_yield=self.sigY, k=self.k, c=self.c or 1.0)
         return plastic_winkler(joint, np.maximum(delta, 0.0))
 
     def force(self, delta: ArrayLike) -> Array:
         """Force per unit thickness of the whole joint at ``delta`` (any shape); 0 where ``delta <= 0``."""
-        return self._state(delta).load
+        return self._asked(delta).load
 
     def stiffness(self, delta: ArrayLike) -> Array:
         """``dP/d(delta)`` of `force` (any shape); 0 where ``delta <= 0``."""
-        return self._state(delta).stiffness
+        return self._asked(delta).stiffness
 
     def displacement(self, force: ArrayLike) -> Array:
         """The inverse of `force` (any shape): 0 where ``force <= 0``, nan where no displacement brings so much: the
         plastic law's force stays below ``2 sqrt(2) c sigY R``."""
-        return rising_root(self.force, np.asarray(force, float), self.dR)
+        return rising_root(lambda x: self._state(x).load, np.asarray(force, float), self.dR)
 
     @classmethod
     def from_json(cls, text: str) -> FittedLaw:
@@ -84,6 +95,7 @@ class FittedLaw(BaseModel):
             "k_error": f"{self.k_error:.2g}",
             "c_comment": "no yield" if self.c is None else f"standard error {self.c_error or 0.0:.2g}",
             "range": f"{low:g} to {high:g}",
+            "end": repr(high * self.dR),
             "units": json.dumps(f"{self.length_unit}; force per unit thickness: {self.force_unit}"),
             "sources": json.dumps(", ".join(self.fitted_to)),
             "plane": self.plane,

@@ -83,5 +83,6 @@ def draw_laws(states: Sequence[tuple[Law, LawState]], joint: LawJoint, target: P
         axis.set(xlabel=over, ylabel=label, xlim=(0, to), ylim=(0, None))
         axis.grid(alpha=0.3)
     axes[0].legend(frameon=False)
-    with writing(target):
-        return save(figure, target)
+    with writing(target) as new:
+        save(figure, new)
+    return target

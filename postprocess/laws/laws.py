@@ -53,6 +53,8 @@ def _half_spaces(A: float, q: float, hertz: bool = True) -> dict[str, Any]:
 
 
 _CHORD: dict[str, Any] = {"limit": lambda joint: _DEEPEST * joint.clearance, "unfit": _thick}
+_WINKLER: dict[str, Any] = {"coefficients": ("k",), **_CHORD}
+_PLASTIC: dict[str, Any] = {"coefficients": ("k", "c"), "needs": ("yield_stress",), "plastic": True, **_CHORD}
 _OF_LOAD = {"gives": ("pressure", "contact angle")}
 _FUNCTIONS: dict[str, dict[str, Any]] = {
     "archord": {
@@ -61,10 +63,11 @@ _FUNCTIONS: dict[str, dict[str, Any]] = {
         "unfit": general.outside,
         "needs": ("plane", "nu"),
         "plastic": True,
+        "solved": True,
     },
-    "paper": {"state": chord.parabola, **_CHORD},
-    "paper-plastic": {"state": chord.plastic_winkler, "needs": ("yield_stress",), "plastic": True, **_CHORD},
-    "winkler": {"state": chord.winkler, **_CHORD},
+    "paper": {"state": chord.parabola, **_WINKLER},
+    "paper-plastic": {"state": chord.plastic_winkler, **_PLASTIC},
+    "winkler": {"state": chord.winkler, **_WINKLER},
     "liu": {"state": chord.liu, **_CHORD},
     "johnson": _half_spaces(4 * math.pi, -1.0),  # the bracket is ln(4 R1/a) + ln(4 R2/a) - 1 with Hertz's half-width a
     # 2/3 + ln(4 R1/d) + ln(4 R2/d) with d = width (R* P/E*)^(1/2), so A = 16/width^2: R1 and R2 cancel

@@ -56,6 +56,15 @@ class RunSteps:
         scale = self.length if force is None else self.force
         return f"{(value or 0.0) * scale:.6g} {self.run.units.get(name, '')}".rstrip()
 
+    @property
+    def units(self) -> dict[str, Any]:
+        """Units of x, y and peak as numbers, the names of their units, and the length that forces are of, as
+        `JointCurve` has them."""
+        length_unit, force_unit = (self.run.units.get(name, "-") for name in self.names)
+        numbers = {"length": self.length, "force": self.force, "pressure": self.pressure}
+        words = {"length_unit": length_unit, "force_unit": force_unit}
+        return numbers | words | {"pin_length": self.run.scene.thickness}
+
     def require_rising(self, steps: np.ndarray) -> None:
         """Raise `InputError` if the force does not rise from each of the ``steps`` to the next."""
         for a, b in pairwise(steps):

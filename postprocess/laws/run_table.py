@@ -30,6 +30,7 @@ _SAME = 1e-9  # of the range: nodes that are one
 _FEWEST, _FEWEST_BACK = 6, 3  # steps with contact
 _UNSEEN = 0.03  # error of ways back that were not solved, over the force they begin at (docs/calibration.md)
 _FIRST = 4.0  # error at first touch over that at the first step: 5 to 8 % of P against the logarithm of line contact
+_WANTED, _EARLY = 0.01, 0.1  # error of first loading to be asked for, and from which share of its end on
 _BISECTIONS, _LARGEST = 60, 7.0  # of ln(ratio)
 _SOFTER = 0.9  # slope of the way back where it opens over that up to the first step, at most
 _LEAST = 1e-3  # slope at an end over that of the last two nodes
@@ -88,6 +89,7 @@ def run_table(run: Run, of: str | None = None) -> JointCurve:
         "first loading": f"{len(k)} steps to {steps.said(x[k[-1]])}, {steps.said(force=y[k[-1]])}",
         "contact begins at": steps.said(begin[-1]),
         "error of first loading": f"{_sizes(left_out)} of P, by the cubic through every second step",
+        "steps for 1 %": _steps_asked(x[k], left_out),
         "way back": back.said,
         "error of the way back": said,
     }
@@ -104,7 +106,7 @@ def _tables(steps: RunSteps, k: np.ndarray, loading: _Cubic, back: _WayBack) -> 
     tables: dict[str, Any] = {"x": nodes, "toe": np.zeros(len(nodes)), "touch": np.empty(0)}
     for name, cubic in cubics.items():
         tables[name], tables[f"d{name}"] = cubic.at(nodes)
-    return tables | {"length": steps.length, "force": steps.force, "pressure": steps.pressure}
+    return tables | steps.units
 
 
 def _way_back(steps: RunSteps, k: np.ndarray, loading: _Cubic) -> _WayBack:
@@ -202,6 +204,17 @@ def _left_out(x: Array, f: Array) -> Array:
         kept = np.delete(np.arange(len(x)), out)
         error[out] = _cubic(x[kept], f[kept], touching=True).at(x[out])[0] - f[out]
     return error
+
+
+def _steps_asked(x: Array, left_out: Array) -> str:
+    """How many steps of first loading leave errors of 1 %, from those ``left_out`` at the steps ``x``, which fall with
+    the square of the step's length; below `_EARLY` of the largest x, near first touch, they fall far more slowly."""
+    worst = float(np.abs(left_out[x > _EARLY * x[-1]]).max())
+    where = f"above {_EARLY:.0%} of the largest displacement"
+    if worst <= _WANTED:
+        return f"the {len(x)} of this run are enough {where}: largest error {worst:.2%}"
+    wanted = int(np.ceil(len(x) * np.sqrt(worst / _WANTED)))
+    return f"about {wanted} of equal length on first loading, instead of {len(x)}; {where}"
 
 
 def _around(errors: Array) -> Array:

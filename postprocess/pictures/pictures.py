@@ -28,10 +28,11 @@ _FEW = 10  # runs that get a name in the legend
 def save_figure(figure: Figure, target: Path) -> Path:
     """Write ``figure`` as ``target``; returns it. Raises `InputError` if that cannot be written."""
     try:
-        with writing(target):
-            return save(figure, target)
+        with writing(target) as new:
+            save(figure, new)
     except ValueError as error:
         raise InputError(str(error)) from None
+    return target
 
 
 def draw_run(run: Run, target: Path | str) -> Path:
@@ -54,8 +55,8 @@ def draw_probe(probe: Probe, target: Path) -> Path:
     if target.suffix == ".csv":
         from archord.postprocess.frames import with_headings
 
-        with writing(target):
-            with_headings(probe.frame()).to_csv(target, index=False, float_format="%.12g", lineterminator="\n")
+        with writing(target) as new:
+            with_headings(probe.frame()).to_csv(new, index=False, float_format="%.12g", lineterminator="\n")
         return target
     figure = new_figure(6.0, 4.4)
     problems.draw_probes(figure.subplots(), [probe], [f"{probe.place}, step {probe.step}"])

@@ -19,6 +19,7 @@ WITH_TOE = True  # which ends more softly than it begins
 
 LAST = 1  # index of the last node
 RANGE = 1.0  # displacement up to which the tables reach
+REACH = 1.0  # the same, with what round-off may add
 LENGTH = 1.0  # clearance dR
 FORCE = 1.0  # unit of force of the logarithmic law
 NODES: Table = (0.0, 1.0)  # displacements of the tables
@@ -34,12 +35,43 @@ PEAK: Table = (1.0, 1.0)  # largest pressure over the root of the force
 PEAK_SLOPE: Table = (0.0, 0.0)
 ANGLE: Table = (1.0, 1.0)  # semi-angle over the root of the force
 ANGLE_SLOPE: Table = (0.0, 0.0)
+WIDEST = 1.5  # semi-angle that no contact exceeds
 ERROR: Table = (0.0, 0.0)  # expected error on first loading, over the force
 BACK_ERROR: Table = (0.0, 0.0)  # on the way back, over the largest force
 
 
 def warn_outside(delta: float) -> None:
     """Say where the law is used beyond its tables: a function of each language's own."""
+
+
+def beyond(value: float, last: float) -> float:
+    """0 up to last; nan, by infinity less infinity, beyond and of nan: added to what is unknown there."""
+    doubt = 0.0
+    if value <= last:
+        doubt = 0.0
+    else:
+        big = value
+        bound = last
+        for _ in range(8):
+            big = big * 1e100
+            bound = bound * 1e100
+        doubt = big - bound
+    return doubt
+
+
+def no_number(delta: float, deepest: float) -> float:
+    """0, but nan if one of both is nan or infinite."""
+    doubt = beyond(delta, 1e300) + beyond(deepest, 1e300)
+    return doubt
+
+
+def unknown(delta: float, deepest: float) -> float:
+    """0 where the tables tell of the state, else nan."""
+    doubt = beyond(delta, REACH) + beyond(deepest, 1e300)
+    if WITH_WAY_BACK:
+        if delta > 0:
+            doubt = doubt + beyond(deepest, REACH)
+    return doubt
 
 
 def interval(table: Table, value: float) -> int:
@@ -181,7 +213,7 @@ def way_back(delta: float, deepest: float) -> tuple[float, float]:
 
 
 def force(delta: float, deepest: float = 0.0) -> tuple[float, float]:
-    """Force P and stiffness dP/d(delta) at a displacement, after the joint has been as deep as deepest."""
+    """Force P and stiffness dP/d(delta), nan beyond the tables, after the joint has been as deep as deepest."""
     warn_outside(max(delta, deepest))
     P, stiffness = curve(LOAD, LOAD_SLOPE, delta)
     if WITH_WAY_BACK:
@@ -190,12 +222,20 @@ def force(delta: float, deepest: float = 0.0) -> tuple[float, float]:
             if below <= P:
                 P = below
                 stiffness = slope
+    P = P + no_number(delta, deepest)
+    stiffness = stiffness + unknown(delta, deepest)
     return P, stiffness
+
+
+def deeper(deepest: float, delta: float) -> float:
+    """The deepest displacement after an accepted step at delta; nan if one of both is nan."""
+    deepest_now = max(deepest, delta) + no_number(delta, deepest)
+    return deepest_now
 
 
 def residual(deepest: float) -> float:
     """The displacement at which the joint opens on its way back: residual clearance."""
-    z = 0.0
+    z = beyond(deepest, 1e300)
     if WITH_WAY_BACK:
         start = max(deepest, 0.0)
         ratio = scale(start)
@@ -203,12 +243,12 @@ def residual(deepest: float) -> float:
         z = start - ratio * back_displacement(largest / ratio)
         if WITH_TOE:
             z = z - straight(TOE, start)
-        z = max(z, 0.0)
+        z = max(z, 0.0) + beyond(deepest, REACH)
     return z
 
 
 def expected_error(delta: float, deepest: float = 0.0) -> float:
-    """The error of the force, in its unit, below which 9 of 10 joints stay."""
+    """The error of the force, in its unit, below which 9 of 10 joints stay; nan beyond the tables."""
     place = delta
     share = straight(ERROR, delta)
     if WITH_WAY_BACK:
@@ -219,20 +259,21 @@ def expected_error(delta: float, deepest: float = 0.0) -> float:
     error = P * share
     if delta <= 0:
         error = 0.0
+    error = error + unknown(delta, deepest)
     return error
 
 
 def peak_pressure(delta: float) -> float:
-    """The largest contact pressure on first loading."""
+    """The largest contact pressure on first loading; nan beyond the tables."""
     P, slope = curve(LOAD, LOAD_SLOPE, delta)
     root, slope = cubic(PEAK, PEAK_SLOPE, max(delta, 0.0))
-    p0 = root * math.sqrt(P)
+    p0 = root * math.sqrt(P) + beyond(delta, REACH)
     return p0
 
 
 def contact_angle(delta: float) -> float:
-    """The semi-angle of the contact [rad] on first loading."""
+    """The semi-angle of the contact [rad] on first loading; nan beyond the tables."""
     P, slope = curve(LOAD, LOAD_SLOPE, delta)
     root, slope = cubic(ANGLE, ANGLE_SLOPE, max(delta, 0.0))
-    angle = root * math.sqrt(P)
+    angle = min(root * math.sqrt(P), WIDEST) + beyond(delta, REACH)
     return angle

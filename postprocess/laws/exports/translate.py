@@ -225,7 +225,7 @@ MODELICA = Language(
     while_="while {} loop",
     for_="for k in 1:{} loop",
     ends=("end if;", "end while;", "end for;"),
-    warning='assert({} <= RANGE, "delta is beyond the tables of this law", AssertionLevel.warning);',
+    warning='assert({} <= REACH, "delta is beyond the tables of this law", AssertionLevel.warning);',
     types={"Table": "Real {}[:]", "float": "Real {}", "int": "Integer {}"},
 )
 
@@ -241,7 +241,7 @@ OCTAVE = Language(
     while_="while {}",
     for_="for k = 1:{}",
     ends=("end", "end", "end"),
-    warning="warn_outside({}, T.RANGE);",
+    warning="warn_outside({}, T.REACH);",
     types={},
     table="T.{}",
 )

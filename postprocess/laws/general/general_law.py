@@ -131,6 +131,7 @@ def reduce_joints(side: str, joints: Elastic, yielding: Yielding | None = None) 
         ratio = _from_zero(np.stack([_ratio(x, *map(np.asarray, row)) for row in rows]), 1.0)
         back_error = _from_zero(np.hypot(error, lost.way_error))
     root = np.sqrt(y)
+    angle = np.minimum(angle, np.pi / 2)
     F0 = elastic_model().F.at(joints, np.zeros(1))[0][:, 0]
     rise, end = base.F[:, 0] - F0, base.F_slope[:, 0]
     touch = np.stack([F0, 2 * rise / x[0] - end, end / x[0] - rise / x[0] ** 2], axis=1)

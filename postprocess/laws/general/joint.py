@@ -31,8 +31,8 @@ class LawJoint:
     the block's, or rigid). ``pin_hardening`` and ``block_hardening`` are d(yield stress)/d(PEEQ) over Young's modulus
     of the body (0: perfect plasticity, None: no straight line). Laws of P(delta) are for a pin in a wide block, and say
     so of a ``ring``, where ``block_size`` (None: wide) is small, the pin is ``whole``, not cut at the pressed
-    diameter, or there is ``friction`` or ``large_strain``, which no law knows. Raises ValueError for values that make
-    no joint.
+    diameter, or there is ``friction`` or ``large_strain``, which no law knows; and archord's also where contact is of
+    the pairs of points of the undeformed curves (``fixed_pairs``). Raises ValueError for values that make no joint.
     """
 
     radius: float
@@ -54,6 +54,7 @@ class LawJoint:
     whole: bool = False
     friction: float = 0.0
     large_strain: bool = False
+    fixed_pairs: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -95,6 +96,7 @@ class LawJoint:
             whole=scene.pin.whole,
             friction=scene.analysis.friction,
             large_strain=scene.analysis.strain == "large",
+            fixed_pairs=scene.analysis.kinematics == "reference",
             **given,
         )
 

@@ -26,13 +26,16 @@ from archord.postprocess.laws.general.joint import Array
 
 _ITERATIONS = 6  # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
 _INSIDE = 1 + 1e-9  # of the last node, but for round-off
+_NUMBER = 1e300  # beyond it nothing is a displacement
+_NEWER = ("length_unit", "force_unit", "pin_length")  # which files of earlier versions lack
 _BEND = np.sqrt(2) - 1
 _BRACKETED = 60  # iterations at most of Newton's method for an inverse, which bisects where it must
 
 
 class CurveState(NamedTuple):
     """What a joint's law says at displacements ``(...)``: force, dP/d(delta), and the error of the force expected of 9
-    in 10 joints; largest pressure and semi-angle [rad] of the contact, nan on the way back after yielding."""
+    in 10 joints; largest pressure and semi-angle [rad] of the contact, nan on the way back after yielding. Beyond the
+    table all but the force are nan, and of nan all."""
 
     load: Array
     stiffness: Array
@@ -52,7 +55,8 @@ class JointCurve:
     ``dangle`` of eps/sqrt(y): nearly constant at first touch; nan where unknown. Beyond the last node curves go on
     along their tangents. Expected errors are of 9 in 10 joints, straight between nodes: ``error`` that of y on loading,
     over y, ``back_error`` on the way back, over the largest y. ``about`` says what it is the law of and where it comes
-    from.
+    from, ``length_unit`` and ``force_unit`` name the units of displacement and force, and ``pin_length`` is the length
+    of the pin that carries the force: 1 where forces are per unit length.
     """
 
     x: Array
@@ -74,6 +78,9 @@ class JointCurve:
     force: Any = 1.0
     pressure: Any = 1.0
     about: dict[str, Any] = field(default_factory=dict)
+    length_unit: str = "unit of R"
+    force_unit: str = "unit of E* times unit of R"
+    pin_length: float = 1.0
 
     @property
     def yields(self) -> bool:
@@ -86,13 +93,29 @@ class JointCurve:
         """Largest displacement that the table covers."""
         return self.length * self.x[-1]
 
+    @property
+    def reach(self) -> float:
+        """Largest x that counts as within the table."""
+        return float(_INSIDE * self.x[-1])
+
+    @property
+    def widest(self) -> Any:
+        """Semi-angle [rad] that cubics between nodes do not exceed: a quarter of a circle, or the largest node's."""
+        largest = (self.angle * np.sqrt(self.y)).max(axis=-1, keepdims=self.y.ndim > 1)
+        return np.where(largest > _INSIDE * np.pi / 2, largest, np.pi / 2)
+
     def at(self, delta: npt.ArrayLike, deepest: npt.ArrayLike = 0.0) -> CurveState:
         """All quantities at ``delta`` after the joint has been as deep as ``deepest`` (both ``(..., k)``); 0 where the
         joint is open. Warns beyond the table."""
         x = np.asarray(delta, float) / self.length
         most = np.maximum(np.asarray(deepest, float) / self.length, 0.0)
-        x, most = np.broadcast_arrays(x, most)
-        if (np.maximum(x, most) > _INSIDE * self.x[-1]).any():
+        x, most = np.broadcast_arrays(np.maximum(x, -1.0), most)
+        numbers = (x <= _NUMBER) & (most <= _NUMBER)
+        known = numbers & (x <= self.reach)
+        if self.yields:
+            known &= (x <= 0) | (most <= self.reach)
+        x, most = (np.where(numbers, values, 0.0) for values in (x, most))
+        if (np.maximum(x, most) > self.reach).any():
             warnings.warn(
                 f"archord: beyond {self.x[-1]:g} dR, where the joint's table ends, it goes on straight", stacklevel=2
             )
@@ -101,6 +124,7 @@ class JointCurve:
         peak, angle = (
             hermite(self.x, f, df, x)[0] * root for f, df in ((self.peak, self.dpeak), (self.angle, self.dangle))
         )
+        angle = np.minimum(angle, self.widest)
         error = y * linear(self.x, self.error, x)
         returning = x < most
         if returning.any() and self.yields:
@@ -114,6 +138,8 @@ class JointCurve:
             error = np.where(returning, ymost * linear(self.x, self.back_error, most), error)
             peak, angle = (np.where(returning, np.nan, values) for values in (peak, angle))
         y, dy, error, peak, angle = (np.where(x <= 0, 0.0, values) for values in (y, dy, error, peak, angle))
+        y = np.where(numbers, y, np.nan)
+        dy, error, peak, angle = (np.where(known, values, np.nan) for values in (dy, error, peak, angle))
         return CurveState(
             y * self.force, dy * self.force / self.length, error * self.force, peak * self.pressure, angle
         )
@@ -121,13 +147,17 @@ class JointCurve:
     def displacement(self, load: npt.ArrayLike) -> Array:
         """The displacement of first loading at which the force is ``load`` ``(..., k)``; nan beyond the table's."""
         y = np.asarray(load, float) / self.force
-        return np.where(y > self.y[..., -1:], np.nan, self._inverse(self.y, self.dy, y)) * self.length
+        known = y <= self.y[..., -1:]
+        return np.where(known, self._inverse(self.y, self.dy, np.where(known, y, 0.0)), np.nan) * self.length
 
     def residual(self, deepest: npt.ArrayLike) -> Array:
-        """The displacement ``(..., k)`` at which the joint opens on its way back from ``deepest``."""
+        """The displacement ``(..., k)`` at which the joint opens on its way back from ``deepest``; nan beyond the table
+        if it yields."""
         most = np.maximum(np.asarray(deepest, float) / self.length, 0.0)
+        known = most <= (self.reach if self.yields else _NUMBER)
+        most = np.where(known, most, 0.0)
         _, _, travel, toe = self._way(most)
-        return np.maximum(most - travel - toe, 0.0) * self.length
+        return np.where(known, np.maximum(most - travel - toe, 0.0), np.nan) * self.length
 
     def _way(self, most: Array) -> tuple[Array, Array, Array, Array]:
         """Of the way back from ``most`` its y there, ratio, travel and toe."""
@@ -195,7 +225,9 @@ class JointCurve:
         try:
             data = json.loads(text)
             given: dict[str, Any] = {
-                f.name: np.array(data[f.name], float) if f.type == "Array" else data[f.name] for f in fields(cls)
+                f.name: np.array(data[f.name], float) if f.type == "Array" else data[f.name]
+                for f in fields(cls)
+                if f.name in data or f.name not in _NEWER
             }
         except (KeyError, TypeError) as error:
             raise ValueError(f"is no table of a joint's law: {error}") from None

@@ -205,6 +205,15 @@ def joint_with(name, **sections):
             "pin.whole = true does not fit: run has the other; one law is for one",
         ),
         (joint_with("other", analysis={"friction": 0.2}), r"analysis.friction = 0\.2 does not fit: the law is for"),
+        (
+            joint_with("other", analysis={"strain": "large"}),
+            "analysis.strain = 'large' does not fit: run has the other",
+        ),
+        (joint_with("other", analysis={"kinematics": "reference"}), "analysis.kinematics = 'reference' does not fit"),
+        (
+            joint_with("other", block={"yield_stress": 0.002, "back_stresses": [[1.0, 10.0]]}),
+            "block.back_stresses does not fit: .* archord fit RUN --table FILE",
+        ),
         (joint_with("other", joint={"block_size": 5.0}), r"joint.block_size is 5 R and that of run 100 R, .* 5\.6%"),
     ],
 )
@@ -212,6 +221,19 @@ def test_runs_that_do_not_fit_together(second, said):
     """One k is for one pair of materials in a plane, without hardening; a small block gives a softer joint."""
     with pytest.raises(InputError, match=f"other: {said}"):
         calibrate([curve(0.83), second])
+
+
+def test_runs_whose_bodies_yield_otherwise_do_not_fit_together():
+    """c depends on which body yields; elastic runs go with any."""
+    block, both = (
+        replace(curve(0.83, 1.2, sigY=0.002), name=name, scene=scene(0.05, block={"yield_stress": 0.002}, **pin))
+        for name, pin in (("block", {}), ("both", {"pin": {"yield_stress": 0.002}}))
+    )
+    with pytest.raises(
+        InputError, match=r"both: yield stresses \(both\) do not fit: block has them otherwise \(block\)"
+    ):
+        calibrate([block, both])
+    assert calibrate([curve(0.83), block]).law().k == pytest.approx(0.83, rel=1e-3)
 
 
 @pytest.mark.parametrize("widths", [[5.0], [100.0, 50.0]])

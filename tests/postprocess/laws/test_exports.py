@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import json
 import re
 import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from archord.cli import run
 from archord.postprocess.laws.exports.export import export_curve
+from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
+from archord.scene.file import load_scene
 from tests.postprocess.laws.curves import yielding_curve
 from tests.postprocess.laws.modelica import functions_of
 
 COLUMNS = ("load", "stiffness", "error", "residual", "peak", "angle")
+EXTREMES = (0.0, -0.0, -1.0, 0.7, 1.0, 1 + 1e-8, 1.2, -np.inf, np.inf, np.nan)  # over the range
 FUNCTIONS = ("force", "expected_error", "residual", "peak_pressure", "contact_angle")
 C_CLIENT = """
 #include <stdio.h>
@@ -40,12 +47,16 @@ int main(void) {
     if (state.outside || state.deepest != 0.9 * law_RANGE) return 1;
     law_advance(&state, 1.1 * law_RANGE);
     law_advance(&state, 0.0);
-    return state.outside && state.deepest == 1.1 * law_RANGE ? 0 : 2;
+    if (!state.outside || state.deepest != 1.1 * law_RANGE) return 2;
+    law_advance(&state, NAN);
+    law_advance(&state, 0.0);
+    return isnan(state.deepest) ? 0 : 3;
 }
 """
 OCTAVE_CLIENT = """
 addpath('.'); warning('off', 'archord:outside');
 law = law(); about = jsondecode(law.about); assert(law.advance(1, 2) == 2 && law.in_range(law.range));
+assert(isnan(law.advance(0.1, NaN)) && isnan(law.advance(NaN, 0.1)) && ~law.in_range(NaN));
 file = fopen('in', 'r'); in = fread(file, [2 Inf], 'double'); fclose(file);
 out = zeros(6, columns(in));
 for k = 1:columns(in)
@@ -76,12 +87,14 @@ pytestmark = pytest.mark.filterwarnings("ignore:archord. beyond")
 
 
 def inputs(curve: JointCurve, n: int = 10_000) -> np.ndarray:
-    """Pairs of displacement and deepest displacement ``(n, 2)``: open, first touch, through the table and beyond."""
+    """Pairs of displacement and deepest displacement ``(n + 100, 2)``: open, first touch, through the table and beyond;
+    and every pair of `EXTREMES`."""
     rng = np.random.default_rng(19)
     delta, deepest = curve.limit * rng.uniform([-0.05, -0.05], [1.3, 1.2], (n, 2)).T
     delta[: n // 10] = curve.limit * 10 ** rng.uniform(-12, -1, n // 10)
     deepest[n // 20 : n // 5] = 1.2 * np.abs(delta[n // 20 : n // 5])
-    return np.stack([delta, deepest], axis=1)
+    usual = np.stack([delta, deepest], axis=1)
+    return np.concatenate([usual, curve.limit * np.array(list(product(EXTREMES, repeat=2)))])
 
 
 def check(curve: JointCurve, pairs: np.ndarray, values: np.ndarray) -> None:
@@ -92,11 +105,12 @@ def check(curve: JointCurve, pairs: np.ndarray, values: np.ndarray) -> None:
     wanted = (state.load, state.stiffness, state.error, curve.residual(deepest), first.peak_pressure, first.angle)
     for name, ours, theirs in zip(COLUMNS, values.T, wanted, strict=True):
         if name == "stiffness":
-            far = np.abs(delta - curve.residual(deepest)) > 1e-7 * curve.limit
-            far |= delta >= deepest
+            near = np.abs(delta - curve.residual(deepest)) <= 1e-7 * curve.limit
+            far = ~near | (delta >= deepest)
             np.testing.assert_allclose(ours[far], theirs[far], rtol=1e-9, err_msg=name)
         else:
-            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max() + 1e-16, err_msg=name)
+            largest = np.nanmax(np.abs(theirs))
+            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * largest + 1e-16, err_msg=name)
 
 
 def evaluate(law: dict[str, Any], pairs: np.ndarray) -> np.ndarray:
@@ -132,7 +146,8 @@ def test_python_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> N
     assert law.advance(0.1, 0.2) == 0.2
     assert law.in_range(curve.limit)
     assert not law.in_range(1.001 * curve.limit)
-    assert np.isnan(law.force(float("nan"))[0])
+    assert np.isnan([law.advance(0.1, np.nan), law.advance(np.nan, 0.1)]).all()
+    assert not law.in_range(np.nan)
 
 
 def test_c_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
@@ -143,7 +158,8 @@ def test_c_says_what_the_table_says(curve: JointCurve, tmp_path: Path) -> None:
     write(curve, tmp_path / "law.h")
     (tmp_path / "main.c").write_text(C_CLIENT)
     strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2"]
-    subprocess.run([compiler, *strict, "main.c", "-o", "law", "-lm"], cwd=tmp_path, check=True)
+    careful = ["-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
+    subprocess.run([compiler, *strict, *careful, "main.c", "-o", "law", "-lm"], cwd=tmp_path, check=True)
     pairs = inputs(curve)
     done = subprocess.run([tmp_path / "law"], input=pairs.tobytes(), capture_output=True, check=True)
     check(curve, pairs, np.frombuffer(done.stdout).reshape(-1, 6))
@@ -168,6 +184,37 @@ def test_modelica_says_what_the_table_says(curve: JointCurve, tmp_path: Path) ->
     assert package.endswith("end Law;\n")
     pairs = inputs(curve)
     check(curve, pairs, evaluate(functions_of(package), pairs))
+
+
+def test_beyond_its_range_a_law_is_a_force_alone(curve: JointCurve) -> None:
+    """The force goes on along its tangent; what else is said there is nan, and so is everything of nan."""
+    end, step = curve.limit, 1e-6 * curve.limit
+    beyond = np.array([1 + 1e-8, 1.2, 100.0]) * end
+    state, edge = curve.at(beyond), curve.at([end])
+    np.testing.assert_allclose(state.load, edge.load + edge.stiffness * (beyond - end), rtol=1e-9)
+    assert np.isnan(state[1:]).all()
+    assert np.isfinite(edge).all()
+    assert np.isfinite(curve.at([end * (1 + 1e-12)])).all()
+    for delta, deepest in ((np.nan, 0.0), (0.5 * end, np.nan), (-step, np.nan), (np.inf, 0.0)):
+        assert np.isnan(curve.at([delta], [deepest])).all()
+    assert np.isnan(curve.residual([np.nan])).all()
+    assert np.isnan(curve.displacement([np.nan])).all()
+    back = curve.at([0.5 * end, -step], [1.2 * end])
+    assert np.isfinite(back.load).all()
+    assert np.isnan([back.stiffness[0], back.error[0], curve.residual([1.2 * end])[0]]).all() == curve.yields
+    np.testing.assert_array_equal([values[1] for values in back], 0.0)
+
+
+def test_no_contact_is_wider_than_the_hole(tmp_path: Path) -> None:
+    """A quarter of a circle, in the table and in what is exported of it; a ring's may be wider, where its nodes are."""
+    joint = LawJoint(10.0, 0.05, 1e5, pin_share=0.68, plane="strain", nu=0.0, pin_nu=0.49)
+    curve = general_law(joint)
+    delta = np.linspace(0, curve.limit, 3000)
+    law = load(write(curve, tmp_path / "law.py"))
+    assert curve.at(delta).angle.max() == np.pi / 2
+    assert max(map(law.contact_angle, delta.tolist())) == np.pi / 2
+    wide = replace(curve, angle=2 * curve.angle, dangle=2 * curve.dangle)
+    assert wide.at(delta).angle.max() == pytest.approx(np.pi, rel=1e-3)
 
 
 def test_a_joint_that_does_not_yield_needs_no_way_back(tmp_path: Path) -> None:
@@ -198,15 +245,34 @@ def test_exports_that_cannot_be(tmp_path: Path) -> None:
     for name in ("law.for", "law"):
         with pytest.raises(ValueError, match=r"\.py, \.h, \.mo, \.m or \.json"):
             export_curve(curve, tmp_path / name)
-    for name in ("lug-pin.h", "2.py", "force.m", "class.py"):
-        with pytest.raises(ValueError, match="cannot name a law"):
+    names = "lug-pin.h 2.py force.m class.py math.py print.py math.h time.h string.h namespace.h restrict.h Bolzen_ä.py"
+    names += " model.mo end.mo Real.mo Modelica.mo sqrt.mo max.m function.m endif.m parfor.m plot.m the_law.m _x.h"
+    for name in [*names.split(), f"{'x' * 64}.m", "a b.h"]:
+        with pytest.raises(ValueError, match=f"^{re.escape(name)}: .* cannot name a law: .*; choose another name"):
             export_curve(curve, tmp_path / name)
+    for name in ("function.json", "model.h", "end.h", "int_.h", f"{'x' * 63}.m", "Class.py", "real.mo"):
+        assert export_curve(curve, tmp_path / name)
     with pytest.raises(ValueError, match="several"):
         export_curve(replace(curve, y=np.stack([curve.y, curve.y])), tmp_path / "law.h")
     with pytest.raises(ValueError, match="gaps in its tables cannot be exported: LOAD"):
         export_curve(replace(curve, y=np.full(61, np.nan)), tmp_path / "law.h")
     with pytest.raises(ValueError, match="does not rise"):
         export_curve(replace(curve, back=0 * curve.back), tmp_path / "law.h")
+
+
+def test_what_octave_has_cannot_name_a_law(tmp_path: Path) -> None:
+    """Its keywords; and all functions that an export calls."""
+    if not shutil.which("octave-cli"):
+        pytest.skip("octave-cli is not here")
+    keywords = "printf('%s ', iskeyword(){:});"
+    done = subprocess.run(["octave-cli", "--norc", "--eval", keywords], capture_output=True, text=True, check=True)
+    program = re.sub("%.*", "", export_curve(curves()["yielding"], tmp_path / "lug.m"))
+    called = re.findall(r"[^@\w.]([a-z_]\w*)\(", program)
+    assert {"sqrt", "min", "warning"} <= {*called}
+    variables = {"f", "df", "lug", "table", "d"}
+    for name in {*done.stdout.split(), *called} - variables:
+        with pytest.raises(ValueError, match="cannot name a law"):
+            export_curve(curves()["yielding"], tmp_path / f"{name}.m")
 
 
 def test_the_examples_of_the_documentation_run(tmp_path: Path) -> None:
@@ -228,3 +294,45 @@ def test_the_examples_of_the_documentation_run(tmp_path: Path) -> None:
         if program == "./main" or shutil.which(program):
             done = subprocess.run([program, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True)
             np.testing.assert_allclose([float(word) for word in done.stdout.split()], wanted, rtol=1e-10)
+
+
+@pytest.mark.parametrize(("thickness", "unit", "pin"), [(None, "N/mm", 1.0), (25.0, "N", 25.0)])
+def test_every_export_tells_the_unit_of_force_and_the_length(thickness, unit, pin, tmp_path: Path) -> None:
+    """In its head and as constants, alike in all languages; a force over its length is that of the unit length."""
+    sets = [] if thickness is None else ["--set", f"analysis.thickness={thickness}"]
+    files = {suffix: tmp_path / f"law.{suffix}" for suffix in ("py", "h", "mo", "m", "json")}
+    exports = [word for file in files.values() for word in ("--export", str(file))]
+    scene = str(Path(__file__).parents[3] / "scenes" / "steel_pin.toml")
+    assert run(["law", "--scene", scene, *sets, *exports]) == 0
+    law, told = load(files["py"]), json.loads(files["json"].read_text())
+    assert ("mm", unit, pin) == (law.LENGTH_UNIT, law.FORCE_UNIT, law.PIN_LENGTH)
+    assert (told["length_unit"], told["force_unit"], told["pin_length"]) == ("mm", unit, pin)
+    constants = {
+        "h": 'static const char law_{} = "{}";',
+        "mo": '  constant String {} = "{}";',
+        "m": "    T.{} = '{}';",
+    }
+    for suffix, form in constants.items():
+        text = files[suffix].read_text()
+        brackets = "[]" if suffix == "h" else ""
+        assert form.format(f"FORCE_UNIT{brackets}", unit) in text
+        assert form.format(f"LENGTH_UNIT{brackets}", "mm") in text
+        assert re.search(rf"PIN_LENGTH = {pin}", text)
+    rule = "do not multiply them by the length" if thickness else "multiply them by the pin's length"
+    for file in files.values():
+        words = " ".join(file.read_text().split())
+        assert f"force P in {unit}, " in words
+        assert rule in words
+    curve = JointCurve.from_json(files["json"].read_text())
+    scene_law = general_law(LawJoint.from_scene(load_scene(scene)))
+    assert law.force(0.05)[0] / pin == pytest.approx(float(scene_law.at(0.05).load), rel=1e-12)
+    assert float(curve.at(0.05).load) / curve.pin_length == pytest.approx(float(scene_law.at(0.05).load), rel=1e-12)
+
+
+def test_files_of_earlier_versions_are_read() -> None:
+    """They named no units."""
+    curve = curves()["yielding"]
+    data = json.loads(curve.to_json())
+    for name in ("length_unit", "force_unit", "pin_length"):
+        del data[name]
+    assert JointCurve.from_json(json.dumps(data)).pin_length == 1

@@ -4,11 +4,13 @@ import ast
 import json
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
 
 from archord.postprocess.laws.fitted_law import FittedLaw
+from archord.postprocess.laws.law import LawRangeWarning
 
 ELASTIC = FittedLaw(k=0.83, E_star=1.05e5, R=10.0, dR=0.05, k_error=0.001, fitted_range=(0.1, 2.0))
 PLASTIC = FittedLaw(
@@ -60,6 +62,23 @@ def test_stiffness_is_the_slope_and_displacement_the_inverse(law):
     np.testing.assert_allclose(law.displacement(law.force(delta).reshape(2, 3)), delta.reshape(2, 3), rtol=1e-12)
     np.testing.assert_array_equal(law.displacement([-1.0, 0.0]), 0)
     assert (law.stiffness(DELTA[:2]) == 0).all()
+
+
+def test_beyond_what_it_was_fitted_to_it_warns():
+    """The module has that displacement; nan gives nan in both."""
+    space = {}
+    exec(ELASTIC.to_python(), space)
+    assert space["RANGE"] == 2.0 * ELASTIC.dR
+    with pytest.warns(LawRangeWarning, match=r"delta = 3 dR is beyond the 2 dR that the law was fitted to"):
+        ELASTIC.force([0.01, 0.15])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert (ELASTIC.force([0.0, 0.01, 0.1]) >= 0).all()
+        assert ELASTIC.displacement(1e5) > 0
+        for law in (ELASTIC, PLASTIC):
+            exec(law.to_python(), space)
+            said = [law.force(np.nan), law.stiffness(np.nan), law.displacement(np.nan)]
+            assert np.isnan([*said, space["force"](np.nan), space["stiffness"](np.nan)]).all()
 
 
 def test_the_module_says_how_good_it_is():

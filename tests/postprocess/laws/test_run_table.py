@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,8 +11,10 @@ import pytest
 
 from archord.benchmarks.case import paper_joint
 from archord.cli import run as command
+from archord.postprocess.laws.general.general_law import general_law
+from archord.postprocess.laws.general.joint import LawJoint
 from archord.postprocess.laws.general.joint_curve import JointCurve
-from archord.postprocess.laws.run_table import run_table
+from archord.postprocess.laws.run_table import _left_out, _steps_asked, run_table
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from archord.scene.file import load_scene
@@ -104,6 +107,24 @@ def test_errors_are_measured_where_they_can_be() -> None:
     accurate = synthetic(CYCLES)
     accurate.summary["accuracy"] = {"estimated": 1e-2}
     np.testing.assert_allclose((run_table(accurate).error - cycles.error)[-1], 1e-2, rtol=1e-9)
+
+
+@pytest.mark.parametrize("strength", [None, 150.0, 230.0])
+def test_it_tells_how_many_steps_one_per_cent_asks_for(strength) -> None:
+    """With a quarter more the error of equal steps is below 1 %, and it says that they are enough."""
+    joint = LawJoint(10.0, 0.05, 115385.0, strength, strength, plane="strain", nu=0.3)
+
+    def said(n: int) -> str:
+        x = np.linspace(0, 2, n + 1)
+        y = general_law(joint).at(x * joint.clearance).load
+        return _steps_asked(x[1:], _left_out(x, y)[1:] / y[1:])
+
+    assert "of this run are enough above 10%" in said(100)
+    coarse = said(20 if strength else 6)
+    wanted = int(re.findall(r"about (\d+) of equal length", coarse)[0])
+    assert 6 < wanted < 50
+    assert "are enough" in said(int(1.25 * wanted))
+    assert re.search("about|enough", run_table(synthetic(path(END, 0.0))).about["steps for 1 %"])
 
 
 def test_an_elastic_joint_comes_back_as_it_went() -> None:
