@@ -30,9 +30,10 @@ def mesh_text(name: str, mesh: PlaneMesh) -> str:
     for name, tags in mesh.facet_sets.items():
         facets.add(name, *_facet_row(mesh, mesh.edges[np.isin(mesh.tags, tags)], cells))
     points = Table("point set", "nodes", left=1, rows=((name, len(nodes)) for name, nodes in mesh.point_sets.items()))
+    notes = [f"warning: {said}" for said in mesh.notes]
     warnings = [f"warning: {said}" for name, inside in cells.items() for said in cracks(mesh, name, inside)]
     tables = [str(table) for table in (bodies, facets, points) if table.rows]
-    return "\n\n".join([head, *tables, *filter(None, ["\n".join(warnings)])])
+    return "\n\n".join([head, *tables, *filter(None, ["\n".join(notes + warnings)])])
 
 
 def _facet_row(mesh: PlaneMesh, edges: np.ndarray, cells: Mapping[str, np.ndarray]) -> list[object]:
