@@ -24,6 +24,10 @@ APART = (
     "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; give a "
     "displacement or a force above 0 if it should"
 )
+AWAY = (
+    "the bodies touch, but not on the contact axis, where p0 is measured and from where eps is: their columns say "
+    "nothing of this step"
+)
 UNSEEN = (
     "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
     "reduce joint.element_size or increase the load"
@@ -139,6 +143,9 @@ class JointAccount:
         said, squashed = [], core_peeq(self.system)
         if self.scene.joint.arc_end < np.pi and any(p.in_contact[-1] > 0 for p in profiles.values()):
             said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
+        on_axis = any(p.in_contact[0] > 0 for p in profiles.values())
+        if self.scene.joint.is_ring and m.contact_area and not on_axis:
+            said.append(AWAY)
         touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
         if m.contact_area and touching < _FEW_FACETS:
             facets = "facet" if touching == 1 else "facets"
@@ -150,12 +157,12 @@ class JointAccount:
                 "load.core_radius would spread the force"
             )
         scene = self.scene
-        if abs(m.delta) > scene.small * scene.joint.radius and not scene.doubts:
+        if abs(m.delta) > scene.small * scene.joint.radius and not scene.doubts_of_strain:
             said.append(
                 f"delta exceeds {scene.small:.2g} R: small-strain theory makes P too low, relatively by about "
                 f'{scene.too_low:g} delta/R; analysis.strain = "large" is for that'
             )
-        if residual > 1e-8 and m.contact_area:
+        if residual > max(1e-8, scene.analysis.tolerance) and m.contact_area:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
         if m.force_balance > 1e-8:
             said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")

@@ -60,9 +60,9 @@ class Checked(Section):
         return self.analysis.thickness or 1.0
 
     @property
-    def doubts(self) -> list[str]:
+    def doubts(self: Any) -> list[str]:
         """What to warn of before anything is solved."""
-        return []
+        return self.analysis.doubts
 
     @property
     def plastic(self: Any) -> bool:
@@ -118,6 +118,23 @@ class Scene(Checked):
     @property
     def doubts(self) -> list[str]:
         """What to warn of before anything is solved."""
+        return [*super().doubts, *self.doubts_of_strain, *self._doubts_of_path]
+
+    @property
+    def _doubts_of_path(self) -> list[str]:
+        """A warning of a pin that is lifted so far that it would meet the half of the hole that is not there."""
+        lifted = -min(self.targets)
+        if self.force_controlled or lifted <= 2 * self.joint.dR:
+            return []
+        return [
+            f"load.{self.load.kind} lifts the pin by {lifted / self.joint.dR:.3g} dR: beyond 2 dR it would meet the "
+            "upper half of the hole, which is not modelled, so P stays 0 there; a joint that is loaded both ways takes "
+            "two scenes, one for each direction"
+        ]
+
+    @property
+    def doubts_of_strain(self) -> list[str]:
+        """A warning of loads for which small strain is not meant."""
         farthest, least = max(map(abs, self.targets)) / self.joint.radius, ""
         if self.force_controlled:
             stiffest = _STIFFEST_STUCK if self.analysis.friction else _STIFFEST

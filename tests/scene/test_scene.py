@@ -176,6 +176,34 @@ def test_a_displacement_beyond_small_strains_is_doubted():
     assert parse_scene(data | {"analysis": {"friction": 0.3}, "load": {"relative_force": 0.14}}).doubts == []
 
 
+def test_a_pin_lifted_to_the_half_of_the_hole_that_is_not_modelled_is_told():
+    """A load that reverses has P = 0 there, where the joint would press the other side of its hole."""
+    data = basic()
+    assert parse_scene(data | {"load": {"displacement": [2.0, -2.0]}}).doubts == []
+    (said,) = parse_scene(data | {"load": {"displacement": [2.0, -2.5]}}).doubts
+    assert said.startswith("load.displacement lifts the pin by 2.5 dR: beyond 2 dR it would meet the upper half")
+    assert parse_scene(data | {"load": {"force": [100.0, -100.0]}}).doubts == []
+
+
+@pytest.mark.parametrize(
+    ("typo", "meant"),
+    [
+        ("block.yield_stres", "block.yield_stress"),
+        ("joint.block_sise", "joint.block_size"),
+        ("units.lenght", "units.length"),
+    ],
+)
+def test_a_key_that_no_scene_has_cannot_be_dropped(tmp_path, typo, meant):
+    """The misspelled key was dropped, and the one that was meant kept its value."""
+    path = tmp_path / "scene.toml"
+    path.write_text(resolved(parse_scene(basic())))
+    said = f"--set {typo}=none: there is no key {typo} to drop; did you mean {meant}?"
+    with pytest.raises(InputError) as refusal:
+        load_scene(path, [f"{typo}=none"])
+    assert str(refusal.value) == said
+    load_scene(path, [f"{meant}=none"])
+
+
 def test_overrides_replace_values_and_alternatives(tmp_path):
     """--set wins over the file, drops the alternative key, and is named when it is at fault."""
     path = tmp_path / "scene.toml"
