@@ -135,14 +135,19 @@ class JointAccount:
             return self.scene.doubts
         longest = max(side.facet_lengths().max() for side in self.system.sides.values())
         off = (1 - np.cos(longest / g.radius / 2)) ** 2 / 8 * g.radius / abs(g.dR)
-        said = f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"
+        said = (
+            f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR; "
+            "reduce joint.element_size"
+        )
         return [*self.scene.doubts, *([said] if off > _ROUGH else [])]
 
     def step_warnings(self, m: Measures, profiles: Mapping[str, Any], residual: float) -> list[str]:
         """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
         said, squashed = [], core_peeq(self.system)
         if self.scene.joint.arc_end < np.pi and any(p.in_contact[-1] > 0 for p in profiles.values()):
-            said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
+            said.append(
+                "the contact reaches the end of the modelled quarter arc, beyond which it cannot spread; load less far"
+            )
         on_axis = any(p.in_contact[0] > 0 for p in profiles.values())
         if self.scene.joint.is_ring and m.contact_area and not on_axis:
             said.append(AWAY)

@@ -108,7 +108,7 @@ class Scene(Checked):
     def require_mesh(self) -> None:
         """Raise `InputError` if the scene leaves its mesh to `archord.studies.accuracy`."""
         if self.analysis.accuracy is not None:
-            raise InputError(f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open.")
+            raise InputError(f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; drop it here.")
 
     @property
     def force_controlled(self) -> bool:
@@ -202,11 +202,12 @@ def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
     for place, solid in solids.items():
         modulus, strength = (*place, "E"), solid.yield_stress
         require(1e-30 <= solid.E <= 1e30, modulus, "must be between 1e-30 and 1e30; choose other units")
-        require(stiffest <= solid.E / _SOFTEST, modulus, f"must be at least {_SOFTEST:g} of the largest E")
+        said = f"must be at least {_SOFTEST:g} of the largest E, {stiffest:g}: give all moduli in one unit"
+        require(stiffest <= solid.E / _SOFTEST, modulus, said)
         strong = strength is None or strength >= _WEAKEST * solid.E
-        require(strong, (*place, "yield_stress"), f"must be at least {_WEAKEST:g} times E")
+        require(strong, (*place, "yield_stress"), f"must be at least {_WEAKEST:g} times E, in the same unit")
         allowed = not isinstance(solid.hardening, float) or solid.hardening <= solid.E / _WEAKEST
-        require(allowed, (*place, "hardening"), f"must not exceed {1 / _WEAKEST:g} times E")
+        require(allowed, (*place, "hardening"), f"must not exceed {1 / _WEAKEST:g} times E, in the same unit")
 
 
 def plain(value: Any) -> Any:

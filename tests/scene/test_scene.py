@@ -37,8 +37,8 @@ def basic() -> dict:
         ("joint", "clearance", 0.05, "= 0.05 must not be given together with relative_clearance."),
         ("joint", "edge_angle", 0.0, "must be greater than 0."),
         ("joint", "element_size", 20.0, "must be between 1e-4 and 0.5 times the radius."),
-        ("joint", "block_size", 15.0, "must be at least twice the radius of the hole."),
-        ("joint", "block_size", 10.1, "must be at least twice the radius of the hole."),
+        ("joint", "block_size", 15.0, "must be at least twice the radius of the hole, 20.1."),
+        ("joint", "block_size", 10.1, "must be at least twice the radius of the hole, 20.1."),
         ("joint", "raduis", 1.0, "did you mean radius?"),
         ("block", "nu", 0.5, "scene: block.nu = 0.5 must be at most 0.499999."),
         ("block", "rigid", True, "is not a known key"),
@@ -58,7 +58,7 @@ def basic() -> dict:
         ("block", "hardening", {"rat": 1.0}, "block.hardening.rat = 1.0 is not a known key; did you mean rate?"),
         ("block", "back_stresses", [[1.0, 1.0]], "need a yield_stress."),
         ("block", "yield_stress", 0.0, "must be greater than 0."),
-        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times E."),
+        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times E, in the same unit."),
         ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
         ("pin", "rigid", True, "is not for a rigid pin."),
         ("pin", None, {"rigid": True, "material": "S355"}, 'pin.material = "S355" is not for a rigid pin.'),
@@ -155,7 +155,7 @@ def test_a_ring_may_have_a_thin_wall():
     data = basic() | {"load": {"relative_force": 0.001}}
     ring = {"model": "ring", "radius": 10.0, "clearance": 0.05}
     assert parse_scene(data | {"joint": ring | {"block_size": 10.25}}).joint.W == 10.25
-    with pytest.raises(InputError, match=r"joint\.block_size = 10\.2 must leave a wall of at least 0\.02 times R\.$"):
+    with pytest.raises(InputError, match=r"joint\.block_size = 10\.2 must leave a wall of at least 0\.02 times R, 10\.25 or more\.$"):
         parse_scene(data | {"joint": ring | {"block_size": 10.2}})
 
 
