@@ -155,7 +155,8 @@ def test_a_ring_may_have_a_thin_wall():
     data = basic() | {"load": {"relative_force": 0.001}}
     ring = {"model": "ring", "radius": 10.0, "clearance": 0.05}
     assert parse_scene(data | {"joint": ring | {"block_size": 10.25}}).joint.W == 10.25
-    with pytest.raises(InputError, match=r"joint\.block_size = 10\.2 must leave a wall of at least 0\.02 times R, 10\.25 or more\.$"):
+    said = r"joint\.block_size = 10\.2 must leave a wall of at least 0\.02 times R, 10\.25 or more\.$"
+    with pytest.raises(InputError, match=said):
         parse_scene(data | {"joint": ring | {"block_size": 10.2}})
 
 
