@@ -150,10 +150,18 @@ class GeneralAccount:
     def step_warnings(self, m: Record, profiles: Mapping[str, Any], residual: float) -> list[str]:
         """What to warn of after the step ``m``. Collective."""
         said, system = list[str](), self.system
+        tied = {name for part in self.scene.interaction if part.law == "tied" for name in part.surfaces}
         for name, profile in profiles.items():
+            if name in tied:
+                continue
             touching = int((profile.in_contact > 0).sum())
             if 0 < touching < _FEW_FACETS:
                 said.append(f"only {touching} facets of {name!r} in contact; smaller elements would resolve it")
+            if self.scene.analysis.kinematics == "reference" and profile.largest_slip > profile.width.max():
+                said.append(
+                    f"{name!r} slides by {profile.largest_slip:.3g}, more than a facet, but keeps the partners that it "
+                    'had at first; analysis.kinematics = "current" is for that'
+                )
         largest = max((v for k, v in m.values.items() if k.endswith(" peeq_max")), default=0.0)
         if largest > _LARGE_STRAIN and self.scene.analysis.strain == "small":
             said.append(
@@ -164,7 +172,7 @@ class GeneralAccount:
             said.append(
                 f"a coupling turns by {angle:.2g} rad; it turns linearly, which stretches radii by {angle**2 / 2:.1g}"
             )
-        if residual > 1e-8 and m.force_balance:
+        if residual > max(1e-8, self.scene.analysis.tolerance) and m.force_balance:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
         if m.force_balance > 1e-8:
             said.append(f"the forces on the whole do not balance: {m.force_balance:.1e} of the largest is left")
@@ -175,10 +183,11 @@ class GeneralAccount:
 
     def ending(self, steps: Sequence[Record]) -> tuple[str, list[str]]:
         """A warning where nothing ever touched; that springs alone hold a body is no end."""
+        touching = [part for part in self.scene.interaction if part.law != "tied"]
         total = max((max(abs(m.work), m.elastic_energy + dissipated(m)) for m in steps), default=0.0)
         if self.system.stabilisation_energy > _ALONE * total:
             return "nothing holds what the loads move: no contact carries them", []
-        return "", [NEVER] if self.scene.interaction and not any(m.contact_area for m in steps) else []
+        return "", [NEVER] if touching and not any(m.contact_area for m in steps) else []
 
     def energy_balance(self, steps: Sequence[Record]) -> float | None:
         """See `energy_balance`; where interferences arise first, from the end of their stage on."""

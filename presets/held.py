@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain, combinations
 
 import numpy as np
 from mpi4py import MPI
@@ -16,6 +17,7 @@ from archord.solver.problem import Problem
 from archord.solver.system import System
 
 _FAR = 0.1  # of the size of a surface: drawn farther behind another one, it does not face that
+_APART = 0.01  # of the same: a gap between tied surfaces that is told of
 _ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
 
 
@@ -34,10 +36,28 @@ def check(scene: ProblemScene, problem: Problem) -> list[str]:
     warnings = check_mesh(mesh, cells, pairs, overlap, in_mm)
     whole = gathered(mesh)
     owner = {name: problem.body_of(name).name for part in scene.interaction for name in part.surfaces}
-    failure = next(_loose(scene, whole, cells, owner), "") if whole is not None else ""
+    failure = ""
+    if whole is not None:
+        faults = chain(_shared(scene, whole), _loose(scene, whole, cells, owner))
+        failure = next(faults, "")
     if failure := mesh.mesh.comm.bcast(failure):
         raise ValueError(failure)
     return warnings
+
+
+def _shared(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+    """What is said of facets that two interactions have: what is between them would be counted twice."""
+    surfaces = [(part.name, name) for part in scene.interaction for name in part.surfaces]
+    for (first, one), (second, other) in combinations(surfaces, 2):
+        tags = {*whole.facet_sets[one]} & {*whole.facet_sets[other]}
+        common = whole.edges[np.isin(whole.tags, [*tags])]
+        if first != second and len(common):
+            x, y = whole.x[common[0, :2]].mean(axis=0)
+            yield (
+                f"the surfaces {one!r} of the interaction {first!r} and {other!r} of {second!r} have {len(common)} "
+                f"facets in common, the first at ({x:.6g}, {y:.6g}), whose contact would count twice: a facet goes to "
+                "one interaction"
+            )
 
 
 def _loose(scene: ProblemScene, whole: PlaneMesh, cells: dict[str, str], owner: dict[str, str]) -> Iterator[str]:
@@ -82,10 +102,14 @@ def require_facing(system: System) -> list[str]:
         part = interface.interaction
         for pair in interface.pairs:
             gap = (pair.separation * pair.projection.normal).sum(axis=1)[pair.projection.found]
-            found = np.array([gap.min(initial=np.inf), np.abs(gap).min(initial=np.inf)])
+            found = np.array([gap.min(initial=np.inf), np.abs(gap).min(initial=np.inf), -np.abs(gap).max(initial=0.0)])
             system.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MIN)
-            (lowest, nearest), size = found, np.ptp(pair.surface.curve.X, axis=0).max()
+            lowest, nearest, farthest = found * [1.0, 1.0, -1.0]
+            size = np.ptp(pair.surface.curve.X, axis=0).max()
             allowed, said = part.overlap + _FAR * size, f"the surface {pair.surface.name!r} of {part.name!r}"
+            if nearest <= allowed and farthest > _APART * size and not pair.law.slides:
+                drawn = f"the surfaces that {part.name!r} ties are drawn up to {farthest:.3g} apart"
+                warnings[part.name] = f"{drawn}: what is carried along them loses its moment about that gap"
             if lowest < -allowed:
                 raise ValueError(f"{said} lies up to {-lowest:g} behind the opposite one: they must face each other")
             if nearest > allowed and not pair.law.slides:

@@ -6,6 +6,7 @@ horizontal diameter; "ring" is half a whole pin in a ring, loaded by a force at 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -57,8 +58,10 @@ def joint_problem(scene: Scene, comm: MPI.Comm, partitioner=None) -> Problem:
     part = "none" if rigid else "whole" if scene.pin.whole else "half"
 
     def guess(load: float) -> Guess:
-        """The pin moved down by the load, or by about what a force would press it, the block at rest."""
-        shift = load / stiffness + (max(g.dR, 0.0) if ring else 0.0)
+        """The pin moved by the load, or by about what a force would press it, from where it touches on
+        that side, the block at rest."""
+        first_touch = math.copysign(max(g.dR, 0.0), load) if ring else 0.0
+        shift = load / stiffness + first_touch
         return Guess(shift, {"pin": (0.0, -shift)})
 
     return Problem(

@@ -24,6 +24,10 @@ APART = (
     "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; give a "
     "displacement or a force above 0 if it should"
 )
+AWAY = (
+    "the bodies touch, but not on the contact axis, where p0 is measured and from where eps is: their columns say "
+    "nothing of this step"
+)
 UNSEEN = (
     "no contact point was ever pressed, though delta was positive: the contact is smaller than the mesh can see; "
     "reduce joint.element_size or increase the load"
@@ -132,14 +136,22 @@ class JointAccount:
             return self.scene.doubts
         longest = max(side.facet_lengths().max() for side in self.system.sides.values())
         off = (1 - np.cos(longest / g.radius / 2)) ** 2 / 8 * g.radius / abs(g.dR)
-        said = f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"
+        said = (
+            f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR; "
+            "reduce joint.element_size"
+        )
         return [*self.scene.doubts, *([said] if off > _ROUGH else [])]
 
     def step_warnings(self, m: Measures, profiles: Mapping[str, Any], residual: float) -> list[str]:
         """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
         said, squashed = [], core_peeq(self.system)
         if self.scene.joint.arc_end < np.pi and any(p.in_contact[-1] > 0 for p in profiles.values()):
-            said.append("the contact reaches the end of the modelled quarter arc, beyond which it cannot spread")
+            said.append(
+                "the contact reaches the end of the modelled quarter arc, beyond which it cannot spread; load less far"
+            )
+        on_axis = any(p.in_contact[0] > 0 for p in profiles.values())
+        if self.scene.joint.is_ring and m.contact_area and not on_axis:
+            said.append(AWAY)
         touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
         if m.contact_area and touching < _FEW_FACETS:
             facets = "facet" if touching == 1 else "facets"
@@ -151,12 +163,12 @@ class JointAccount:
                 "load.core_radius would spread the force"
             )
         scene = self.scene
-        if abs(m.delta) > scene.small * scene.joint.radius and not scene.doubts:
+        if abs(m.delta) > scene.small * scene.joint.radius and not scene.doubts_of_strain:
             said.append(
                 f"delta exceeds {scene.small:.2g} R: small-strain theory makes P too low, relatively by about "
                 f'{scene.too_low:g} delta/R; analysis.strain = "large" is for that'
             )
-        if residual > 1e-8 and m.contact_area:
+        if residual > max(1e-8, scene.analysis.tolerance) and m.contact_area:
             said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
         if m.force_balance > 1e-8:
             said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")

@@ -48,6 +48,13 @@ def in_sentences(
     return "\n".join(_sentence(error, data, model, source, origin) for error in errors[:_MOST_SENTENCES])
 
 
+def keys_of(models: list[Any], section: str) -> list[str]:
+    """The keys that a ``section`` may have in scenes of any of the ``models``."""
+    fields = [model.model_fields[section] for model in models if section in model.model_fields]
+    kinds = [kind for field in fields for kind in _sections(field.annotation).values()]
+    return sorted({key for kind in kinds for key in kind.model_fields})
+
+
 def shortened(text: str, length: int = 80) -> str:
     """``text`` with its middle left out if it is long."""
     return text if len(text) <= length else f"{text[: length - 20]} ... {text[-15:]}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import re
 import tomllib
@@ -12,7 +13,7 @@ from typing import Any
 
 from archord.report.readable import require_file
 from archord.scene.errors import InputError
-from archord.scene.faults import shortened
+from archord.scene.faults import keys_of, shortened
 from archord.scene.problem import ProblemScene
 from archord.scene.scene import CHOSEN, Scene
 from archord.scene.sections import LOADS
@@ -27,6 +28,7 @@ _BROUGHT = {"material": ("E", "nu", "yield_stress", "hardening")}
 _LARGEST_FILE = 2 * 10**6  # bytes
 _DEEPEST = 20  # dotted parts of a key: tomllib's time grows with their square and more
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}")
 
 AnyScene = Scene | ProblemScene
@@ -120,13 +122,17 @@ def read_targets(data: dict[str, Any], scene: Path) -> None:
     if not isinstance(load, dict) or not isinstance(load.get("path"), str) or not load.keys().isdisjoint(LOADS):
         return
     file = scene.parent / load.pop("path")
-    name, *values = [line.strip().strip('"') for line in read_text(file).splitlines() if line.strip()] or [""]
+    name, *values = [line.strip().strip('"') for line in read_text(file).rstrip().splitlines()] or [""]
     if name not in LOADS:
-        raise InputError(f"{file}: must have one column, headed by {', '.join(LOADS[:-1])} or {LOADS[-1]}.")
-    try:
-        load[name] = [float(value) for value in values]
-    except ValueError as error:
-        raise InputError(f"{file}: must have a number in every row, like 0.5: {shortened(str(error))}.") from None
+        known = f"{', '.join(LOADS[:-1])} or {LOADS[-1]}"
+        raise InputError(f"{file}: must have one column, headed by {known}, not {shortened(name)!r}.")
+    if not values:
+        raise InputError(f"{file}: must have a number below the heading {name}.")
+    for row, value in enumerate(values, 2):
+        if not _NUMBER.fullmatch(value):
+            said = "a decimal number like 0.5 and nothing else in every row"
+            raise InputError(f"{file}: must have {said}; row {row} has {shortened(value)!r}.")
+    load[name] = [float(value) for value in values]
     load.setdefault("steps", 1)
 
 
@@ -187,18 +193,32 @@ def override_key(data: dict[str, Any], override: str) -> str:
 def put(data: dict[str, Any], section: str, name: str, value: Any, said: str) -> None:
     """Set a key of scene ``data``, or drop it if ``value`` is `ABSENT`; what it is an alternative to goes, too.
 
-    Raises `InputError`, beginning with ``said``, if there can be no such section.
+    Raises `InputError`, beginning with ``said``, if there can be no such section, or no such key to drop.
     """
     table = data.setdefault(section, {})
     if not isinstance(table, dict):
         raise InputError(f"{said}: {section} is not a section of the scene.")
     instead = next((names for names in ALTERNATIVES.get(section, []) if name in names), (name,))
+    there = name in table
     for other in (*instead, *_BROUGHT.get(name, ())):
         table.pop(other, None)
+    if value == ABSENT and not there:
+        _require_known(section, name, said)
     if (section, name, value) == ("pin", "rigid", True):
         table.clear()
     if value != ABSENT:
         table[name] = value
+
+
+def _require_known(section: str, name: str, said: str) -> None:
+    """Raise `InputError`, beginning with ``said``, unless a kind of scene has the key ``name`` in this ``section``."""
+    kinds: list[Any] = [Scene, ProblemScene, *PRESETS.values()]
+    known = keys_of(kinds, section)
+    if name in known:
+        return
+    near = difflib.get_close_matches(name, known, 1)
+    meant = "".join(f"; did you mean {section}.{found}?" for found in near) or "."
+    raise InputError(f"{said}: there is no key {section}.{name} to drop{meant}")
 
 
 def _value(text: str) -> Any:

@@ -43,15 +43,18 @@ class JointGeometry(Section):
         name = sizes[0] if self.relative_element_size is None else given(self, sizes)
         require(1e-4 <= h <= 0.5, name, "must be between 1e-4 and 0.5 times the radius")
         require(1e-4 <= self.size_ratio * h <= 0.5, "size_ratio", "must leave elements of 1e-4 to 0.5 R on the pin")
-        require(self.edge_angle is None or not self.is_ring, "edge_angle", "is only for the model block")
-        hole, said = self.radius + self.dR, "must be at least twice the radius of the hole"
+        require(self.edge_angle is None or not self.is_ring, "edge_angle", 'is for joint.model = "block" alone')
+        hole = self.radius + self.dR
         least = 2 * hole
+        said = f"must be at least twice the radius of the hole, {least:g}"
         if self.is_ring:
-            least, said = hole + _THINNEST * self.radius, f"must leave a wall of at least {_THINNEST:g} times R"
+            least = hole + _THINNEST * self.radius
+            said = f"must leave a wall of at least {_THINNEST:g} times R, {least:g} or more"
         require(least <= self.W * (1 + 1e-9), "block_size", said)
         require(self.W / self.radius <= _WIDEST, "block_size", f"must not exceed {_WIDEST:g} times the radius")
         cells = self.expected_cells
-        said = f"with growth = {self.growth:g} makes {cells:.0e} of at most {_MOST_CELLS:.0e} triangles"
+        made = f"makes {cells:.0e} of at most {_MOST_CELLS:.0e} triangles"
+        said = f"with growth = {self.growth:g} {made}; increase either of them"
         require(cells <= _MOST_CELLS, name, said)
         return self
 

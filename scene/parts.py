@@ -113,7 +113,7 @@ class Load(Loading):
     core: RigidCircle | None = key(
         "circle in which a force on cells is spread, less and less outward", other={"centre": [0.0, 0.0], "radius": 1.0}
     )
-    pressure: Targets | None = key("pressure on a facet set", "stress", other=10.0)
+    pressure: Targets | None = key("pressure on a facet set, on its undeformed area", "stress", other=10.0)
 
     @model_validator(mode="after")
     def _directed(self) -> Load:

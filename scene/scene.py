@@ -62,7 +62,7 @@ class Checked(Section):
     @property
     def doubts(self: Any) -> list[str]:
         """What to warn of before anything is solved."""
-        return self.units.doubts
+        return [*self.units.doubts, *self.analysis.doubts]
 
     @property
     def materials(self: Any) -> dict[str, dict[str, Any]]:
@@ -118,7 +118,7 @@ class Scene(Checked):
     def require_mesh(self) -> None:
         """Raise `InputError` if the scene leaves its mesh to `archord.studies.accuracy`."""
         if self.analysis.accuracy is not None:
-            raise InputError(f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open.")
+            raise InputError(f"analysis.accuracy = {self.analysis.accuracy:g}: leaves the mesh open; drop it here.")
 
     @property
     def force_controlled(self) -> bool:
@@ -128,6 +128,23 @@ class Scene(Checked):
     @property
     def doubts(self) -> list[str]:
         """What to warn of before anything is solved."""
+        return [*super().doubts, *self.doubts_of_strain, *self._doubts_of_path]
+
+    @property
+    def _doubts_of_path(self) -> list[str]:
+        """A warning of a pin that is lifted so far that it would meet the half of the hole that is not there."""
+        lifted = -min(self.targets)
+        if self.force_controlled or lifted <= 2 * self.joint.dR:
+            return []
+        return [
+            f"load.{self.load.kind} lifts the pin by {lifted / self.joint.dR:.3g} dR: beyond 2 dR it would meet the "
+            "upper half of the hole, which is not modelled, so P stays 0 there; a joint that is loaded both ways takes "
+            "two scenes, one for each direction"
+        ]
+
+    @property
+    def doubts_of_strain(self) -> list[str]:
+        """A warning of loads for which small strain is not meant."""
         farthest, least = max(map(abs, self.targets)) / self.joint.radius, ""
         if self.force_controlled:
             stiffest = _STIFFEST_STUCK if self.analysis.friction else _STIFFEST
@@ -196,11 +213,12 @@ def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
     for place, solid in solids.items():
         modulus, strength = (*place, "E"), solid.yield_stress
         require(1e-30 <= solid.E <= 1e30, modulus, "must be between 1e-30 and 1e30; choose other units")
-        require(stiffest <= solid.E / _SOFTEST, modulus, f"must be at least {_SOFTEST:g} of the largest E")
+        said = f"must be at least {_SOFTEST:g} of the largest E, {stiffest:g}: give all moduli in one unit"
+        require(stiffest <= solid.E / _SOFTEST, modulus, said)
         strong = strength is None or strength >= _WEAKEST * solid.E
-        require(strong, (*place, "yield_stress"), f"must be at least {_WEAKEST:g} times E")
+        require(strong, (*place, "yield_stress"), f"must be at least {_WEAKEST:g} times E, in the same unit")
         allowed = not isinstance(solid.hardening, float) or solid.hardening <= solid.E / _WEAKEST
-        require(allowed, (*place, "hardening"), f"must not exceed {1 / _WEAKEST:g} times E")
+        require(allowed, (*place, "hardening"), f"must not exceed {1 / _WEAKEST:g} times E, in the same unit")
 
 
 def plain(value: Any) -> Any:

@@ -20,6 +20,7 @@ LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
 Ratio = Annotated[float, Field(ge=-0.999, le=0.499999)]
 _E, _NU = "Young's modulus, unless a material brings it", "Poisson's ratio, unless a material brings it"
 MOST_STEPS = 10_000  # output steps
+_COERCIVE = 0.25  # gamma over the trace constant, from which on Nitsche's form is coercive
 Accuracy = Annotated[float, Field(ge=1e-5, le=0.1)]
 Side = Literal["both", "pin", "block"]
 Steps = Annotated[int, Field(ge=1, le=MOST_STEPS)]
@@ -252,6 +253,16 @@ class Modelling(Section):
             self.strain == "small" or self.kinematics == "current", "kinematics", 'must be "current" at large strain'
         )
         return self
+
+    @property
+    def doubts(self) -> list[str]:
+        """What to warn of before anything is solved."""
+        if self.gamma_factor >= _COERCIVE:
+            return []
+        return [
+            f"analysis.gamma_factor = {self.gamma_factor:g} is below {_COERCIVE:g}, where Nitsche's form is not "
+            "coercive: forces and pressures may be wrong by a tenth and more; the default is 0.5"
+        ]
 
 
 class PresetAnalysis(Modelling):

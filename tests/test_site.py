@@ -125,3 +125,12 @@ def test_the_site_builds_and_its_links_lead_somewhere(tmp_path):
             assert target.exists(), f"{page.name}: {link}"
             if parts.fragment and target in pages:
                 assert parts.fragment in pages[target].names, f"{page.name}: {link}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_and_programs_fit_in_the_column_of_the_site(page):
+    """What is to be typed; what was printed goes on in the next line."""
+    text = page.read_text(encoding="utf-8")
+    fenced = "\n".join(re.findall(r"```(?:python|toml|sh|c)\n(.*?)```", text, re.S)).splitlines()
+    typed = re.findall(r"^    ((?:docker/run|archord|mpirun|ARCHORD_\w+=\S+) .*)$", text, re.M)
+    assert [line for line in [*fenced, *typed] if len(line) > 92 and not line.startswith("archord: ")] == []

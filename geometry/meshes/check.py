@@ -155,7 +155,7 @@ def check_mesh(
     found, warnings = tagged.mesh.comm.bcast((found, warnings))
     if found:
         raise ValueError(found)
-    return warnings
+    return [*tagged.notes, *warnings]
 
 
 def _of_bodies(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], millimetres: bool) -> Iterator[str]:

@@ -134,7 +134,7 @@ def distribute(comm: MPI.Comm, made: PlaneMesh | None, partitioner=None, cut: Cu
     mesh.topology.create_connectivity(1, 2)
     facets = meshtags_from_entities(mesh, 1, adjacencylist(edges), tags)
     points = comm.bcast({name: made.x[nodes] for name, nodes in made.point_sets.items()} if comm.rank == 0 else None)
-    return TaggedMesh(mesh, cells, facets, made.cell_sets, made.facet_sets, points)
+    return TaggedMesh(mesh, cells, facets, made.cell_sets, made.facet_sets, points, made.notes)
 
 
 def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
@@ -162,7 +162,7 @@ def gathered(tagged: TaggedMesh) -> PlaneMesh | None:
     edges = sides_of(cells)[sides_between(cells, ends)]
     points = {name: cKDTree(x[first]).query(places)[1] for name, places in tagged.point_sets.items()}
     sets = dict(tagged.cell_sets), dict(tagged.facet_sets)
-    return PlaneMesh(x[first], cells[order], body[order], edges, tags, *sets, points)
+    return PlaneMesh(x[first], cells[order], body[order], edges, tags, *sets, points, tagged.notes)
 
 
 def sectors(x: Array, cells: np.ndarray, n_parts: int) -> np.ndarray:

@@ -23,7 +23,8 @@ _THICK = 1e-6  # difference of z over the mesh's size
 class PlaneMesh:
     """Nodes ``x`` ``(n, 2)``, ``cells`` ``(m, a)`` of the ``bodies`` ``(m,)`` and ``edges`` ``(k, b)`` of the curves
     ``tags`` ``(k,)``; the nodes of cells and edges come in basix' order. ``cell_sets`` and ``facet_sets`` name bodies
-    and tags, of which a set has several where sets overlap; ``point_sets`` are node numbers."""
+    and tags, of which a set has several where sets overlap; ``point_sets`` are node numbers,
+    ``notes`` what to warn of."""
 
     x: Array
     cells: np.ndarray
@@ -33,6 +34,7 @@ class PlaneMesh:
     cell_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
     facet_sets: dict[str, tuple[int, ...]] = field(default_factory=dict)
     point_sets: dict[str, np.ndarray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def from_gmsh(cls, gmsh) -> PlaneMesh:

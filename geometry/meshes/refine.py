@@ -13,10 +13,12 @@ from dolfinx.mesh import create_mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import TRIANGLE, cell_kind, lagrange_element
+from archord.geometry.curve import circle_through
 from archord.geometry.meshes.plane_mesh import PlaneMesh, sides_between
 from archord.geometry.meshes.tagged_mesh import tags_of
 
 _OFF_CIRCLE = 0.05  # of the radius
+_ELSEWHERE = 1e-4  # of the radius: more than the rounding of a file moves nodes onto their circle
 _SAME = 1e-9  # distance in a reference cell
 
 
@@ -32,8 +34,10 @@ def refined(mesh: PlaneMesh, times: int = 0, order: int | None = None, circles: 
     """``mesh`` with each cell cut in four so many ``times``, then of a higher ``order``; the nodes of ``circles`` are
     moved onto them along their rays. Without a circle, new nodes lie on the curved edges that are there.
 
-    Raises ValueError if a node is far from its circle.
+    A note of the mesh tells of nodes that lie on another circle than theirs. Raises ValueError if a node is far from
+    its circle.
     """
+    notes = list[str]()
     for circle in circles:
         nodes = np.unique(mesh.edges[np.isin(mesh.tags, tags_of("facet", mesh.facet_sets, circle.facets))])
         off = np.abs(np.linalg.norm(mesh.x[nodes] - circle.centre, axis=1) - circle.radius)
@@ -43,6 +47,8 @@ def refined(mesh: PlaneMesh, times: int = 0, order: int | None = None, circles: 
             said += f", whose centre or radius {circle.radius:g} must be wrong"
             small = np.ptp(mesh.x[nodes], axis=0).max() < circle.radius / 100
             raise ValueError(f"{said}; or is the mesh in metres? Then give mesh.scale = 1000" if small else said)
+        notes += _elsewhere(mesh, circle)
+    mesh = replace(mesh, notes=(*mesh.notes, *notes))
 
     def settled(mesh: PlaneMesh) -> PlaneMesh:
         return on_circles(mesh, circles).centred() if circles else mesh
@@ -55,6 +61,22 @@ def refined(mesh: PlaneMesh, times: int = 0, order: int | None = None, circles: 
     if order < own:
         raise ValueError(f"the mesh is of order {own}, which cannot be lowered to {order}")
     return settled(_raised(mesh, order))
+
+
+def _elsewhere(mesh: PlaneMesh, circle: Circle) -> list[str]:
+    """A warning if the ends of the facets of ``circle`` lie on another one: its clearance is not the drawn one."""
+    facets = np.isin(mesh.tags, mesh.facet_sets[circle.facets])
+    corners = mesh.x[np.unique(mesh.edges[facets, :2])]
+    drawn = circle_through(corners)
+    moved = np.abs(np.linalg.norm(corners - circle.centre, axis=1) - circle.radius).max()
+    if drawn is None or moved <= _ELSEWHERE * circle.radius:
+        return []
+    (x, y), radius = drawn[0].round(9) + 0.0, drawn[1]
+    return [
+        f"the facet set {circle.facets!r} is drawn on the circle of radius {radius:.6g} about ({x:.6g}, {y:.6g}), but "
+        f"its [[mesh.circle]] has radius {circle.radius:.6g} about ({circle.centre[0]:.6g}, {circle.centre[1]:.6g}) "
+        f"and moves nodes by up to {moved:.3g}, which changes the clearance by as much"
+    ]
 
 
 def on_circles(mesh: PlaneMesh, circles: Sequence[Circle]) -> PlaneMesh:

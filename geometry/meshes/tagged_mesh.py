@@ -23,7 +23,7 @@ class TaggedMesh:
     """A mesh of one kind of cells, its ``cells`` and ``facets`` with tags, and named sets; all bodies live in one mesh.
 
     A set has several tags where sets overlap: cells (facets) of the same sets share a tag. ``point_sets`` are the
-    coordinates ``(k, 2)`` of single nodes.
+    coordinates ``(k, 2)`` of single nodes. ``notes`` are what to warn of, by how the mesh was made.
     """
 
     mesh: Mesh
@@ -32,6 +32,7 @@ class TaggedMesh:
     cell_sets: Sets
     facet_sets: Sets
     point_sets: Mapping[str, Array] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def cell_tags(self, name: str) -> tuple[int, ...]:
         """Tags of the cell set ``name``. Raises ValueError, also for a set without cells."""

@@ -30,7 +30,7 @@ def mesh_text(name: str, mesh: PlaneMesh) -> str:
     for name, tags in mesh.facet_sets.items():
         facets.add(name, *_facet_row(mesh, mesh.edges[np.isin(mesh.tags, tags)], cells))
     points = Table("point set", "nodes", left=1, rows=((name, len(nodes)) for name, nodes in mesh.point_sets.items()))
-    doubts = distorted(mesh)
+    doubts = [*mesh.notes, *distorted(mesh)]
     doubts += [said for name, inside in cells.items() for said in cracks(mesh, name, inside)]
     warnings = [f"warning: {said}" for said in doubts]
     tables = [str(table) for table in (bodies, facets, points) if table.rows]

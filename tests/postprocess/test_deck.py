@@ -286,7 +286,7 @@ def test_the_command_writes_a_deck_and_nothing_over_what_is_there(tmp_path, monk
     cyclic = ["--set=block.yield_stress=300", "--set=block.back_stresses=[[1000, 10]]", "--force"]
     assert "the material of 'block' cannot be exported" in refused(["export-deck", "joint.toml", *cyclic])
     (tmp_path / "path.csv").write_text("displacement\n0.01\n")
-    with_path = [f"--set=load.{key}=none" for key in ("displacement", "relative_displacement")] + [
+    with_path = [f"--set=load.{key}=none" for key in ("displacement", "displacement_absolute")] + [
         "--set=load.path=path.csv"
     ]
     for name in ("joint.toml", "path.csv"):

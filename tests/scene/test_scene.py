@@ -39,8 +39,8 @@ def basic() -> dict:
         ("joint", "clearance", 0.05, "= 0.05 must not be given together with relative_clearance."),
         ("joint", "edge_angle", 0.0, "must be greater than 0."),
         ("joint", "element_size", 20.0, "must be between 1e-4 and 0.5 times the radius."),
-        ("joint", "block_size", 15.0, "must be at least twice the radius of the hole."),
-        ("joint", "block_size", 10.1, "must be at least twice the radius of the hole."),
+        ("joint", "block_size", 15.0, "must be at least twice the radius of the hole, 20.1."),
+        ("joint", "block_size", 10.1, "must be at least twice the radius of the hole, 20.1."),
         ("joint", "raduis", 1.0, "did you mean radius?"),
         ("block", "nu", 0.5, "scene: block.nu = 0.5 must be at most 0.499999."),
         ("block", "rigid", True, "is not a known key"),
@@ -60,7 +60,7 @@ def basic() -> dict:
         ("block", "hardening", {"rat": 1.0}, "block.hardening.rat = 1.0 is not a known key; did you mean rate?"),
         ("block", "back_stresses", [[1.0, 1.0]], "need a yield_stress."),
         ("block", "yield_stress", 0.0, "must be greater than 0."),
-        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times E."),
+        ("block", "yield_stress", 1e-30, "must be at least 1e-07 times E, in the same unit."),
         ("joint", "block_size", 1e30, "must not exceed 1e+06 times the radius."),
         ("pin", "rigid", True, "is not for a rigid pin."),
         ("pin", None, {"rigid": True, "material": "S355"}, 'pin.material = "S355" is not for a rigid pin.'),
@@ -165,7 +165,8 @@ def test_a_ring_may_have_a_thin_wall():
     data = basic() | {"load": {"relative_force": 0.001}}
     ring = {"model": "ring", "radius": 10.0, "clearance": 0.05}
     assert parse_scene(data | {"joint": ring | {"block_size": 10.25}}).joint.W == 10.25
-    with pytest.raises(InputError, match=r"joint\.block_size = 10\.2 must leave a wall of at least 0\.02 times R\.$"):
+    said = r"joint\.block_size = 10\.2 must leave a wall of at least 0\.02 times R, 10\.25 or more\.$"
+    with pytest.raises(InputError, match=said):
         parse_scene(data | {"joint": ring | {"block_size": 10.2}})
 
 
@@ -184,6 +185,34 @@ def test_a_displacement_beyond_small_strains_is_doubted():
     (said,) = parse_scene(data | {"load": {"relative_force": 0.17}}).doubts
     assert said.startswith("load.relative_force moves the pin by at least 0.11 R: small-strain theory")
     assert parse_scene(data | {"analysis": {"friction": 0.3}, "load": {"relative_force": 0.14}}).doubts == []
+
+
+def test_a_pin_lifted_to_the_half_of_the_hole_that_is_not_modelled_is_told():
+    """A load that reverses has P = 0 there, where the joint would press the other side of its hole."""
+    data = basic()
+    assert parse_scene(data | {"load": {"displacement": [2.0, -2.0]}}).doubts == []
+    (said,) = parse_scene(data | {"load": {"displacement": [2.0, -2.5]}}).doubts
+    assert said.startswith("load.displacement lifts the pin by 2.5 dR: beyond 2 dR it would meet the upper half")
+    assert parse_scene(data | {"load": {"force": [100.0, -100.0]}}).doubts == []
+
+
+@pytest.mark.parametrize(
+    ("typo", "meant"),
+    [
+        ("block.yield_stres", "block.yield_stress"),
+        ("joint.block_sise", "joint.block_size"),
+        ("units.lenght", "units.length"),
+    ],
+)
+def test_a_key_that_no_scene_has_cannot_be_dropped(tmp_path, typo, meant):
+    """The misspelled key was dropped, and the one that was meant kept its value."""
+    path = tmp_path / "scene.toml"
+    path.write_text(resolved(parse_scene(basic())))
+    said = f"--set {typo}=none: there is no key {typo} to drop; did you mean {meant}?"
+    with pytest.raises(InputError) as refusal:
+        load_scene(path, [f"{typo}=none"])
+    assert str(refusal.value) == said
+    load_scene(path, [f"{meant}=none"])
 
 
 def test_overrides_replace_values_and_alternatives(tmp_path):

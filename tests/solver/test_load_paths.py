@@ -153,21 +153,23 @@ def test_paths_from_a_csv_file(tmp_path):
     assert twice.targets == pytest.approx([0.0025, 0.005, 0.00375, 0.0025, 0.00625, 0.01])
 
 
-CYCLE, IN_A_ROW = 'path = "cycle.csv"', "cycle.csv: must have a number in every row, like 0.5: .*"
+CYCLE, IN_A_ROW = 'path = "cycle.csv"', "cycle.csv: must have a decimal number like 0.5 .* in every row; row"
 
 
 @pytest.mark.parametrize(
     ("load", "content", "said"),
     [
         (CYCLE, None, "cannot be read"),
-        (CYCLE, "", "one column, headed by displacement"),
-        (CYCLE, "delta\n1\n", "one column, headed by displacement"),
-        (CYCLE, "displacement,force\n1,2\n", "one column, headed by displacement"),
-        (CYCLE, "displacement\n1\ntwo\n", f"{IN_A_ROW}: 'two'"),
-        (CYCLE, "displacement\n1\n\n0.5,5\n", f"{IN_A_ROW}: '0.5,5'"),
-        (CYCLE, "displacement\n0,5\n", f"{IN_A_ROW}: '0,5'"),
-        (CYCLE, "displacement\n", r"load.displacement = \[\] must not be empty"),
-        (CYCLE, "displacement\n1\ninf\n", "entry 2 must be a finite number"),
+        (CYCLE, "", "one column, headed by displacement, .*, not ''"),
+        (CYCLE, "delta\n1\n", "one column, headed by displacement, .*, not 'delta'"),
+        (CYCLE, "displacement,force\n1,2\n", "one column, headed by displacement, .*, not 'displacement,force'"),
+        (CYCLE, "displacement\n1\ntwo\n", f"{IN_A_ROW} 3 has 'two'"),
+        (CYCLE, "displacement\n1\n0.5,5\n", f"{IN_A_ROW} 3 has '0.5,5'"),
+        (CYCLE, "displacement\n0,5\n", f"{IN_A_ROW} 2 has '0,5'"),
+        (CYCLE, "displacement\n1_0\n", f"{IN_A_ROW} 2 has '1_0'"),
+        (CYCLE, "displacement\n1\n\n2\n", f"{IN_A_ROW} 3 has ''"),
+        (CYCLE, "displacement\n", "cycle.csv: must have a number below the heading displacement"),
+        (CYCLE, "displacement\n1\ninf\n", f"{IN_A_ROW} 3 has 'inf'"),
         (CYCLE, "displacement\n1\n1e9\n", "must not exceed .* half the radius"),
         ("displacement = []", None, "must not be empty"),
         ('displacement = "far"', None, "must be a number"),

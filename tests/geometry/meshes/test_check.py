@@ -148,6 +148,19 @@ def test_straight_sides_of_arcs_are_told_with_their_sagitta():
     assert check_mesh(distribute(MPI.COMM_SELF, curved), bodies, **PAIR) == []
 
 
+@pytest.mark.parametrize(
+    ("radius", "x", "warned"), [(1.0, 0.0, 0), (1.00005, 0.0, 0), (1.005, 0.0, 1), (1.0, 0.003, 1)]
+)
+def test_a_circle_that_is_not_the_drawn_one_is_told(radius, x, warned):
+    """It changes the clearance: nodes were moved by up to a twentieth of the radius without a word."""
+    given = [Circle("0 top", (x, 0.0), radius), Circle("1 top", (0.0, 0.0), 1.1)]
+    made = refined(PlaneMesh.of_sets(*arcs(0.1), {}), order=2, circles=given)
+    for mesh in (made, gathered(distribute(MPI.COMM_SELF, made))):
+        assert len(mesh.notes) == warned
+        assert all("'0 top' is drawn on the circle of radius 1 about (0, 0), but" in said for said in mesh.notes)
+    assert len(check_mesh(distribute(MPI.COMM_SELF, made), {"pin": "0", "plate": "1"}, **PAIR)) == warned
+
+
 def test_the_circle_of_points():
     angle = np.linspace(0.2, 0.5, 7)
     x = np.array([30.0, -4.0]) + 2.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)

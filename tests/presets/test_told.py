@@ -1,0 +1,110 @@
+"""What a run tells of numbers that are not what they seem, and does not tell of those that are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import archord
+from archord.output.run import solve_scene
+from archord.presets.general_account import GeneralAccount
+from archord.scene.errors import InputError
+from archord.scene.file import parse_scene
+from tests.solver.parts import blocks
+
+BODIES = [{"name": name, "E": 1000.0, "nu": 0.3} for name in ("lower", "upper")]
+
+
+def ring(**load):
+    like = {"E": 1.82, "nu": 0.3}
+    joint = {"model": "ring", "radius": 1.0, "clearance": 0.001, "relative_element_size": 0.2, "growth": 1.0}
+    return parse_scene({"joint": joint, "pin": like, "block": like, "load": {"steps": 1} | load})
+
+
+def block(**analysis):
+    like = {"E": 1.82, "nu": 0.3}
+    joint = {"radius": 1.0, "clearance": 0.005, "relative_element_size": 0.1, "growth": 1.0}
+    load = {"displacement": 2.0, "steps": 1}
+    return parse_scene({"joint": joint, "pin": like, "block": like, "load": load, "analysis": analysis})
+
+
+def told(scene, folder):
+    """The warnings of a run that comes to its end."""
+    folder.mkdir()
+    outcome = solve_scene(scene, folder, MPI.COMM_SELF)
+    assert outcome.status == "done"
+    return outcome.warnings
+
+
+def test_a_ring_pressed_the_other_way_has_no_peak_on_the_axis(tmp_path):
+    """Under the opposite force it touches on the other side: p0 was -0 and eps pi, without a word."""
+    assert not any("axis" in said for said in told(ring(relative_force=0.001), tmp_path / "down"))
+    (said,) = [said for said in told(ring(relative_force=-0.001), tmp_path / "up") if "axis" in said]
+    assert said.startswith("step 1: the bodies touch, but not on the contact axis")
+
+
+def test_a_tolerance_that_was_asked_for_is_no_round_off(tmp_path):
+    said = told(block(tolerance=1e-4), tmp_path / "loose")
+    assert not any("round-off" in text for text in said)
+
+
+def test_a_gamma_that_is_not_coercive_is_told(tmp_path):
+    """P is 5 % and more off there."""
+    (said,) = [said for said in told(block(gamma_factor=0.001), tmp_path / "run") if "coercive" in said]
+    assert said.startswith("analysis.gamma_factor = 0.001 is below 0.25, where")
+
+
+def problem(interactions, gap=0.0, **changes):
+    """Two squares, the upper one drawn ``gap`` above the lower one and pulled along x."""
+    mesh = blocks(MPI.COMM_SELF, 4, 3)
+    mesh.mesh.geometry.x[np.unique(mesh.mesh.geometry.dofmap[mesh.cells_in("upper")]), 1] += gap
+    sets = mesh.facet_sets | {"again": mesh.facet_sets["lower top"], "other": mesh.facet_sets["upper bottom"]}
+    data = {
+        "bodies": BODIES,
+        "interactions": interactions,
+        "supports": [{"name": "base", "on": "base", "fixed": ["x", "y"]}],
+        "loads": [{"name": "pull", "on": "lid", "direction": "y", "displacement": 0.01}],
+        "path": {"steps": 1},
+    }
+    return archord.Problem(replace(mesh, facet_sets=sets), **(data | changes))
+
+
+def told_first(scene):
+    return GeneralAccount(scene, MPI.COMM_SELF).warnings()
+
+
+TIE = {"name": "tie", "law": "tied", "surfaces": ["lower top", "upper bottom"]}
+CONTACT = {"name": "contact", "surfaces": ["lower top", "upper bottom"]}
+
+
+def test_a_facet_belongs_to_one_interaction():
+    """Two on the same facets counted contact twice: forces rose by 2 %, without a word."""
+    twice = [CONTACT, {"name": "second", "surfaces": ["again", "other"]}]
+    said = r"'lower top' of the interaction 'contact' and 'again' of 'second' have 4 facets in common, .* \(0.125, 0\)"
+    with pytest.raises(InputError, match=said):
+        told_first(problem(twice))
+
+
+@pytest.mark.parametrize(("gap", "warned"), [(0.0, 0), (0.005, 0), (0.03, 1)])
+def test_a_tie_over_a_gap_is_told(gap, warned):
+    said = told_first(problem([TIE], gap))
+    assert len(said) == warned
+    assert all("'tie' ties are drawn up to 0.03 apart" in text for text in said)
+
+
+def test_tied_surfaces_that_are_pulled_are_no_open_contact(tmp_path):
+    """A tie in tension "never touched", and one that is bent had "few facets in contact"."""
+    bent = {"name": "push", "on": "right", "pressure": 1.0}
+    assert told(problem([TIE]), tmp_path / "pulled") == []
+    assert told(problem([TIE], loads=[bent]), tmp_path / "bent") == []
+
+
+@pytest.mark.parametrize("kinematics", ["current", "reference"])
+def test_partners_of_the_beginning_are_told_of_where_surfaces_slide_far(tmp_path, kinematics):
+    """At two facets' slip P was that of surfaces which still cover each other: four times too much."""
+    press = {"name": "press", "on": "lid", "direction": "y", "displacement": -0.01}
+    slide = {"name": "slide", "on": "lid", "direction": "x", "displacement": [0.0, 0.4]}
+    scene = problem([CONTACT], loads=[press, slide], analysis={"kinematics": kinematics})
+    said = [text for text in told(scene, tmp_path / "run") if "partners" in text]
+    assert len(said) == 2 * (kinematics == "reference")
