@@ -145,7 +145,7 @@ class KinematicMaterial(J2Material):
         d_peeq, (_, fall, _, theta, eta, rate) = bracketed_newton(off, start, start, high, STEEP * mu)
         return d_peeq, fall, theta, eta, rate
 
-    def centre(self, state: PlasticState) -> Array:
+    def centre(self, state: State) -> Array:
         """The sum of the back stresses ``(n, 4)``."""
         return state.back_stress.sum(axis=1)
 
