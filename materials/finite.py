@@ -3,9 +3,9 @@
 The logarithmic strain is ``E = 1/2 ln C`` with ``C = F^T F``. The inner material makes of it the stress ``T`` that does
 work on it, along the principal axes Kirchhoff's: Hencky's elasticity, and plastic strains that add up as logarithms,
 which is multiplicative plasticity where the axes do not turn. The second Piola-Kirchhoff stress ``S = T : 2 dE/dC`` and
-its derivative follow by those of the logarithm, and the nominal stress is ``P = F S``. J2 materials with isotropic
-hardening yield by Cauchy's von Mises stress: their yield stress times ``J``, which elasticity alone changes, is
-Kirchhoff's; with back stresses it is Kirchhoff's itself (the difference is (1 - 2 nu) sigma/E).
+its derivative follow by those of the logarithm, and the nominal stress is ``P = F S``. J2 materials yield by Cauchy's
+von Mises stress: their yield stress times ``J``, which elasticity alone changes, is Kirchhoff's. Back stresses are
+Kirchhoff's.
 
 Gradients ``(n, 4)`` of the displacement and nominal stresses are ``[xx, yy, xy, yx]``, P_xy a force along x on a face
 that was normal to y. In plane stress forces are per undeformed thickness, and the thickness follows.
@@ -88,7 +88,7 @@ class LargeStrain(Material):
     def _logarithmic(self, strain: Array, state: State) -> tuple[Array, Array, State]:
         """The inner material at logarithmic strains ``(n, 3)``."""
         m = self.inner
-        if type(m) is not J2Material:
+        if not isinstance(m, J2Material):
             return m.update(strain, state)
         if m.plane == "strain":
             volume = strain[:, 0] + strain[:, 1]
@@ -98,8 +98,9 @@ class LargeStrain(Material):
         stress, moduli, new = replace(m, hardening=hardening).update(strain, state)
         if m.plane == "strain" and new is not state:  # a yield stress that grows makes the deviator grow with it
             deviator = stress - stress[:, :3].mean(axis=1)[:, None] * [1.0, 1.0, 1.0, 0.0]
+            deviator, slope = deviator - m.centre(new), hardening.slope(new.peeq) + m.stiffening(state, new)
             _, mu = m.lame
-            grown = (new.peeq > state.peeq) / (1 + hardening.slope(new.peeq) / (3 * mu))
+            grown = (new.peeq > state.peeq) / (1 + slope / (3 * mu))
             moduli = moduli + (grown[:, None] * deviator)[:, [0, 1, 3], None] * np.array([1.0, 1.0, 0.0])
         return stress, moduli, new
 

@@ -35,6 +35,14 @@ class J2Material(Elastic):
             return radial_return(strain, state, self, *linear)
         return return_map(strain, state, self, self.hardening)
 
+    def centre(self, state: PlasticState) -> Array | float:
+        """The middle of the elastic range, a deviator ``(n, 4)``."""
+        return 0.0
+
+    def stiffening(self, old: PlasticState, new: PlasticState) -> Array | float:
+        """By how much the middle moves per PEEQ at the end of a step, as a stress ``(n,)`` in tension."""
+        return 0.0
+
     def dissipation(self, state: PlasticState) -> Array:
         """Plastic work density ``(n,)``."""
         return self.hardening.work(state.peeq)

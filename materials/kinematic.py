@@ -15,9 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from archord.materials.hardening import Hardening
 from archord.materials.j2 import J2Material
 from archord.materials.material import Array, State
-from archord.materials.return_map import PlasticState, bracketed_newton
+from archord.materials.return_map import STEEP, PlasticState, beyond, bracketed_newton
 
 _TWICE = np.array([1.0, 1.0, 1.0, 2.0])  # products of tensors; engineering over tensor shear
 _TRACE = np.array([1.0, 1.0, 1.0, 0.0])
@@ -94,10 +95,11 @@ class KinematicMaterial(J2Material):
         stress = trial + (bulk * strain @ _TRACE)[:, None] * _TRACE
         tangent = np.tile(bulk * np.outer(_TRACE, _TRACE) + 2 * mu * _DEVIATOR, (len(strain), 1, 1))
         from_centre = trial - old.back_stress.sum(axis=1)
-        p = np.flatnonzero(np.sqrt(1.5) * _norm(from_centre) > self.hardening.stress(old.peeq))
+        p = beyond(np.sqrt(1.5) * _norm(from_centre), self.hardening, old.peeq)
         if not len(p):
             return stress, tangent, old
-        d_peeq, fall, theta, eta, rate = self._increment(trial[p], old.back_stress[p], old.peeq[p])
+        hardening = self.hardening.at(p)
+        d_peeq, fall, theta, eta, rate = self._increment(trial[p], old.back_stress[p], old.peeq[p], hardening)
         length = _norm(eta)
         n = eta / length[:, None]
         flow = np.sqrt(1.5) * d_peeq[:, None] * n
@@ -108,7 +110,7 @@ class KinematicMaterial(J2Material):
         # stress . d eps_p = yield stress d_peeq + sum of d(a . a) 3 / (4 C) + gamma a . a 3 / (2 C) d_peeq
         now, between, then = (_dot(a, b) / C for a, b in ((back, back), (back, before), (before, before)))
         kept, lost = 0.75 * (now - then).sum(axis=1), 0.75 * d_peeq * ((now + between) @ gamma)
-        isotropic = self.hardening.work(after) - self.hardening.work(old.peeq[p])
+        isotropic = hardening.work(after) - hardening.work(old.peeq[p])
         new = KinematicState(*(a.copy() for a in (old.plastic_strain, old.peeq, old.back_stress, old.work)))
         new.plastic_strain[p] += flow
         new.peeq[p], new.back_stress[p] = after, back
@@ -121,7 +123,9 @@ class KinematicMaterial(J2Material):
         tangent[p] -= (np.sqrt(6) * mu / fall)[:, None, None] * drift[:, :, None] * n[:, None, :]
         return stress, tangent, new
 
-    def _increment(self, trial: Array, back: Array, peeq: Array) -> tuple[Array, Array, Array, Array, Array]:
+    def _increment(
+        self, trial: Array, back: Array, peeq: Array, hardening: Hardening
+    ) -> tuple[Array, Array, Array, Array, Array]:
         """The increment of PEEQ at which ``sqrt(1.5) |eta| = (3 mu + sum of theta C) d_peeq + yield stress``, with
         ``theta = 1 / (1 + gamma d_peeq)`` and ``eta = trial - sum of theta a``; how fast the difference falls, with
         ``theta``, ``eta`` and its derivative."""
@@ -134,12 +138,21 @@ class KinematicMaterial(J2Material):
             eta = trial - np.einsum("nk,nki->ni", theta, back)
             rate = np.einsum("nk,nki->ni", gamma * theta**2, back)
             length, after = _norm(eta), peeq + d_peeq
-            value = (3 * mu + theta @ C) * d_peeq + self.hardening.stress(after) - np.sqrt(1.5) * length
-            fall = 3 * mu + theta**2 @ C + self.hardening.slope(after) - np.sqrt(1.5) * _dot(rate, eta) / length
+            value = (3 * mu + theta @ C) * d_peeq + hardening.stress(after) - np.sqrt(1.5) * length
+            fall = 3 * mu + theta**2 @ C + hardening.slope(after) - np.sqrt(1.5) * _dot(rate, eta) / length
             return value, fall, close, theta, eta, rate
 
-        d_peeq, (_, fall, _, theta, eta, rate) = bracketed_newton(off, start, start, high)
+        d_peeq, (_, fall, _, theta, eta, rate) = bracketed_newton(off, start, start, high, STEEP * mu)
         return d_peeq, fall, theta, eta, rate
+
+    def centre(self, state: State) -> Array:
+        """The sum of the back stresses ``(n, 4)``."""
+        return state.back_stress.sum(axis=1)
+
+    def stiffening(self, old: PlasticState, new: PlasticState) -> Array:
+        """By how much their sum moves per PEEQ, but for the recovery of what was there before."""
+        C, gamma = self._moduli
+        return (1 / (1 + gamma * (new.peeq - old.peeq)[:, None]) ** 2) @ C
 
     def dissipation(self, state: State) -> Array:
         """Plastic work density ``(n,)``, with what the back stresses store."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from archord.kernels.compiled import library, pointer
 from archord.materials.elasticity import Elastic
@@ -24,6 +25,9 @@ from archord.materials.hardening import Hardening
 from archord.materials.material import Array
 
 _ITERATIONS = 60
+STEEP = 1e3  # slope over what elasticity makes of it, from which it says nothing of where the zero is
+_NARROW = 1e-3  # width of an interval with a zero over how short Newton's last step is
+_STEEPEST = 1e12  # slope of a hardening law over E, from which its tangent is elastic
 # components of (n, 4) stresses and of strains that a plane has; eigenvectors and eigenvalues of P
 _PLANES = {
     "stress": (
@@ -61,7 +65,7 @@ def return_map(strain: Array, old: PlasticState, m: Elastic, hardening: Hardenin
     stress, tangent = np.zeros((len(strain), 4)), np.tile(m.elastic_tangent, (len(strain), 1, 1))
     stress[:, parts] = elastic[:, parts] @ C
     a = stress[:, parts] @ Q.T
-    p = np.flatnonzero(np.sqrt(1.5 * a**2 @ deviator) > hardening.stress(old.peeq))
+    p = beyond(np.sqrt(1.5 * a**2 @ deviator), hardening, old.peeq)
     if not len(p):
         return stress, tangent, old
     hardening = hardening.at(p)
@@ -78,13 +82,24 @@ def return_map(strain: Array, old: PlasticState, m: Elastic, hardening: Hardenin
 
     softened = np.einsum("ki,nk,kj->nij", Q, moduli / shrink, Q)  # (C^-1 + zeta P)^-1
     direction = np.einsum("nij,nj->ni", softened, flow)
-    slope = hardening.slope(peeq[p])
+    slope = np.minimum(hardening.slope(peeq[p]), _STEEPEST * m.E)
     left = 1 - 2 / 3 * slope * zeta
     factor = left / (left * np.einsum("ni,ni->n", flow, direction) + 4 / 9 * slope * q**2)
     consistent = softened - factor[:, None, None] * direction[:, :, None] * direction[:, None, :]
     in_plane = np.array([0, 1, len(parts) - 1])
     tangent[p] = consistent[:, in_plane[:, None], in_plane]
     return stress, tangent, PlasticState(plastic_strain, peeq)
+
+
+def beyond(stress: Array, hardening: Hardening, peeq: Array) -> npt.NDArray[np.integer]:
+    """Numbers of the points whose von Mises ``stress`` ``(n,)`` exceeds the yield stress. Raises ValueError where the
+    law gives none."""
+    strength = hardening.stress(peeq)
+    lost = np.isnan(strength) & np.isfinite(stress)
+    if lost.any():
+        at = np.broadcast_to(peeq, lost.shape)[lost][0]
+        raise ValueError(f"the hardening law gives a yield stress that is not a number, at PEEQ = {at:g}")
+    return np.flatnonzero(stress > strength)
 
 
 def plastic_multiplier(
@@ -103,24 +118,30 @@ def plastic_multiplier(
         rise = hardening.slope(now) * 2 / 3 * (q - zeta * fall)
         return 1 / q - 1 / strength, fall / q**2 + rise / strength**2, 1e-10 * (zeta + 1 / compliance.max())
 
-    zeta, (value, slope, _) = bracketed_newton(off, np.zeros(len(a)), np.zeros(len(a)), np.full(len(a), np.inf))
-    zeta = zeta - value / slope  # so short a step of Newton's leaves nothing but round-off
+    start, q = np.zeros(len(a)), np.sqrt(a**2 @ weights)
+    steep = STEEP * compliance.max() / q
+    zeta, (value, slope, close) = bracketed_newton(off, start, start, np.full(len(a), np.inf), steep)
+    last = np.clip(value / slope, -close, close)  # so short a step of Newton's leaves nothing but round-off
+    zeta = np.maximum(zeta - last, 0.0)
     return zeta, np.sqrt((a / (1 + zeta[:, None] * compliance)) ** 2 @ weights)
 
 
-def bracketed_newton(f: Callable[[Array], tuple], x: Array, low: Array, high: Array) -> tuple[Array, tuple]:
+def bracketed_newton(
+    f: Callable[[Array], tuple], x: Array, low: Array, high: Array, steep: Array | float = np.inf
+) -> tuple[Array, tuple]:
     """Zeros ``(n,)`` of functions that increase, from ``x``, and what ``f`` gives there; not a number where it does not
     converge. ``f(x)`` begins with values, slopes, and how short Newton's step from a zero is. Steps that leave what is
-    known to bracket a zero, as they can where a hardening law is not concave, are halved intervals instead."""
+    known to bracket a zero, as they can where a hardening law is not concave, are halved intervals instead. So are
+    steps by slopes that are not below ``steep``, as of a law that begins vertically: they are short far from a zero."""
     for _ in range(_ITERATIONS):
         found = off, slope, close, *_ = f(x)
         low, high = np.where(off < 0, x, low), np.where(off > 0, x, high)
-        step = off / slope
-        moving = ~(np.abs(step) <= close)
+        step, trusted = off / slope, slope < steep
+        moving = ~np.where(trusted, np.abs(step) <= close, high - low <= _NARROW * close)
         if not moving.any():
             return x, found
         x = np.where(moving, x - step, x)
-        astray = moving & ~((x > low) & (x < high))
+        astray = moving & ~((x > low) & (x < high) & trusted)
         x = np.where(astray, np.where(high == np.inf, 2 * low + close, (low + high) / 2), x)
     x = np.where(moving, np.nan, x)
     return x, f(x)

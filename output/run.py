@@ -92,12 +92,18 @@ def solve_scene(
                 position, work = output.begin()
                 # what a coarse mesh went through before a halt is not kept
                 coarse = coarse_start(system) if position is None else None
+
+                def target_done(step: Step, position: Position) -> None:
+                    on_step(output.add(step, position, work))
+                    if refused := account.refusal(output.steps):
+                        raise StepFailure(refused, step)
+
                 march(
                     system.load_path(position, coarse),
                     scene.targets,
                     rules=StepRules(**scene.stepping.model_dump()),
                     substep_done=lambda load: work.add(*account.driven()),
-                    target_done=lambda step, position: on_step(output.add(step, position, work)),
+                    target_done=target_done,
                     attempted=on_attempt,
                 )
         except StepFailure as failure:
@@ -107,9 +113,10 @@ def solve_scene(
         except Interrupted as interrupted:
             status, message = "interrupted", f"{interrupted} after step {len(output.steps)}"
             received = interrupted.number
-        told: list[str] = []
+        told = account.work_doubts(output.steps)
         if status == "done":
-            message, told = account.ending(output.steps)
+            message, ending = account.ending(output.steps)
+            told += ending
             status = "stopped" if message else status
         try:
             warnings = output.finish(told, status=status, message=message, **failed)
@@ -183,7 +190,7 @@ class _Output:
         account, after = self.account, len(self.steps)
         scene = account.scene
         with self.system.timer("output"):
-            warnings = account.step_warnings(m, profiles, step.residual)
+            warnings = account.step_warnings(m, profiles, step.residual, self.steps)
             if scene.output.fields:
                 fields = self._of_fields.collect_fields(self._order, self._at_points)
 

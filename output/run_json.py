@@ -19,6 +19,8 @@ from archord.kernels.compat import versions
 from archord.output.disk import replace_file
 from archord.presets.account import Account
 from archord.presets.joint_account import APART
+from archord.presets.measures import WORK_OFF
+from archord.report.doubts import Told, kind, tell
 from archord.report.timer import BEFORE_SOLVING
 from archord.report.version import VERSION
 from archord.solver.stepping import Step
@@ -39,7 +41,13 @@ class Report:
         now, n, comm = datetime.now(UTC).isoformat(timespec="seconds"), len(steps), self.system.comm
         restart = {"when": now, "after_step": n + 1, "ranks": comm.size, "command": sys.argv}
         restarts = [*before.get("restarts", []), *([restart] if before else [])]
+        known = before.get("told", [])
+        told = [Told(**one) for one in known]
         warnings = before.get("warnings", account.warnings())
+        warnings = [said for said in warnings if said not in map(str, told)]
+        # the step after those done is noted once more
+        self._told = {kind(one.said): one for one in told if one.first <= n}
+        self._others = [w for w in warnings if not w.startswith((f"step {n + 1}:", APART, WORK_OFF))]
         self.content: dict[str, Any] = {
             "status": "running",
             "message": "",
@@ -59,15 +67,14 @@ class Report:
                 "gamma_factor": account.scene.analysis.gamma_factor,
             },
             "restarts": restarts,
-            # the step after those done is noted once more
-            "warnings": [w for w in warnings if not w.startswith(f"step {n + 1}:") and w != APART],
+            "warnings": self._others,
             "steps": before.get("steps", [])[:n],
         }
 
     def add(self, step: Step, warnings: Sequence[str]) -> None:
         """Note how the last of the steps was reached, and what to warn of at it. Raises `OSError`."""
         m = self.steps[-1]
-        self.content["warnings"] += [f"step {m.step}: {text}" for text in warnings]
+        tell(self._told, m.step, warnings)
         cost = {
             "substeps": step.substeps,
             "coarse_iterations": step.coarse_iterations,
@@ -81,13 +88,15 @@ class Report:
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
         """Note how the run ended, and what else to warn of; returns all warnings. Raises `OSError`."""
         self.content |= _finite(ending)
-        self.content["warnings"] += warnings
+        self._others += warnings
         self.write()
         return self.content["warnings"]
 
     def write(self) -> None:
         """Replace run.json in one move, with a line for each of its keys. Raises `OSError`."""
+        self.content["warnings"] = [*self._others, *map(str, self._told.values())]
         content = self.content | {
+            "told": [asdict(one) for one in self._told.values()],
             "linear_solver": self.system.equilibrium.choice.words(),  # a matrix may decide otherwise later
             "totals": self._totals(),
             "seconds": self._seconds(),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -13,6 +12,7 @@ from archord.postprocess.comparison import COMMON, COMPARED, Comparison, differi
 from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
+from archord.report.doubts import kind
 from archord.report.table import Table
 from archord.scene.faults import shortened
 
@@ -82,7 +82,7 @@ def first_of_each_kind(warnings: list[str]) -> list[str]:
     """Each kind of warning once, at the first step that gave it; kinds differ in more than their numbers."""
     first: dict[str, str] = {}
     for warning in warnings:
-        first.setdefault(re.sub(r"[0-9.e+-]+", "#", re.sub(r"^step \d+: ", "", warning)), warning)
+        first.setdefault(kind(warning), warning)
     return list(first.values())
 
 

@@ -14,8 +14,21 @@ from mpi4py import MPI
 from archord.materials.material import Array
 from archord.presets.edge import SurfaceProfile, per_step, surface_profiles
 from archord.presets.joint_account import sizes
-from archord.presets.measures import ENERGIES, Record, costs, dissipated, energy_balance, headed
+from archord.presets.measures import (
+    ENERGIES,
+    LARGE,
+    LARGE_STRAIN,
+    Record,
+    contrast_doubts,
+    costs,
+    dissipated,
+    distortion_doubts,
+    energy_balance,
+    headed,
+    work_doubts,
+)
 from archord.presets.problem import as_input_error, general_problem, require_mirrored
+from archord.report.doubts import Doubt
 from archord.report.timer import Timer
 from archord.scene.problem import LIVE, ProblemScene
 from archord.solver.stepping import Step
@@ -23,9 +36,11 @@ from archord.solver.system import System
 
 _FEW_FACETS = 3
 _FAR_TURN = 0.02  # angle at which linear rotations stretch radii by 0.02 %
-_LARGE_STRAIN = 0.05  # PEEQ
 _SPURIOUS = 1e-4  # of the work or the energy, in the springs that hold floating bodies
-_ALONE = 0.1  # of the same, where the springs alone hold a body
+_CARRYING = 0.01  # of the same, where the springs carry what contact should
+_ALONE = 0.1  # of the same at the end, where no force pushes the bodies that springs hold
+_LOST = "nothing holds what the loads move"
+_CHECK = "let more of the loads press it against others, or look whether its E has the unit of the others"
 NEVER = "no surfaces ever touched: no load presses any of them together"
 
 
@@ -128,7 +143,7 @@ class GeneralAccount:
             at=system.equilibrium.load,
             values=dict(zip(self._units(), map(float, values), strict=True)),
             contact_area=area,
-            force_balance=system.force_balance(),
+            force_balance=system.force_balance(self._largest_force(before)),
             **costs(before, step, system, work, seconds),
         )
 
@@ -145,10 +160,12 @@ class GeneralAccount:
 
     def warnings(self) -> list[str]:
         """What to warn of before the first step."""
-        return self._warnings
+        return [*self._warnings, *contrast_doubts(self.system.problem.bodies)]
 
-    def step_warnings(self, m: Record, profiles: Mapping[str, Any], residual: float) -> list[str]:
-        """What to warn of after the step ``m``. Collective."""
+    def step_warnings(
+        self, m: Record, profiles: Mapping[str, Any], residual: float, before: Sequence[Record] = ()
+    ) -> list[str]:
+        """What to warn of after the step ``m``, which follows the steps ``before``. Collective."""
         said, system = list[str](), self.system
         tied = {name for part in self.scene.interaction if part.law == "tied" for name in part.surfaces}
         for name, profile in profiles.items():
@@ -156,40 +173,74 @@ class GeneralAccount:
                 continue
             touching = int((profile.in_contact > 0).sum())
             if 0 < touching < _FEW_FACETS:
-                said.append(f"only {touching} facets of {name!r} in contact; smaller elements would resolve it")
-            if self.scene.analysis.kinematics == "reference" and profile.largest_slip > profile.width.max():
-                said.append(
+                facets = "facet" if touching == 1 else "facets"
+                text = f"only {touching} {facets} of {name!r} in contact; smaller elements would resolve it"
+                said.append(Doubt(text, -touching))
+            far_slip = profile.largest_slip > profile.width.max()
+            if self.scene.analysis.kinematics == "reference" and far_slip:
+                text = (
                     f"{name!r} slides by {profile.largest_slip:.3g}, more than a facet, but keeps the partners that it "
                     'had at first; analysis.kinematics = "current" is for that'
                 )
+                said.append(Doubt(text, profile.largest_slip))
         largest = max((v for k, v in m.values.items() if k.endswith(" peeq_max")), default=0.0)
-        if largest > _LARGE_STRAIN and self.scene.analysis.strain == "small":
-            said.append(
-                f'PEEQ reaches {largest:.2g}, too much for small-strain theory; analysis.strain = "large" is for that'
-            )
+        small = self.scene.analysis.strain == "small"
+        if largest > LARGE_STRAIN and small:
+            said.append(Doubt(f"PEEQ reaches {largest:.2g}, too much for small-strain theory; {LARGE}", largest))
+        said += distortion_doubts(system, largest, small=small)
         angle = np.abs(system.driven()[0][self._turning]).max(initial=0.0)
         if angle > _FAR_TURN:
-            said.append(
-                f"a coupling turns by {angle:.2g} rad; it turns linearly, which stretches radii by {angle**2 / 2:.1g}"
-            )
+            far = f"a coupling turns by {angle:.2g} rad; it turns linearly, which stretches radii by {angle**2 / 2:.1g}"
+            said.append(Doubt(far, angle))
         if residual > max(1e-8, self.scene.analysis.tolerance) and m.force_balance:
-            said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
+            said.append(Doubt(f"round-off limits the residual to {residual:.1e} of the reaction", residual))
         if m.force_balance > 1e-8:
-            said.append(f"the forces on the whole do not balance: {m.force_balance:.1e} of the largest is left")
-        total = max(abs(m.work), m.elastic_energy + dissipated(m))
-        if (spurious := system.stabilisation_energy) > _SPURIOUS * total:
-            said.append(f"springs that hold floating bodies do {spurious:.1e} of the work {total:.1e}")
+            left = f"the forces on the whole do not balance: {m.force_balance:.1e} of the largest is left"
+            said.append(Doubt(left, m.force_balance))
+        total, by_springs = _largest_work([*before, m])[1], system.stabilisation_energy
+        if by_springs > _SPURIOUS * total:
+            text = f"springs that hold floating bodies do {by_springs:.1e} of the work {total:.1e}"
+            said.append(Doubt(text, by_springs / total if total else 0.0))
         return said
+
+    def refusal(self, steps: Sequence[Record]) -> str:
+        """Why the run must not go on after the last of the ``steps``: springs carry what something else should. Where
+        no force is prescribed, they may carry alone: bodies may be pushed until they touch. Collective."""
+        system = self.system
+        by_springs = system.stabilisation_energy
+        stored, total = _largest_work(steps)
+        pushed = system.equilibrium.drives.pushes(system.equilibrium.load)
+        if by_springs <= _CARRYING * total or (by_springs > stored and not pushed):
+            return ""
+        name = system.hardest_held
+        share = f"weak springs that keep it from floating do {100 * by_springs / total:.2g} % of the work"
+        return f"{_LOST}: no contact carries {name!r}, {share}, more than 1 %; hold it by a support, {_CHECK}"
 
     def ending(self, steps: Sequence[Record]) -> tuple[str, list[str]]:
         """A warning where nothing ever touched; that springs alone hold a body is no end."""
         touching = [part for part in self.scene.interaction if part.law != "tied"]
-        total = max((max(abs(m.work), m.elastic_energy + dissipated(m)) for m in steps), default=0.0)
-        if self.system.stabilisation_energy > _ALONE * total:
-            return "nothing holds what the loads move: no contact carries them", []
+        if self.system.stabilisation_energy > _ALONE * _largest_work(steps)[1]:
+            return f"{_LOST}: no contact carries {self.system.hardest_held!r}; hold it by a support, {_CHECK}", []
         return "", [NEVER] if touching and not any(m.contact_area for m in steps) else []
 
     def energy_balance(self, steps: Sequence[Record]) -> float | None:
         """See `energy_balance`; where interferences arise first, from the end of their stage on."""
         fit = self.scene.path.fit_steps if self.scene.fits else 0
         return energy_balance(steps, fit, contact=bool(self.scene.interaction))
+
+    def work_doubts(self, steps: Sequence[Record]) -> list[str]:
+        """See `work_doubts`, with the same steps."""
+        fit = self.scene.path.fit_steps if self.scene.fits else 0
+        return work_doubts(steps, fit, contact=bool(self.scene.interaction))
+
+    def _largest_force(self, steps: Sequence[Record]) -> float:
+        """The largest force of a support or an interaction in these ``steps``."""
+        pairs = [(f"{name} x", f"{name} y") for name in self._supports]
+        pairs += [(f"{part.name} force x", f"{part.name} force y") for part in self.scene.interaction]
+        return max((float(np.hypot(m[x], m[y])) for m in steps for x, y in pairs), default=0.0)
+
+
+def _largest_work(steps: Sequence[Record]) -> tuple[float, float]:
+    """The largest energy stored and dissipated in one of the ``steps``, and the largest of it and the work."""
+    stored = max((m.elastic_energy + dissipated(m) for m in steps), default=0.0)
+    return stored, max([stored, *(abs(m.work) for m in steps)])

@@ -10,10 +10,12 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import basix
 import numpy as np
 import ufl
 from mpi4py import MPI
 
+from archord.geometry.basis import cell_basis
 from archord.geometry.curve import RigidCircle
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
 from archord.geometry.shapes.joint_mesh import refinements
@@ -22,12 +24,14 @@ from archord.presets.arc import SYMMETRY
 from archord.report.timer import Timer
 from archord.scene.geometry import JointGeometry
 from archord.scene.scene import Scene
+from archord.solver.drives import LOAD_DEGREE
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Problem, Rigid, Support
 from archord.solver.system import System
 
 _RATIO = 3.0  # element size over that of the next finer mesh
 _COARSEST = 0.2  # element size over R
 _STEEPEST = 1.0  # growth of the element size
+_FEWEST = 6  # integration points in a core: half the points of a triangle
 _COARSE_TOLERANCE = 1e-6  # residual over reaction: what is found is a guess
 
 
@@ -101,6 +105,22 @@ def core_density(centre: Sequence[float], radius: float) -> Callable[[Any], Any]
     """Density of a force, as `Load` takes it: a paraboloid within a circle."""
     middle = ufl.as_vector(list(centre))
     return lambda x: ufl.max_value(1 - ufl.dot(x - middle, x - middle) / radius**2, 0)
+
+
+def require_core(mesh: TaggedMesh, cells: str, centre: Sequence[float], radius: float, key: str) -> None:
+    """Raise ValueError, which names the ``key`` of the radius, where the circle has so few integration points of these
+    ``cells`` that the force on it is not what `core_density` says. Collective."""
+    owned = mesh.mesh.topology.index_map(2).size_local
+    inside = np.unique(mesh.cells_in(cells))
+    X, _ = basix.make_quadrature(mesh.mesh.basix_cell(), LOAD_DEGREE)
+    place = cell_basis(mesh.mesh, 1, inside[inside < owned], X).point
+    apart = np.linalg.norm(place - np.asarray(centre), axis=2)
+    found = mesh.mesh.comm.allreduce(int((apart < radius).sum()))
+    if found < _FEWEST:
+        raise ValueError(
+            f"{key} = {radius:g} about {tuple(centre)} has {found} integration points of the cells {cells!r}, and "
+            f"must have {_FEWEST}: choose a larger radius, smaller elements there, or a centre within these cells"
+        )
 
 
 def _coarser(scene: Scene) -> Scene:

@@ -14,12 +14,24 @@ from archord.materials.material import Array
 from archord.presets.arc import SYMMETRY, ArcProfile, arc_profiles, peak_pressure, semi_angle
 from archord.presets.edge import per_step
 from archord.presets.joint import Joint
-from archord.presets.measures import ENERGIES, Measures, costs, energy_balance, headed
+from archord.presets.measures import (
+    ENERGIES,
+    LARGE,
+    Measures,
+    contrast_doubts,
+    costs,
+    distortion_doubts,
+    energy_balance,
+    headed,
+    work_doubts,
+)
+from archord.report.doubts import Doubt
 from archord.solver.stepping import Step
 from archord.solver.system import System
 
 _FEW_FACETS = 5
 _ROUGH = 0.01  # of the clearance
+_NOTHING = 1e-9  # of the forces on nodes: a P that is round-off
 APART = (
     "the bodies never touched: P is 0 in every step, as the load never presses the pin into the hole; give a "
     "displacement or a force above 0 if it should"
@@ -93,6 +105,9 @@ class JointAccount:
         area = SYMMETRY * float(np.mean([(p.in_contact * p.width).sum() for p in arcs]))
         at_rest = 0.0 if area else self.scene.E_star * self.scene.thickness * abs(delta)
         scale = max(abs(P), *(abs(m.P) for m in before), at_rest)
+        nodal = joint.problem.symmetry * max(joint.equilibrium.reaction_norm, joint.equilibrium.largest_reaction)
+        if scale <= _NOTHING * nodal:  # all that acts is a press fit, which balances by itself
+            scale = nodal
         eps = float(np.mean([semi_angle(p) for p in arcs]))
         return Measures(
             delta=delta,
@@ -131,20 +146,22 @@ class JointAccount:
         A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``. Equal facets
         that face each other are off alike, which leaves the gap as it is.
         """
-        g = self.scene.joint
+        g, doubts = self.scene.joint, [*self.scene.doubts, *contrast_doubts(self.system.problem.bodies)]
         if g.size_ratio == 1 and not self.scene.pin.rigid:
-            return self.scene.doubts
+            return doubts
         longest = max(side.facet_lengths().max() for side in self.system.sides.values())
         off = (1 - np.cos(longest / g.radius / 2)) ** 2 / 8 * g.radius / abs(g.dR)
         said = (
             f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR; "
             "reduce joint.element_size"
         )
-        return [*self.scene.doubts, *([said] if off > _ROUGH else [])]
+        return [*doubts, *([said] if off > _ROUGH else [])]
 
-    def step_warnings(self, m: Measures, profiles: Mapping[str, Any], residual: float) -> list[str]:
+    def step_warnings(
+        self, m: Measures, profiles: Mapping[str, Any], residual: float, before: Sequence[Measures] = ()
+    ) -> list[str]:
         """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""
-        said, squashed = [], core_peeq(self.system)
+        said, squashed = list[str](), core_peeq(self.system)
         if self.scene.joint.arc_end < np.pi and any(p.in_contact[-1] > 0 for p in profiles.values()):
             said.append(
                 "the contact reaches the end of the modelled quarter arc, beyond which it cannot spread; load less far"
@@ -155,24 +172,35 @@ class JointAccount:
         touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
         if m.contact_area and touching < _FEW_FACETS:
             facets = "facet" if touching == 1 else "facets"
-            said.append(f"only {touching} {facets} in contact; a smaller element_size would resolve it")
+            text = f"only {touching} {facets} in contact; a smaller element_size would resolve it"
+            said.append(Doubt(text, -touching))
         if squashed > 0:
-            said.append(
+            text = (
                 f"the pin yields where the force is applied, with PEEQ up to {squashed:.1e} in its core, and delta, "
                 "the mean displacement of the core, contains by how much it is squashed there; a larger "
                 "load.core_radius would spread the force"
             )
+            said.append(Doubt(text, squashed))
         scene = self.scene
-        if abs(m.delta) > scene.small * scene.joint.radius and not scene.doubts_of_strain:
-            said.append(
+        small = scene.analysis.strain == "small"
+        far = abs(m.delta) > scene.small * scene.joint.radius
+        if far and not scene.doubts_of_strain:
+            text = (
                 f"delta exceeds {scene.small:.2g} R: small-strain theory makes P too low, relatively by about "
-                f'{scene.too_low:g} delta/R; analysis.strain = "large" is for that'
+                f"{scene.too_low:g} delta/R; {LARGE}"
             )
+            said.append(Doubt(text, abs(m.delta)))
+        said += distortion_doubts(self.system, m.peeq_max, small=small and not far)
         if residual > max(1e-8, scene.analysis.tolerance) and m.contact_area:
-            said.append(f"round-off limits the residual to {residual:.1e} of the reaction")
+            said.append(Doubt(f"round-off limits the residual to {residual:.1e} of the reaction", residual))
         if m.force_balance > 1e-8:
-            said.append(f"forces at pin, contact and block differ by {m.force_balance:.1e} of P")
+            text = f"forces at pin, contact and block differ by {m.force_balance:.1e} of P"
+            said.append(Doubt(text, m.force_balance))
         return said
+
+    def refusal(self, steps: Sequence[Measures]) -> str:
+        """Why the run must not go on: never, as supports and the load hold both bodies."""
+        return ""
 
     def ending(self, steps: Sequence[Measures]) -> tuple[str, list[str]]:
         """Why a run that came to its end does not count as done, as no contact point noticed that the bodies are
@@ -184,6 +212,10 @@ class JointAccount:
     def energy_balance(self, steps: Sequence[Measures]) -> float | None:
         """See `energy_balance`; a pin too large for its hole is pressed in by the first step."""
         return energy_balance(steps, fit=int(self.scene.joint.dR < 0))
+
+    def work_doubts(self, steps: Sequence[Measures]) -> list[str]:
+        """See `work_doubts`, with the same steps."""
+        return work_doubts(steps, fit=int(self.scene.joint.dR < 0))
 
 
 def _largest(place: str, k: int, m: Measures) -> float:

@@ -8,11 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from archord.report.doubts import Doubt
 from archord.solver.stepping import Step
 
 if TYPE_CHECKING:  # records are read from a run folder, too, without the solver
+    from archord.solver.problem import Body
     from archord.solver.system import System
 
+WORK_OFF = "the work of the loads"  # how the warning of it begins
+_OFF = 0.01  # of the largest work
+LARGE_STRAIN = 0.05
+LARGE = 'analysis.strain = "large" is for that'
+_PLASTIC = 0.5  # PEEQ over the strain from which the strain is that of yielding
+_OTHER_UNIT = 3e5  # ratio of moduli: MPa for Pa is a million, steel on soft rubber 2e5
+_FAR_TURN = 0.2  # angle at which linear rotations stretch lengths by 2 %
 ENERGIES = ("elastic_energy", "plastic_dissipation", "friction_dissipation")
 
 
@@ -74,6 +83,37 @@ class Record:
         return self.values[name]
 
 
+def contrast_doubts(bodies: Sequence[Body]) -> list[str]:
+    """A warning where the moduli of two ``bodies`` are so far apart that they may be given in different units."""
+    moduli = {body.name: float(body.material.elastic_tangent[2, 2]) for body in bodies}
+    softest, stiffest = (choose(moduli, key=lambda name: moduli[name]) for choose in (min, max))
+    ratio = moduli[stiffest] / moduli[softest]
+    if ratio < _OTHER_UNIT:
+        return []
+    return [f"{stiffest!r} is {ratio:.1e} times as stiff as {softest!r}: look whether their E have the same unit"]
+
+
+def distortion_doubts(system: System, peeq: float, *, small: bool) -> list[str]:
+    """What to warn of where cells are strained or turned far in the last accepted state, by ``small`` strain, or turned
+    over, by any; ``peeq``, which has a warning of its own, is the largest. Collective."""
+    strain, tag, angle, inside_out = system.distortion()
+    said = list[str]()
+    if inside_out:
+        cells = "1 element is" if inside_out == 1 else f"{inside_out} elements are"
+        said.append(Doubt(f"{cells} turned inside out: stresses and forces mean nothing", inside_out))
+    if not small:
+        return said
+    if strain > LARGE_STRAIN and peeq < _PLASTIC * strain:
+        name = next(body.name for body in system.problem.bodies if system.problem.tag(body) == tag)
+        off = f"which makes stresses and forces wrong by about {100 * strain:.2g} %"
+        text = f"the strain reaches {strain:.2g} in {name!r}, too much for small-strain theory, {off}; {LARGE}"
+        said.append(Doubt(text, strain))
+    if angle > _FAR_TURN:
+        text = f"elements turn by {angle:.2g} rad, which small-strain theory takes for a strain of {angle**2 / 2:.2g}"
+        said.append(Doubt(f"{text}; {LARGE}", angle))
+    return said
+
+
 @dataclass
 class Work:
     """``total`` work of the loads: the trapezoidal rule over every accepted step, the last of them at the displacement
@@ -114,8 +154,22 @@ def energy_balance(steps: Sequence[Measures | Record], fit: int = 0, *, contact:
     Bodies that are pressed into each other in the first ``fit`` steps store energy by work that nobody counted: there
     all count from the last of these steps on, and the result is None where there is no other.
     """
-    if len(steps) <= fit:
-        return None
-    missing = [m.work - m.elastic_energy - dissipated(m) for m in (steps[fit - 1], steps[-1])]
+    found = _imbalances(steps, fit, contact=contact)
+    return found[-1] if found else None
+
+
+def _imbalances(steps: Sequence[Measures | Record], fit: int, *, contact: bool) -> list[float]:
+    """The `energy_balance` of every step from the last one of the ``fit`` on."""
+    missing = [m.work - m.elastic_energy - dissipated(m) for m in steps]
     work = max((abs(m.work) for m in steps if m.contact_area or not contact), default=0.0)
-    return abs(missing[1] - (missing[0] if fit else 0.0)) / work if work else 0.0
+    before = missing[fit - 1] if 0 < fit <= len(steps) else 0.0
+    return [abs(lost - before) / work if work else 0.0 for lost in missing[fit:]]
+
+
+def work_doubts(steps: Sequence[Measures | Record], fit: int = 0, *, contact: bool = True) -> list[str]:
+    """A warning where the work of a step differs from what is stored and dissipated by a hundredth of the largest."""
+    off = max(_imbalances(steps, fit, contact=contact), default=0.0)
+    if off <= _OFF:
+        return []
+    sums = "a sum of trapezoids over accepted steps, and the energies stored and dissipated differ"
+    return [f"{WORK_OFF}, {sums} by {100 * off:.2g} % of the largest work: more steps bring them together"]

@@ -17,7 +17,7 @@ from archord.geometry.shapes.bushing import bushing
 from archord.geometry.shapes.clevis import clevis
 from archord.geometry.shapes.lug import lug
 from archord.materials.material import Array
-from archord.presets.joint import core_density, joint_mesh
+from archord.presets.joint import core_density, joint_mesh, require_core
 from archord.scene import parts
 from archord.scene.errors import InputError
 from archord.scene.problem import GIVEN, LIVE, ProblemScene
@@ -165,7 +165,11 @@ class _Builder:
             self.loads.append(Load(facets=load.on, pressure=1.0, drive=load.name))
         elif spread:
             force = (1.0, 0.0) if load.direction == "x" else (0.0, 1.0)
-            density = core_density(load.core.centre, load.core.radius) if load.core else None
+            density = None
+            if load.core is not None:
+                centre, radius = load.core.centre, load.core.radius
+                require_core(self.mesh, load.on, centre, radius, f"load {load.name!r}: core.radius")
+                density = core_density(centre, radius)
             self.loads.append(Load(cells=load.on, force=force, density=density, drive=load.name))
         elif load.on not in [*self.couplings, *self.discs]:
             self.supports.append(Support(load.name, load.on, _AXES[str(load.direction)], 1.0, load.name))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+import basix
 import basix.ufl
 import numpy as np
 import numpy.typing as npt
@@ -110,6 +111,21 @@ class _BodyPoints:
         return stress.reshape(*self.weight.shape, len(self.elastic))
 
 
+class Distortion(NamedTuple):
+    """The largest principal ``strain`` at the middle of a cell, of the body with this ``tag``; the largest ``angle`` by
+    which one turns, in radians; and how many cells are turned ``inside_out``, at a corner at least."""
+
+    strain: float = 0.0
+    tag: int = -1
+    angle: float = 0.0
+    inside_out: int = 0
+
+    def joined(self, other: Distortion) -> Distortion:
+        """Of the cells of both."""
+        strain, tag = max(self[:2], other[:2])
+        return Distortion(strain, tag, max(self.angle, other.angle), self.inside_out + other.inside_out)
+
+
 class PointFields(NamedTuple):
     """Fields at the integration points ``coordinates`` ``(n, q, 2)`` of a body's ``cells`` ``(n,)``: ``weight`` and
     ``peeq`` ``(n, q)``, ``stress`` and ``plastic_strain`` ``(n, q, 4)``."""
@@ -153,6 +169,7 @@ class Bulk:
         self._nonlinear = {tag: _BodyPoints(V, self.cells[tag], m) for tag, m in nonlinear.items()}
         self.plastic = any(m.yields for m in materials.values())
         self.finite = any(m.finite for m in materials.values())
+        self._at_corners: dict[int, Array] = {}
         elastic = {}
         for tag, material in materials.items():
             _check_elastic_tangent(material)
@@ -270,6 +287,27 @@ class Bulk:
             plastic_strain = getattr(points.trial, "plastic_strain", np.zeros_like(stress)).reshape(shape)
             peeq = points.peeq.reshape(body.weight.shape)
             yield PointFields(cells, body.point, body.weight, stress, plastic_strain, peeq)
+
+    def distortion(self, u: Array) -> Distortion:
+        """How far the cells of this rank are strained, turned and turned over at ``u`` ``(n_nodes, 2)``."""
+        worst = Distortion()
+        for tag in self.cells:
+            H = displacement_gradient(self._corners(tag), self.V.dofmap.list[self.cells[tag]], u)
+            xx, yy, xy, yx = np.moveaxis(H, 2, 0)
+            over = ((1 + xx) * (1 + yy) <= xy * yx).any(axis=1)
+            principal = np.abs(xx + yy) / 2 + np.hypot(xx - yy, xy + yx) / 2
+            largest = float(principal[:, 0].max(initial=0.0))
+            angle = float(np.abs(yx - xy)[:, 0].max(initial=0.0)) / 2
+            worst = worst.joined(Distortion(largest, tag, angle, int(over.sum())))
+        return worst
+
+    def _corners(self, tag: int) -> Array:
+        """Gradients ``(n, q, a, 2)`` of the basis at the middle and at the corners of a body's cells."""
+        if tag not in self._at_corners:
+            corners = basix.geometry(self.V.mesh.basix_cell())
+            X = np.vstack([corners.mean(axis=0), corners])
+            self._at_corners[tag] = cell_basis(self.V.mesh, self.degree, self.cells[tag], X).gradient
+        return self._at_corners[tag]
 
     def cell_fields(self, parts: Iterable[PointFields]) -> dict[str, Array]:
         """Cell means of `at_points`: "von_mises" and "mean_stress" ``(n_cells,)``, "stress" ``(n_cells, 4)``; where a

@@ -26,7 +26,7 @@ from archord.solver.contact.contact import Contact
 from archord.solver.contact.surface import RigidSurface
 from archord.solver.problem import Body, Load, Mean, Problem, Rigid
 
-_LOAD_DEGREE = 6  # of the quadrature of distributed forces
+LOAD_DEGREE = 6  # of the quadrature of distributed forces
 MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
 _SAME_PLACE = 1e-9  # of the distance between two anchors
 
@@ -100,6 +100,12 @@ class Drives:
         values = [drive.value(factor) for drive in self._drives]
         return np.array(values + [0.0] * (len(self.rate) - len(values)))
 
+    def pushes(self, factor: float) -> bool:
+        """Whether a force that is prescribed acts at the load ``factor``."""
+        loaded = {load.drive for load in self.problem.loads}
+        by_force = [drive for drive in self._drives if drive.control == "force" or drive.name in loaded]
+        return any(drive.value(factor) for drive in by_force)
+
     def course(self, factor: float) -> Array:
         """Where the path is at the load ``factor``: the problem's drives over their largest values, and the fit."""
         largest = [max(map(abs, drive.path), default=1.0) or 1.0 for drive in self._drives]
@@ -148,7 +154,7 @@ class Drives:
         mesh, sets = self.V.mesh, self.problem.mesh
         entities = np.unique(sets.cells_in(cells) if cells else sets.facets_in(facets))
         tags = meshtags(mesh, 2 if cells else 1, entities.astype(np.int32), 1)
-        rule = {"quadrature_degree": _LOAD_DEGREE}
+        rule = {"quadrature_degree": LOAD_DEGREE}
         measure = ufl.Measure("dx" if cells else "ds", mesh, subdomain_data=tags, metadata=rule)(1)
         if not self.integral(fem.Constant(mesh, 1.0) * measure):
             raise ValueError(f"the facet set {facets!r} is not on the boundary of a body: nothing can load it")

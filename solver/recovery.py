@@ -11,6 +11,7 @@ from archord.geometry.basis import Array
 from archord.materials.material import Points
 from archord.solver.contact.interaction import GAMMA_FACTOR
 from archord.solver.newton import CIRCLING, Newton, NewtonSolver
+from archord.solver.stabilisation import RigidMotions
 
 _STIFF_CONTACT = 5.0  # gamma factor above which it is raised in stages where a solve fails
 _GAMMA_RATIO = 10.0  # and the largest ratio of one gamma to the next
@@ -26,7 +27,8 @@ class Recovery:
 
     def solve(self, load: float, guesses: Iterable[tuple[Array, bool]]) -> Newton:
         """Solve at ``load`` from one of the ``guesses`` after the other, each with whether it comes from afar; where
-        springs may have to hold bodies, these come to rest there first as if rigid. Collective."""
+        springs may have to hold bodies, these come to rest there first as if rigid; so do bodies under forces of which
+        no guess has found the contact, as it may be if forces are tiny. Collective."""
         self.equilibrium.load = load
         self._solves: list[Newton] = []
         springs = self.equilibrium.springs
@@ -35,7 +37,11 @@ class Recovery:
                 with self.equilibrium.timer("contact"):
                     guess, afar = springs.rigid.at_rest(load, guess), True
             if self._solve_in_stages(guess, afar):
-                break
+                return Newton.together(self._solves)
+        at = self.equilibrium
+        if springs is None and at.problem.by_force and not at.contact.n_active():
+            rigid = RigidMotions(at.drives, at.contact)
+            self._solve_in_stages(rigid.at_rest(load, guess), True)
         return Newton.together(self._solves)
 
     def _solve_in_stages(self, guess: Array, afar: bool) -> bool:

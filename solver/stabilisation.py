@@ -4,6 +4,7 @@ As if rigid, bodies go where contact and forces push them; from there the elasti
 between them and their last accepted state hold what does not touch even then: each point of a body of area ``A`` is
 pulled back with `WEAK` times ``M / A`` per displacement and area, ``M`` being the modulus of uniaxial strain, so that a
 force moves the body by about ``1 / WEAK`` times as much as it deforms it; rigid discs under forces, with `WEAK` ``M``.
+Beside a far softer body ``M`` is `_STIFFER` times its shear modulus: springs are weak for all that carries.
 """
 
 from __future__ import annotations
@@ -18,10 +19,13 @@ from archord.geometry.basis import Array
 from archord.geometry.curve import ProjectionError
 from archord.solver.bulk import assemble, matrix
 from archord.solver.contact.contact import Contact
+from archord.solver.contact.surface import RigidSurface
 from archord.solver.contact.tangent import trial_rate
 from archord.solver.drives import MOVABLE, Drives
 
 WEAK = 1e-8  # without influence, but well above the round-off of a factorisation
+_STIFFER = 100.0  # most of M over the smallest shear modulus
+_LEAST = 1e-5  # least of M over the own one: springs must stand out of the round-off of a factorisation
 _LITTLE = 0.01  # part of the contact forces below which springs hold nothing
 _MOST = 100  # iterations
 _AT_REST = 1e-3  # part of the forces that may be left
@@ -113,12 +117,19 @@ class RigidMotions:
         return *map(self.comm.allreduce, (force, stiffness, pressed)), openings
 
 
+def spring_modulus(own: float, softest: float) -> float:
+    """The modulus that the springs of a body take for ``M``: its ``own`` one where no body is far softer; ``softest``
+    is the smallest shear modulus of all bodies."""
+    return max(min(own, _STIFFER * softest), _LEAST * own)
+
+
 class Springs:
     """The springs of what ``rigid`` finds loose, bodies and discs; ``stiffness`` is that of discs. Collective.
 
     ``forces`` ``(n_owned dofs,)`` are those of the bodies' last displacements, ``on_levels`` ``(d,)`` those of discs,
     and ``work`` what the springs took up, of the modelled part; ``energy`` is its sum over accepted states. ``of_free``
-    is their matrix without prescribed displacements. In the last accepted state ``idle`` ones left all to contact.
+    is their matrix without prescribed displacements. In the last accepted state ``idle`` ones left all to contact, and
+    ``works`` are what they took up then, by the names of loose bodies and of interactions with a disc.
     """
 
     def __init__(self, rigid: RigidMotions, stiffness: float) -> None:
@@ -126,10 +137,13 @@ class Springs:
         self.rigid, self.comm, self._contact = rigid, drives.comm, contact
         self.energy, self.idle, V = 0.0, False, drives.V
         u, v, forms = ufl.TrialFunction(V), ufl.TestFunction(V), []
+        softest = min(float(body.material.elastic_tangent[2, 2]) for body in drives.problem.bodies)
+        self.works: dict[str, float] = {}
         for body in rigid.loose:
             dx = drives.measure(body.cells or body.name)
             area = drives.integral(fem.Constant(V.mesh, 1.0) * dx)
-            modulus = fem.Constant(V.mesh, WEAK * float(body.material.elastic_tangent[0, 0]) / area)
+            own = float(body.material.elastic_tangent[0, 0])
+            modulus = fem.Constant(V.mesh, WEAK * spring_modulus(own, softest) / area)
             forms.append(fem.form(modulus * ufl.inner(u, v) * dx))
         self._matrix = matrix(V, forms)
         assemble(self._matrix, forms)
@@ -139,7 +153,8 @@ class Springs:
         self.of_free.zeroRowsColumns(fixed.astype(PETSc.IntType), 0.0)
         self._x, self._y = self._matrix.createVecs()
         none: Array = np.zeros(len(drives.rate))
-        self.of_levels = WEAK * stiffness * sum(((disc.rate**2).sum(axis=1) for disc in contact.rigid), none)
+        of_disc = WEAK * spring_modulus(stiffness, softest)
+        self.of_levels = of_disc * sum(((disc.rate**2).sum(axis=1) for disc in contact.rigid), none)
         self.last = np.zeros(2 * drives.n_owned), none
 
     def pull(self, u: Array) -> Array:
@@ -152,12 +167,28 @@ class Springs:
         """Forces and work at the displacements ``u`` ``(n_owned dofs,)`` and drives' ``levels`` ``(d,)``."""
         self._now, moved, turned = (u.copy(), levels.copy()), u - self.last[0], levels - self.last[1]
         self.forces, self.on_levels = self.pull(moved), self.of_levels * turned
+        self._moved, self._turned = moved, turned
         self.work = (self.comm.allreduce(float(self.forces @ moved)) + float(self.on_levels @ turned)) / 2
 
     def commit(self) -> None:
         """Accept the last evaluation: the springs rest there."""
         self.last, self.energy = self._now, self.energy + self.work
+        self.works = self._works()
         self.look()
+
+    def _works(self) -> dict[str, float]:
+        """What they took up at the last evaluation, as ``works``."""
+        drives, found = self.rigid.drives, dict[str, float]()
+        on_nodes = (self.forces * self._moved).reshape(-1, 2).sum(axis=1) / 2
+        for body in self.rigid.loose:
+            nodes = np.unique(drives.V.dofmap.list[drives.problem.cells_of(body)])
+            found[body.name] = self.comm.allreduce(float(on_nodes[nodes[nodes < drives.n_owned]].sum()))
+        for interface in self._contact.interfaces:
+            disc = interface.surfaces[0]
+            if isinstance(disc, RigidSurface):
+                along = (disc.rate**2).sum(axis=1) > 0
+                found[interface.interaction.name] = float((self.on_levels * self._turned)[along].sum()) / 2
+        return found
 
     def look(self) -> None:
         """See whether they are `idle`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import basix.ufl
@@ -13,7 +14,7 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.kernels.compat import cell_degree
 from archord.report.timer import Timer
-from archord.solver.bulk import Bulk
+from archord.solver.bulk import Bulk, Distortion
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.interaction import Interface, Rigid
 from archord.solver.contact.surface import RigidSurface, Surface
@@ -129,6 +130,13 @@ class System:
         springs = self.equilibrium.springs
         return self.problem.symmetry * springs.energy if springs else 0.0
 
+    @property
+    def hardest_held(self) -> str:
+        """The body, or the interaction with a disc, on which these springs did most work in the last accepted step."""
+        springs = self.equilibrium.springs
+        works = springs.works if springs else {}
+        return max(works, key=lambda name: works[name], default="")
+
     def energies(self) -> tuple[float, float]:
         """Elastic energy and plastic dissipation of the whole."""
         parts = np.array(self.bulk.energies(self.equilibrium.displacement()))
@@ -157,13 +165,19 @@ class System:
                 found.append((float(peeq[at]), float(x[at, 0]), float(x[at, 1])))
         return max(self.comm.allgather(max(found)))
 
-    def force_balance(self) -> float:
+    def distortion(self) -> Distortion:
+        """How far cells are strained, turned and turned over, in the last evaluation."""
+        found = self.comm.allgather(self.bulk.distortion(self.equilibrium.displacement()))
+        return reduce(Distortion.joined, found)
+
+    def force_balance(self, before: float = 0.0) -> float:
         """Largest resultant on a body over the largest force of an interaction or a support, or over the norm of nodal
-        ones, as of a pure moment; 0 if all are round-off."""
+        ones, as of a pure moment, or over the largest force ``before``; 0 if all are round-off."""
         left = [self.equilibrium.residual_on(self.nodes_of(body)) for body in self.problem.bodies]
         forces = [np.zeros(2), *(self.contact_force(interaction.name) for interaction in self.problem.interactions)]
         forces += [self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)]
-        largest = max(np.linalg.norm(forces, axis=1).max(), self.problem.symmetry * self.equilibrium.reaction_norm)
+        nodal = max(self.equilibrium.reaction_norm, self.equilibrium.largest_reaction)
+        largest = max(np.linalg.norm(forces, axis=1).max(), self.problem.symmetry * nodal, before)
         if largest <= _AT_REST * self.problem.symmetry * self.equilibrium.noise:
             return 0.0
         return float(self.problem.symmetry * np.linalg.norm(left, axis=1).max() / largest)

@@ -58,6 +58,21 @@ def test_a_body_that_is_pulled_away_stops_the_run(tmp_path, capsys):
     assert "nothing holds what the loads move" in capsys.readouterr().err
 
 
+def test_springs_that_carry_a_force_stop_the_run_at_once(tmp_path, capsys):
+    """After the first of three steps, and not at the end; the body is named."""
+    away = {"name": "away", "on": "top of upper", "direction": "y", "force": 1.0}
+    assert run(written(tmp_path, {"load": [away], "path": {"steps": 3}})) == 3
+    said = capsys.readouterr().err
+    assert "nothing holds what the loads move: no contact carries 'upper', weak springs" in said
+    assert "1 accepted steps are in" in said
+
+
+def test_moduli_a_million_apart_are_told(tmp_path, capsys):
+    bodies = [{"name": "lower", "E": 1000.0, "nu": 0.3}, {"name": "upper", "E": 1e9, "nu": 0.3}]
+    assert run(written(tmp_path, {"body": bodies})) == 0
+    assert "'upper' is 1.0e+06 times as stiff as 'lower': look whether their E have" in capsys.readouterr().err
+
+
 def test_no_load_at_all_is_no_imbalance(tmp_path, capsys):
     """Forces of round-off are not told as forces that do not balance."""
     assert run(written(tmp_path, {"load": [PRESS | {"displacement": 0.0}]})) == 0

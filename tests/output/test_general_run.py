@@ -38,7 +38,9 @@ def scene(steps: int = 3, thickness: float | None = None, **changes):
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lug")
     outcome = solve_scene(scene(), folder, MPI.COMM_SELF)
-    assert (outcome.status, outcome.warnings) == ("done", [])
+    off = "the work of the loads, a sum of trapezoids over accepted steps, and the energies stored and dissipated"
+    assert outcome.status == "done"
+    assert outcome.warnings == [f"{off} differ by 1.7 % of the largest work: more steps bring them together"]
     return Run(folder)
 
 

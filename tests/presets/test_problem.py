@@ -169,3 +169,11 @@ def test_a_joint_stands_for_a_general_scene(changes):
     march(account.system.load_path(), general.targets, target_done=done)
     expected = [(m.delta, m.P) for m in solve(scene).steps]
     assert np.array(steps)[general.fits :] == pytest.approx(np.array(expected), rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("core", [{"centre": [0.0, 0.0], "radius": 1e-3}, {"centre": [500.0, 0.0], "radius": 1.0}])
+def test_a_core_without_integration_points_is_refused(core):
+    """Its force has nowhere to act."""
+    press = load(on="pin", force=100.0) | {"core": core}
+    with pytest.raises(InputError, match=r"load 'press': core.radius = .* integration points of the cells 'pin'"):
+        solved([press], pin="whole", interactions=[CONTACT])

@@ -60,6 +60,15 @@ def test_floating_sleeves_hand_the_whole_force_on(comm, material):
         assert at_once.drive_force("") == pytest.approx(P, rel=1e-6)
 
 
+@pytest.mark.parametrize(("times", "nu"), [(1e6, 0.3), (1.0, 0.4999)])
+def test_springs_stay_weak_beside_a_far_softer_body(times, nu):
+    """The springs of sleeves a million times as stiff as the rest, also of nearly incompressible ones, do less than a
+    millionth of the work."""
+    system, work = steps_of(sleeves(material=Elastic(times * 210000.0, nu, "strain")), [0.1, 0.15, 0.2])
+    assert 0 < system.stabilisation_energy < 1e-6 * work
+    np.testing.assert_allclose(system.reaction("edge")[0], -system.drive_force(""), rtol=1e-5)
+
+
 @pytest.mark.parametrize("half", [True, False], ids=["half", "whole"])
 def test_a_pin_under_a_force_finds_its_hole(half):
     """Concentric with clearance at first: nothing resists the force but springs. The whole pin may turn, too."""
