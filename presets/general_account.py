@@ -46,9 +46,10 @@ class GeneralAccount:
 
                 with timer("mesh"):
                     self._warnings = check(scene, problem)
+            require_mirrored(scene, problem)
             self.system = System(problem, timer=timer)
             self.per_step = (*per_step(self.system), "slip")
-            require_mirrored(scene, self.system)
+            self._warnings += self.system.warnings
             if scene.mesh.shape is None:
                 self._warnings += require_facing(self.system)
         turning = {f"{coupling.name} rotation" for coupling in scene.coupling}

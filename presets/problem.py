@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ from archord.scene import parts
 from archord.scene.errors import InputError
 from archord.scene.problem import GIVEN, LIVE, ProblemScene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
-from archord.solver.system import System
+from archord.solver.system import displacement_space
 
 _SHAPES: dict[str, Callable[..., TaggedMesh]] = {"lug": lug, "bushing": bushing, "joint": joint_mesh}
 _AXES = {"x": 0, "y": 1, "rotation": 2}
@@ -62,22 +63,27 @@ def scene_mesh(scene: ProblemScene, comm: MPI.Comm) -> TaggedMesh:
     return read_mesh(given, comm, circles=circles, scale=mesh.scale, order=mesh.order, refine=mesh.refine)
 
 
-def require_mirrored(scene: ProblemScene, system: System) -> None:
+def require_mirrored(scene: ProblemScene, problem: Problem) -> None:
     """Raise ValueError where a rigid coupling of a part with mirror images shares nodes with an edge that is held in
     one direction, as a mirror line is, and could leave that line or turn. Collective."""
     fixed: dict[str, set[str]] = {}
     for support in scene.support:
         fixed.setdefault(support.on, set()).update(support.fixed)
     held = {c.name: fixed.pop(c.name, set()) for c in scene.coupling}
-    for coupling in scene.coupling if scene.analysis.symmetry > 1 else []:
-        for on, axis in [(on, *axes) for on, axes in fixed.items() if len(axes) == 1 and coupling.kind == "rigid"]:
-            ends, edge = (system.problem.mesh.dofs_in(system.V, name) for name in (coupling.facets, on))
-            free = [freedom for freedom in (axis, "rotation") if freedom not in held[coupling.name]]
-            if free and system.comm.allreduce(len(np.intersect1d(ends, edge))):
-                raise ValueError(
-                    f"the rigid coupling {coupling.name!r} of a part with mirror images meets {on!r}, which is held in "
-                    f"{axis}: hold its {' and '.join(free)}, too, in a [[support]]"
-                )
+    lines = [(on, *axes) for on, axes in fixed.items() if len(axes) == 1 and scene.analysis.symmetry > 1]
+    rigid = [coupling for coupling in scene.coupling if coupling.kind == "rigid"]
+    if not (lines and rigid):
+        return
+    mesh = problem.mesh
+    V = displacement_space(mesh.mesh, problem.degree)
+    for coupling, (on, axis) in product(rigid, lines):
+        free = [freedom for freedom in (axis, "rotation") if freedom not in held[coupling.name]]
+        shared = np.intersect1d(mesh.dofs_in(V, coupling.facets), mesh.dofs_in(V, on))
+        if mesh.mesh.comm.allreduce(len(shared)) and free:
+            raise ValueError(
+                f"the rigid coupling {coupling.name!r} of a part with mirror images meets {on!r}, which is held in "
+                f"{axis}: hold its {' and '.join(free)}, too, in a [[support]]"
+            )
 
 
 class _Builder:
