@@ -96,7 +96,9 @@ class Support(Section):
 
     name: Name = key("name of the support", example="clamp")
     on: Name = key("coupling, or facet, point or cell set: the first that has the name", example="clamp")
-    fixed: Freedoms = key("directions held; rotation is of couplings alone", example=["x", "y"])
+    fixed: Freedoms = key(
+        "directions held, also where a load's set shares nodes; rotation is of couplings alone", example=["x", "y"]
+    )
 
 
 class Load(Loading):

@@ -30,6 +30,8 @@ from archord.solver.problem import Body, Load, Mean, Problem, Rigid
 _LOAD_DEGREE = 6  # of the quadrature of distributed forces
 MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
 _SAME_PLACE = 1e-9  # of the distance between two anchors
+_DEPENDENT = 1e-12  # of the squared length of a mean's gradient: what is left of it is round-off
+_PART = 1e-3  # of a combination of means that displacements cannot follow
 
 
 class Drives:
@@ -50,9 +52,10 @@ class Drives:
         self._drives = problem.all_drives
         self.names = names = [drive.name for drive in self._drives]
         self.applied = np.zeros((len(names), self.n_owned, 2))
-        self._prescribed = prescribed = Prescribed(problem, V, self._drives)
-        self.rate, self._holder = prescribed.rate, prescribed.holder
-        self.warnings = prescribed.warnings
+        self._prescribed = Prescribed(problem, V, self._drives)
+        self.rate = self._prescribed.rate
+        self._holder = self._prescribed.holder
+        self.warnings = self._prescribed.warnings
         for load in problem.loads:
             self.applied[names.index(load.drive)] += self._nodal_forces(load)
         for mean in problem.means:
@@ -73,10 +76,29 @@ class Drives:
                 rates = [given.moved_by().get(name, (0.0, 0.0)) for name in names]
                 disc.rate = np.array(rates + [(0.0, 0.0)] * len(anchors))
         self.fixed = self._holder >= 0
+        self._require_independent()
         largest = self._largest_rates(contact)
         self.weight = np.array([self._weight(level, largest) for level in self.unknown])
         self.unknown_rate = self.weight[:, None, None] * self.rate[self.unknown]
         self.unknown_load = self.weight[:, None, None] * self.applied[self.unknown]
+
+    def _require_independent(self) -> None:
+        """Raise ValueError where displacements that are free cannot give prescribed means all their values."""
+        means = self.unknown[~self.moving[self.unknown]]
+        if not len(means):
+            return
+        free = np.where(self.fixed[: self.n_owned], 0.0, self.applied[means]).reshape(len(means), -1)
+        rates = self.rate[self.unknown[self.moving[self.unknown]], : self.n_owned]
+        of_levels = self.comm.allreduce(np.tensordot(self.applied[means], rates, ((1, 2), (1, 2))))
+        products = self.comm.allreduce(free @ free.T) + of_levels @ of_levels.T
+        lengths = np.sqrt(self.comm.allreduce((self.applied[means] ** 2).sum(axis=(1, 2))))
+        smallest, modes = np.linalg.eigh(products / np.outer(lengths, lengths))
+        if smallest[0] < _DEPENDENT:
+            names = [repr(self.names[level]) for level in means[np.abs(modes[:, 0]) > _PART]]
+            raise ValueError(
+                f"the mean motions of {' and '.join(names)} cannot be prescribed: supports, or each other, decide on "
+                "them already; take one away, or give it a force"
+            )
 
     def _largest_rates(self, contact: Contact) -> Array:
         """The largest displacement ``(d,)`` of a node or a disc per unit of each level. Raises ValueError where a level

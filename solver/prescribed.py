@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -94,7 +93,7 @@ class Prescribed:
         return self._holds[self.names.index(name)] / np.maximum(self._holds.sum(axis=0), 1)
 
     def _collected(self) -> list[_Motion]:
-        """All motions, in the order of the supports. Raises ValueError for a drive that is given twice."""
+        """All motions, sorted by their names. Raises ValueError for a drive that is given twice."""
         found: dict[tuple[str, str, int], _Motion] = {}
         given: set[tuple[str, str, int, str]] = set()
         number = {drive.name: k for k, drive in enumerate(self._drives)}
@@ -115,7 +114,7 @@ class Prescribed:
             motion.together |= s.drive in by_force
         for (name, facets, axis), motion in found.items():
             motion.together |= (name, facets, 1 - axis) in found
-        return list(found.values())
+        return [found[key] for key in sorted(found)]
 
     def _rate(self, support: Support, nodes: np.ndarray) -> Array | float:
         return support.rate(self._x[nodes]) if callable(support.rate) else support.rate
@@ -125,13 +124,11 @@ class Prescribed:
         self.holder[nodes, motion.axis] = name
         self._holds[name, nodes, motion.axis] = True
 
-    def _displaced(self, motion: _Motion, which: Any = slice(None)) -> Array:
-        """What tells apart how ``which`` of the motion's nodes are displaced along the path ``(n, d)``."""
-        return motion.rate[:, which].T @ self._course
+    def _displaced(self, motion: _Motion) -> Array:
+        """What tells apart how the motion's nodes are displaced along the path ``(k, d)``."""
+        return motion.rate.T @ self._course
 
-    def _require_free(
-        self, moving: list[_Motion], fixing: list[_Motion], fixed: np.ndarray, round_off: Array
-    ) -> None:
+    def _require_free(self, moving: list[_Motion], fixing: list[_Motion], fixed: np.ndarray, round_off: Array) -> None:
         """Warn where a motion meets what fixes. Raises ValueError where that leaves nothing of it, or bends a set that
         must move as one."""
         free = np.zeros(len(moving), dtype=np.int64)
@@ -171,14 +168,14 @@ class Prescribed:
             if first.axis != second.axis:
                 continue
             common, i, j = np.intersect1d(first.nodes, second.nodes, return_indices=True)
-            difference = np.abs(self._displaced(first, i) - self._displaced(second, j)).max(axis=1, initial=0.0)
-            unlike = difference > max(round_off[a], round_off[b])
+            difference = np.abs(self._displaced(first)[i] - self._displaced(second)[j])
+            unlike = difference.max(axis=1, initial=0.0) > max(round_off[a], round_off[b])
             met += self._first_place(a, b, common[unlike & ~fixed[common, first.axis]])
         for a, b, place in self._everywhere(met):
             raise ValueError(
                 f"{moving[a]} and {moving[b]} move their common node at {_at(place)} differently in "
-                f"{_AXES[moving[a].axis]}: leave it out of one of the sets, let both move alike, or load one of them by "
-                "a pressure or a distributing coupling"
+                f"{_AXES[moving[a].axis]}: leave it out of one of the sets, let both move alike, or load one of them "
+                "by a pressure or a distributing coupling"
             )
 
     def _first_place(self, a: int, b: int, nodes: np.ndarray) -> list[tuple[int, int, Place]]:
@@ -209,7 +206,8 @@ def _courses(drives: list[Drive]) -> Array:
             courses[k, len(factors) + k] = 1.0
         else:
             courses[k, : len(factors)] = drive.values(factors)
-    return np.linalg.qr(courses.T, mode="r").T
+    reduced: Array = np.asarray(np.linalg.qr(courses.T, mode="r"))
+    return reduced.T
 
 
 def _at(place: Place) -> str:

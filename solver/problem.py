@@ -60,8 +60,8 @@ class Support:
     1, 1, ``(Y - y, x - X)``, are a rigid reference point (X, Y).
 
     Where sets share a node, a support without a rate wins over a displacement, with a warning. It must not meet a set
-    that moves as one, under a force or along both axes, unless that keeps the node at rest. All other supports of a node
-    must move it alike. Those who hold a node together have equal parts of its reaction.
+    that moves as one, under a force or along both axes, unless that keeps the node at rest. All other supports of a
+    node must move it alike. Those that hold a node together have equal parts of its reaction.
     """
 
     name: str
