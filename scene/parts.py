@@ -6,12 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from archord.scene.keys import Name, Pair, Positive, Section, given, key, require
+from archord.scene.keys import Name, Pair, PartName, Positive, Section, given, key, require
 from archord.scene.sections import Loading, NotNegative, Solid, StepCounts, Steps, Targets
 from archord.scene.shapes import BushingShape, JointShape, LugShape
 
 Freedom = Literal["x", "y", "rotation"]
 Surfaces = Annotated[list[Name], Field(min_length=1, max_length=2)]
+_OF_CONTACT = {"load", "accepted", ".", ".."}  # names in contact.h5 that are no surface's
 Freedoms = Annotated[list[Freedom], Field(min_length=1)]
 
 
@@ -52,27 +53,40 @@ class Mesh(Section):
 class Body(Solid):
     """A deformable body: a set of cells, of one material."""
 
-    name: Name = key("name of the body", example="pin")
+    name: PartName = key("name of the body", example="pin")
     cells: Name | None = key("its set of cells, that of its name if absent", other="plate")
 
 
 class Interaction(Section):
     """What two surfaces do to each other, or a rigid disc to one."""
 
-    name: Name = key("name of the interaction", example="contact")
+    name: PartName = key("name of the interaction", example="contact")
     surfaces: Surfaces = key("two facet sets, or one beside a rigid disc", example=["pin", "hole"])
     rigid: RigidCircle | None = key("rigid disc, the first surface", other={"centre": [0.0, 0.0], "radius": 10.0})
     law: Literal["frictionless", "tied"] = key("contact without friction, or tied surfaces", default="frictionless")
     friction: float = key("Coulomb's coefficient of friction", default=0.0, ge=0, le=1e6)
     integrated: Name | None = key("the one facet set whose points carry the contact; both do if absent", other="hole")
-    interference: NotNegative = key("how far the surfaces are pushed together, in a stage first", "length", default=0.0)
-    overlap: NotNegative = key("how far the surfaces are drawn into each other, for that stage", "length", default=0.0)
+    interference: NotNegative = key(
+        "of a press fit that the mesh does not show: both surfaces are drawn on one line, and pushed this far together "
+        "in a stage first, as a pin of 10 drawn in a hole of 10 and made 10.03; a drawn gap is taken off",
+        "length",
+        default=0.0,
+    )
+    overlap: NotNegative = key(
+        "of a press fit that the mesh shows: the surfaces cross, and lie this deep in each other, as a pin drawn with "
+        "10.03 in a hole of 10; that stage pushes them apart; instead of interference, not beside it",
+        "length",
+        default=0.0,
+    )
 
     @model_validator(mode="after")
     def _surfaces(self) -> Interaction:
         wanted, said = (1, "one facet set beside a rigid disc") if self.rigid else (2, "two facet sets")
         require(len(self.surfaces) == wanted, "surfaces", f"must name {said}")
         require(len({*self.surfaces}) == wanted, "surfaces", "must be two different facet sets")
+        taken = [name for name in self.surfaces if name in _OF_CONTACT or "/" in name]
+        said = f"must not name {taken}: contact.h5 has no room for such a name, rename the set in the mesh"
+        require(not taken, "surfaces", said)
         require(self.integrated in (None, *self.surfaces), "integrated", f"must be one of the surfaces {self.surfaces}")
         require(not (self.friction and self.law == "tied"), "friction", "is not for tied surfaces")
         fits = self.interference or self.overlap
@@ -83,7 +97,7 @@ class Interaction(Section):
 class Coupling(Section):
     """A reference point that stands for a set of facets: supports and loads may be on it."""
 
-    name: Name = key("name of the coupling", example="reference point")
+    name: PartName = key("name of the coupling", example="reference point")
     facets: Name = key("facet set", example="bore")
     point: Pair = key("the reference point", "length", example=[0.0, 0.0])
     kind: Literal["rigid", "distributing"] = key(
@@ -94,7 +108,7 @@ class Coupling(Section):
 class Support(Section):
     """What is held."""
 
-    name: Name = key("name of the support", example="clamp")
+    name: PartName = key("name of the support", example="clamp")
     on: Name = key("coupling, or facet, point or cell set: the first that has the name", example="clamp")
     fixed: Freedoms = key(
         "directions held, also where a load's set shares nodes; rotation is of couplings alone", example=["x", "y"]
@@ -105,7 +119,7 @@ class Load(Loading):
     """What moves or presses: one value, or a list of values at the ends of the path's stages."""
 
     kinds = ("displacement", "force", "pressure")
-    name: Name = key("name of the load", example="press")
+    name: PartName = key("name of the load", example="press")
     on: Name = key("disc's interaction, coupling, facet, point or cell set: the first of the name", example="flat")
     direction: Freedom | None = key("of displacement and force; rotation: of couplings", default=None, example="x")
     displacement: Targets | None = key("displacement (rotation: angle in rad)", "length", default=None, example=0.1)
