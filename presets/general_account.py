@@ -19,6 +19,7 @@ from archord.presets.problem import as_input_error, general_problem, require_mir
 from archord.report.timer import Timer
 from archord.scene.columns import part_columns, supporting
 from archord.scene.problem import LIVE, ProblemScene
+from archord.scene.sections import friction_doubts
 from archord.solver.stepping import Step
 from archord.solver.system import System
 
@@ -40,7 +41,8 @@ class GeneralAccount:
         timer = timer or Timer()
         with timer("mesh"):
             problem = general_problem(scene, comm)
-        self.scene, self._warnings = scene, list[str]()
+        self.scene = scene
+        self._warnings: list[str] = []
         with as_input_error(scene):
             if scene.mesh.shape is None:
                 from archord.presets.held import check  # with scipy, which solves of presets do without
@@ -55,6 +57,8 @@ class GeneralAccount:
                 from archord.presets.held import require_facing
 
                 self._warnings += require_facing(self.system)
+        frictions = {f'the friction of "{part.name}"': part.friction for part in scene.interaction}
+        self._warnings += friction_doubts(frictions)
         turning = {f"{coupling.name} rotation" for coupling in scene.coupling}
         turning |= {load.name for load in scene.load if load.direction == "rotation"}
         self._turning = [n for n, name in enumerate(self.system.drive_names) if name in turning]

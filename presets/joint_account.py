@@ -15,6 +15,7 @@ from archord.presets.arc import SYMMETRY, ArcProfile, arc_profiles, peak_pressur
 from archord.presets.edge import per_step
 from archord.presets.joint import Joint
 from archord.presets.measures import ENERGIES, Measures, costs, energy_balance, headed
+from archord.scene.sections import friction_doubts
 from archord.solver.stepping import Step
 from archord.solver.system import System
 
@@ -127,12 +128,13 @@ class JointAccount:
         that face each other are off alike, which leaves the gap as it is.
         """
         g = self.scene.joint
+        doubts = [*self.scene.doubts, *friction_doubts({"analysis.friction": self.scene.analysis.friction})]
         if g.size_ratio == 1 and not self.scene.pin.rigid:
-            return self.scene.doubts
+            return doubts
         longest = max(side.facet_lengths().max() for side in self.system.sides.values())
         off = (1 - np.cos(longest / g.radius / 2)) ** 2 / 8 * g.radius / abs(g.dR)
         said = f"the elements on the arcs are too long for the clearance, they depart from the circles by {off:.1g} dR"
-        return [*self.scene.doubts, *([said] if off > _ROUGH else [])]
+        return [*doubts, *([said] if off > _ROUGH else [])]
 
     def step_warnings(self, m: Measures, profiles: Mapping[str, Any], residual: float) -> list[str]:
         """What to warn of after the step ``m``, which Newton's method left with a ``residual``. Collective."""

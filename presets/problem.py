@@ -24,6 +24,7 @@ from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, 
 from archord.solver.system import displacement_space
 
 _SHAPES: dict[str, Callable[..., TaggedMesh]] = {"lug": lug, "bushing": bushing, "joint": joint_mesh}
+_STRETCHED = 10.0  # sizes of the mesh that large strain may displace by
 _AXES = {"x": 0, "y": 1, "rotation": 2}
 
 
@@ -108,6 +109,7 @@ class _Builder:
         for on in [*(s.on for s in scene.support), *(q.on for q in scene.load)]:
             if on not in known:
                 raise ValueError(unknown("set or coupling", on, known))
+        self._require_near()
         for support in scene.support:
             if support.on not in self.couplings:
                 self.supports += [Support(support.name, support.on, _AXES[freedom]) for freedom in support.fixed]
@@ -145,6 +147,27 @@ class _Builder:
         displaced = [load for load in scene.load if load.kind == "displacement" and load.on in self.mesh.facet_sets]
         self._driven = [(load, problem.body_of(load.on).name) for load in displaced]
         return problem
+
+    def _require_near(self) -> None:
+        """Raise ValueError for a displacement beyond the size of the mesh, as if in other units. Large strain is
+        stretched some times as far. Collective."""
+        comm = self.mesh.mesh.comm
+        x = self.mesh.mesh.geometry.x[:, :2]
+        discs = [part.rigid.centre for part in self.scene.interaction if part.rigid]
+        x = np.concatenate([x, np.reshape(discs, (-1, 2))])
+        ends = np.concatenate([x.max(axis=0, initial=-np.inf), -x.min(axis=0, initial=np.inf)])
+        comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
+        size = float((ends[:2] + ends[2:]).max())
+        most = size if self.scene.analysis.strain == "small" else _STRETCHED * size
+        for load in self.scene.load:
+            if load.kind != "displacement" or load.direction == "rotation":
+                continue
+            farthest = max(load.stages, key=abs)
+            if abs(farthest) > most:
+                raise ValueError(
+                    f"the load {load.name!r} moves {load.on!r} by {farthest:g}, but the whole mesh is {size:.4g} "
+                    f"large: a displacement of at most {most:.4g} is solved; are they in the same unit?"
+                )
 
     def _load(self, load: parts.Load) -> None:
         """A pressure; a force spread over cells; or what moves a set, a reference point or a disc."""

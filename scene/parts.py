@@ -12,6 +12,7 @@ from archord.scene.shapes import BushingShape, JointShape, LugShape
 
 Freedom = Literal["x", "y", "rotation"]
 Surfaces = Annotated[list[Name], Field(min_length=1, max_length=2)]
+_RIGHT_ANGLE = 1.5708
 _OF_CONTACT = {"load", "accepted", ".", ".."}  # names in contact.h5 that are no surface's
 Freedoms = Annotated[list[Freedom], Field(min_length=1)]
 
@@ -67,14 +68,14 @@ class Interaction(Section):
     friction: float = key("Coulomb's coefficient of friction", default=0.0, ge=0, le=1e6)
     integrated: Name | None = key("the one facet set whose points carry the contact; both do if absent", other="hole")
     interference: NotNegative = key(
-        "of a press fit that the mesh does not show: both surfaces are drawn on one line, and pushed this far together "
-        "in a stage first, as a pin of 10 drawn in a hole of 10 and made 10.03; a drawn gap is taken off",
+        "of a press fit that the mesh does not show: how far the surfaces, drawn in touch, are pushed together, in a "
+        "stage first; a drawn gap is taken off",
         "length",
         default=0.0,
     )
     overlap: NotNegative = key(
-        "of a press fit that the mesh shows: the surfaces cross, and lie this deep in each other, as a pin drawn with "
-        "10.03 in a hole of 10; that stage pushes them apart; instead of interference, not beside it",
+        "of a press fit that the mesh shows: how deep the surfaces are drawn into each other, for that stage; instead "
+        "of interference",
         "length",
         default=0.0,
     )
@@ -122,7 +123,9 @@ class Load(Loading):
     name: PartName = key("name of the load", example="press")
     on: Name = key("disc's interaction, coupling, facet, point or cell set: the first of the name", example="flat")
     direction: Freedom | None = key("of displacement and force; rotation: of couplings", default=None, example="x")
-    displacement: Targets | None = key("displacement (rotation: angle in rad)", "length", default=None, example=0.1)
+    displacement: Targets | None = key(
+        "displacement, up to the size of the mesh (rotation: angle in rad)", "length", default=None, example=0.1
+    )
     force: Targets | None = key("force on the whole or moment; a facet set with it stays straight", "force", other=1e3)
     core: RigidCircle | None = key(
         "circle in which a force on cells is spread, less and less outward", other={"centre": [0.0, 0.0], "radius": 1.0}
@@ -135,6 +138,9 @@ class Load(Loading):
         directed = (self.direction is None) == (self.pressure is not None)
         said = "is missing" if self.pressure is None else "is not for a pressure, which acts along the normal"
         require(directed, "direction", said)
+        turns = self.direction == "rotation" and self.displacement is not None
+        said = "must be at most 1.5708, a right angle in radians: a coupling turns linearly"
+        require(not turns or max(map(abs, self.stages)) <= _RIGHT_ANGLE, "displacement", said)
         return self
 
 

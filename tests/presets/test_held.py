@@ -192,3 +192,17 @@ def test_a_displacement_of_a_body_leaves_its_support_at_rest(squares, order):
     loads += [{"name": "press", "on": "upper t", "direction": "y", "displacement": -0.01}]
     (said,) = account(squares, load=loads[::order]).warnings()
     assert said.startswith("'wall' (on 'upper l') fixes nodes that 'all' (on 'upper') would move in x, as at (0, 10)")
+
+
+def test_a_displacement_beyond_the_mesh_is_refused_before_the_solve(squares):
+    far = [{"name": "press", "on": "upper t", "direction": "y", "displacement": [-0.01, -20.5]}]
+    said = "the load 'press' moves 'upper t' by -20.5, but the whole mesh is 20 large"
+    with pytest.raises(InputError, match=said):
+        account(squares, load=far)
+    assert account(squares, load=far, analysis={"strain": "large"})
+
+
+@pytest.mark.parametrize(("friction", "asked"), [(0.3, False), (1.5, False), (15.0, True), (1e3, False)])
+def test_friction_in_per_cent_is_asked_about(squares, friction, asked):
+    warnings = fit(squares, friction=friction).warnings()
+    assert [warning.endswith("is it in per cent? Then give 0.15") for warning in warnings] == [True][:asked]
