@@ -30,7 +30,9 @@ from archord.presets.measures import (
 from archord.presets.problem import as_input_error, general_problem, require_mirrored
 from archord.report.doubts import Doubt
 from archord.report.timer import Timer
+from archord.scene.columns import part_columns, supporting
 from archord.scene.problem import LIVE, ProblemScene
+from archord.scene.sections import friction_doubts
 from archord.solver.stepping import Step
 from archord.solver.system import System
 
@@ -57,19 +59,25 @@ class GeneralAccount:
         self.scene, self._warnings = scene, scene.doubts
         with as_input_error(scene):
             if scene.mesh.shape is None:
-                from archord.presets.held import check, require_facing  # with scipy, which solves of presets do without
+                from archord.presets.held import check  # with scipy, which solves of presets do without
 
                 with timer("mesh"):
                     self._warnings += check(scene, problem)
+            require_mirrored(scene, problem)
             self.system = System(problem, timer=timer)
             self.per_step = (*per_step(self.system), "slip")
-            require_mirrored(scene, self.system)
-            if scene.mesh.shape is None:
+            self._warnings += self.system.warnings
+            if scene.mesh.shape is None or any(part.interference for part in scene.interaction):
+                from archord.presets.held import require_facing
+
                 self._warnings += require_facing(self.system)
+        frictions = {f'the friction of "{part.name}"': part.friction for part in scene.interaction}
+        self._warnings += friction_doubts(frictions)
         turning = {f"{coupling.name} rotation" for coupling in scene.coupling}
         turning |= {load.name for load in scene.load if load.direction == "rotation"}
         self._turning = [n for n, name in enumerate(self.system.drive_names) if name in turning]
-        self._supports = list(dict.fromkeys(s.name for s in problem.supports if s.name not in self.system.drive_names))
+        self._supports = supporting(scene)
+        self._units = part_columns(scene)
 
     def columns(self) -> list[tuple[str, Callable[[Any], float | int]]]:
         """Headings of history.csv and their values: loads, supports, interactions, bodies, energies, what the step
@@ -78,33 +86,8 @@ class GeneralAccount:
         last = dict.fromkeys((*energies, "work"), self.scene.units.energy_of(self.scene.analysis.thickness))
         last |= {"force_balance": "", "iterations": "", "cutbacks": "", "seconds": "s"}
         first = ("step", attrgetter("step")), ("load_factor", attrgetter("at"))
-        values = [(headed(name, unit), itemgetter(name)) for name, unit in self._units().items()]
+        values = [(headed(name, unit), itemgetter(name)) for name, unit in self._units.items()]
         return [*first, *values, *((headed(name, unit), attrgetter(name)) for name, unit in last.items())]
-
-    def _units(self) -> dict[str, str]:
-        """Units of all values, by name and in order."""
-        scene, units = self.scene, self.scene.units
-        length, thickness = units.length, scene.analysis.thickness
-        force, moment = units.force_of(thickness), units.energy_of(thickness)
-        area = f"{length}{3 if thickness else 2}"  # displaced, over the thickness a volume
-        found: dict[str, str] = {}
-        for load in scene.load:
-            pair = ("rad", moment) if load.direction == "rotation" else (length, force)
-            moved, by = (area, units.stress) if load.kind == "pressure" else pair
-            found |= {f"{load.name} displacement": moved, f"{load.name} force": by}
-        for name in self._supports:
-            found |= {f"{name} x": force, f"{name} y": force, f"{name} moment": moment}
-        for part in scene.interaction:
-            found |= {f"{part.name} {axis}": force for axis in ("force x", "force y")}
-            found |= {f"{part.name} largest pressure": units.stress}
-            found |= {f"{part.name} {at}": length for at in ("at x", "at y", "contact length", "largest slip")}
-            found |= {f"{part.name} arcs": ""}
-            if part.friction:
-                found |= {f"{part.name} moment": moment, f"{part.name} largest shear": units.stress}
-        for body in scene.body:
-            if body.yield_stress is not None:
-                found |= {f"{body.name} peeq_max": "", f"{body.name} at x": length, f"{body.name} at y": length}
-        return found
 
     def driven(self) -> tuple[Array, Array]:
         """Displacements and forces of all loads. Collective."""
@@ -141,7 +124,7 @@ class GeneralAccount:
                 values += system.largest_peeq(body)
         return Record(
             at=system.equilibrium.load,
-            values=dict(zip(self._units(), map(float, values), strict=True)),
+            values=dict(zip(self._units, map(float, values), strict=True)),
             contact_area=area,
             force_balance=system.force_balance(self._largest_force(before)),
             **costs(before, step, system, work, seconds),

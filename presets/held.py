@@ -13,11 +13,14 @@ from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.materials.material import Array
 from archord.scene.problem import ProblemScene
+from archord.solver.contact.interaction import Interaction
 from archord.solver.problem import Problem
 from archord.solver.system import System
 
 _FAR = 0.1  # of the size of a surface: drawn farther behind another one, it does not face that
 _APART = 0.01  # of the same: a gap between tied surfaces that is told of
+_ALIKE = 2.0  # ratio of a drawn overlap and an interference, up to which they mean the same fit
+_ADDS = 0.1  # of an interference: a drawn gap or overlap that changes the fit
 _ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
 
 
@@ -95,11 +98,12 @@ def _loose(scene: ProblemScene, whole: PlaneMesh, cells: dict[str, str], owner: 
 
 
 def require_facing(system: System) -> list[str]:
-    """Warnings of overlaps that are not drawn. Collective; raises ValueError where surfaces of an interaction as drawn
-    do not face each other, or a tie has nothing to tie."""
-    warnings: dict[str, str] = {}
+    """Warnings of fits that are not as drawn. Collective; raises ValueError where surfaces of an interaction as drawn
+    do not face each other, a tie has nothing to tie, or a fit is drawn and given as an interference, too."""
+    warnings: list[str] = []
     for interface in system.contact.interfaces:
         part = interface.interaction
+        closest, apart = np.inf, ""
         for pair in interface.pairs:
             gap = (pair.separation * pair.projection.normal).sum(axis=1)[pair.projection.found]
             found = np.array([gap.min(initial=np.inf), np.abs(gap).min(initial=np.inf), -np.abs(gap).max(initial=0.0)])
@@ -109,15 +113,38 @@ def require_facing(system: System) -> list[str]:
             allowed, said = part.overlap + _FAR * size, f"the surface {pair.surface.name!r} of {part.name!r}"
             if nearest <= allowed and farthest > _APART * size and not pair.law.slides:
                 drawn = f"the surfaces that {part.name!r} ties are drawn up to {farthest:.3g} apart"
-                warnings[part.name] = f"{drawn}: what is carried along them loses its moment about that gap"
+                apart = f"{drawn}: what is carried along them loses its moment about that gap"
             if lowest < -allowed:
                 raise ValueError(f"{said} lies up to {-lowest:g} behind the opposite one: they must face each other")
             if nearest > allowed and not pair.law.slides:
                 raise ValueError(f"{said} is nowhere near the one that it is tied to")
-            if part.overlap and -part.overlap / 2 < lowest < np.inf:
-                drawn = f"drawn {abs(lowest):.3g} {'apart' if lowest >= 0 else 'deep in each other'}"
-                warnings[part.name] = f"the surfaces of {part.name!r} are {drawn}, but its overlap is {part.overlap:g}"
-    return [*warnings.values()]
+            closest = min(closest, float(lowest))
+        if apart:
+            warnings.append(apart)
+        if np.isfinite(closest):
+            warnings += _fit_as_drawn(part, closest)
+    return warnings
+
+
+def _fit_as_drawn(part: Interaction, gap: float) -> Iterator[str]:
+    """Warnings of the fit of ``part``, whose surfaces are drawn with this smallest ``gap``, negative where they lie in
+    each other. Raises ValueError for a fit that is drawn and given as an interference, too."""
+    deep = -gap
+    drawn = f"drawn {abs(gap):.3g} {'apart' if gap >= 0 else 'deep in each other'}"
+    said = f"the surfaces of {part.name!r} are {drawn}"
+    wanted = part.interference
+    if part.overlap and deep < part.overlap / 2:
+        yield f"{said}, but its overlap is {part.overlap:g}"
+    if wanted and deep > wanted / _ALIKE and (deep < wanted * _ALIKE or not part.overlap):
+        raise ValueError(
+            f"{said}, and its interference of {wanted:g} would push them together by as much again: for a fit that the "
+            f"mesh shows give overlap = {deep:.3g} alone, for one that it does not show draw them in touch"
+        )
+    if wanted and not part.overlap and deep > _ADDS * wanted:
+        yield f"{said}, which adds to its interference of {wanted:g}"
+    if wanted and gap > _ADDS * wanted:
+        left = max(wanted - gap, 0.0)
+        yield f"{said}: of its interference of {wanted:g} only {left:.3g} presses them together"
 
 
 def _nodes(whole: PlaneMesh, name: str, of_cells: bool = False) -> np.ndarray:

@@ -26,6 +26,7 @@ from archord.presets.measures import (
     work_doubts,
 )
 from archord.report.doubts import Doubt
+from archord.scene.sections import friction_doubts
 from archord.solver.stepping import Step
 from archord.solver.system import System
 
@@ -146,7 +147,9 @@ class JointAccount:
         A parabola through ends and middle of an arc of half-angle ``a`` is off by ``R (1 - cos a)^2/8``. Equal facets
         that face each other are off alike, which leaves the gap as it is.
         """
-        g, doubts = self.scene.joint, [*self.scene.doubts, *contrast_doubts(self.system.problem.bodies)]
+        g, friction = self.scene.joint, self.scene.analysis.friction
+        doubts = [*self.scene.doubts, *friction_doubts({"analysis.friction": friction})]
+        doubts += contrast_doubts(self.system.problem.bodies)
         if g.size_ratio == 1 and not self.scene.pin.rigid:
             return doubts
         longest = max(side.facet_lengths().max() for side in self.system.sides.values())

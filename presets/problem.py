@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -22,7 +23,7 @@ from archord.scene import parts
 from archord.scene.errors import InputError
 from archord.scene.problem import GIVEN, LIVE, ProblemScene
 from archord.solver.problem import Body, Drive, Guess, Interaction, Load, Mean, Problem, Rigid, Support
-from archord.solver.system import System
+from archord.solver.system import displacement_space
 
 _SHAPES: dict[str, Callable[..., TaggedMesh]] = {
     "lug": lug,
@@ -30,6 +31,7 @@ _SHAPES: dict[str, Callable[..., TaggedMesh]] = {
     "bushing": bushing,
     "joint": joint_mesh,
 }
+_STRETCHED = 10.0  # sizes of the mesh that large strain may displace by
 _AXES = {"x": 0, "y": 1, "rotation": 2}
 
 
@@ -77,22 +79,27 @@ def given_mesh(scene: ProblemScene, comm: MPI.Comm) -> PlaneMesh | None:
     return plane_mesh_of(given, comm, scene.mesh.order)
 
 
-def require_mirrored(scene: ProblemScene, system: System) -> None:
+def require_mirrored(scene: ProblemScene, problem: Problem) -> None:
     """Raise ValueError where a rigid coupling of a part with mirror images shares nodes with an edge that is held in
     one direction, as a mirror line is, and could leave that line or turn. Collective."""
     fixed: dict[str, set[str]] = {}
     for support in scene.support:
         fixed.setdefault(support.on, set()).update(support.fixed)
     held = {c.name: fixed.pop(c.name, set()) for c in scene.coupling}
-    for coupling in scene.coupling if scene.analysis.symmetry > 1 else []:
-        for on, axis in [(on, *axes) for on, axes in fixed.items() if len(axes) == 1 and coupling.kind == "rigid"]:
-            ends, edge = (system.problem.mesh.dofs_in(system.V, name) for name in (coupling.facets, on))
-            free = [freedom for freedom in (axis, "rotation") if freedom not in held[coupling.name]]
-            if free and system.comm.allreduce(len(np.intersect1d(ends, edge))):
-                raise ValueError(
-                    f"the rigid coupling {coupling.name!r} of a part with mirror images meets {on!r}, which is held in "
-                    f"{axis}: hold its {' and '.join(free)}, too, in a [[support]]"
-                )
+    lines = [(on, *axes) for on, axes in fixed.items() if len(axes) == 1 and scene.analysis.symmetry > 1]
+    rigid = [coupling for coupling in scene.coupling if coupling.kind == "rigid"]
+    if not (lines and rigid):
+        return
+    mesh = problem.mesh
+    V = displacement_space(mesh.mesh, problem.degree)
+    for coupling, (on, axis) in product(rigid, lines):
+        free = [freedom for freedom in (axis, "rotation") if freedom not in held[coupling.name]]
+        shared = np.intersect1d(mesh.dofs_in(V, coupling.facets), mesh.dofs_in(V, on))
+        if mesh.mesh.comm.allreduce(len(shared)) and free:
+            raise ValueError(
+                f"the rigid coupling {coupling.name!r} of a part with mirror images meets {on!r}, which is held in "
+                f"{axis}: hold its {' and '.join(free)}, too, in a [[support]]"
+            )
 
 
 class _Builder:
@@ -117,6 +124,7 @@ class _Builder:
         for on in [*(s.on for s in scene.support), *(q.on for q in scene.load)]:
             if on not in known:
                 raise ValueError(unknown("set or coupling", on, known))
+        self._require_near()
         for support in scene.support:
             if support.on not in self.couplings:
                 self.supports += [Support(support.name, support.on, _AXES[freedom]) for freedom in support.fixed]
@@ -154,6 +162,27 @@ class _Builder:
         displaced = [load for load in scene.load if load.kind == "displacement" and load.on in self.mesh.facet_sets]
         self._driven = [(load, problem.body_of(load.on).name) for load in displaced]
         return problem
+
+    def _require_near(self) -> None:
+        """Raise ValueError for a displacement beyond the size of the mesh, as if in other units. Large strain is
+        stretched some times as far. Collective."""
+        comm = self.mesh.mesh.comm
+        x = self.mesh.mesh.geometry.x[:, :2]
+        discs = [part.rigid.centre for part in self.scene.interaction if part.rigid]
+        x = np.concatenate([x, np.reshape(discs, (-1, 2))])
+        ends = np.concatenate([x.max(axis=0, initial=-np.inf), -x.min(axis=0, initial=np.inf)])
+        comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
+        size = float((ends[:2] + ends[2:]).max())
+        most = size if self.scene.analysis.strain == "small" else _STRETCHED * size
+        for load in self.scene.load:
+            if load.kind != "displacement" or load.direction == "rotation":
+                continue
+            farthest = max(load.stages, key=abs)
+            if abs(farthest) > most:
+                raise ValueError(
+                    f"the load {load.name!r} moves {load.on!r} by {farthest:g}, but the whole mesh is {size:.4g} "
+                    f"large: a displacement of at most {most:.4g} is solved; are they in the same unit?"
+                )
 
     def _load(self, load: parts.Load) -> None:
         """A pressure; a force spread over cells; or what moves a set, a reference point or a disc."""

@@ -176,8 +176,15 @@ def override_key(data: dict[str, Any], override: str) -> str:
     value = _value(text.strip())
     tables = data.get(section)
     if not isinstance(tables, list):
+        inner = tables.get("shape") if isinstance(tables, dict) and name.startswith("shape.") else None
+        if isinstance(inner, dict):
+            name = name.removeprefix("shape.")
         if "\n" in override or not (sign and dot and section and name and "." not in name):
             raise InputError(f"--set {override!r}: must read section.key=value, like joint.clearance=0.01.")
+        if isinstance(inner, dict):
+            kind = str(inner.get("kind"))
+            put({kind: inner}, kind, name, value, f"--set {override}")
+            return f"{section}.shape.{name}"
         put(data, section, name, value, f"--set {override}")
         return f"{section}.{name}"
     known = {str(t.get("name", k)): t for k, t in reversed([*enumerate(tables, 1)]) if isinstance(t, dict)}

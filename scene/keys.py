@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 Name = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f]*$")]  # text on one line
 Positive = Annotated[float, Field(gt=0)]
@@ -50,6 +50,16 @@ def toml_value(value: Any) -> str:
     if isinstance(value, dict):
         return f"{{{', '.join(f'{name} = {toml_value(part)}' for name, part in value.items())}}}"
     return json.dumps(value, default=str, ensure_ascii=False)
+
+
+def _part_name(name: str) -> str:
+    require(name.isprintable(), (), "must be text on one line")
+    require(name == name.strip(), (), "must not begin or end with a space")
+    require(" [" not in name, (), 'must not hold " [", which begins the unit in the headings of tables')
+    return name
+
+
+PartName = Annotated[Name, AfterValidator(_part_name)]  # of a part of a scene, which heads columns of tables
 
 
 class Section(BaseModel):

@@ -6,12 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from archord.scene.keys import Name, Pair, Positive, Section, given, key, require
+from archord.scene.keys import Name, Pair, PartName, Positive, Section, given, key, require
 from archord.scene.sections import Loading, NotNegative, Solid, StepCounts, Steps, Targets
 from archord.scene.shapes import BushingShape, ClevisShape, JointShape, LugShape
 
 Freedom = Literal["x", "y", "rotation"]
 Surfaces = Annotated[list[Name], Field(min_length=1, max_length=2)]
+_RIGHT_ANGLE = 1.5708
+_OF_CONTACT = {"load", "accepted", ".", ".."}  # names in contact.h5 that are no surface's
 Freedoms = Annotated[list[Freedom], Field(min_length=1)]
 
 
@@ -54,27 +56,40 @@ class Mesh(Section):
 class Body(Solid):
     """A deformable body: a set of cells, of one material."""
 
-    name: Name = key("name of the body", example="pin")
+    name: PartName = key("name of the body", example="pin")
     cells: Name | None = key("its set of cells, that of its name if absent", other="plate")
 
 
 class Interaction(Section):
     """What two surfaces do to each other, or a rigid disc to one."""
 
-    name: Name = key("name of the interaction", example="contact")
+    name: PartName = key("name of the interaction", example="contact")
     surfaces: Surfaces = key("two facet sets, or one beside a rigid disc", example=["pin", "hole"])
     rigid: RigidCircle | None = key("rigid disc, the first surface", other={"centre": [0.0, 0.0], "radius": 10.0})
     law: Literal["frictionless", "tied"] = key("contact without friction, or tied surfaces", default="frictionless")
     friction: float = key("Coulomb's coefficient of friction", default=0.0, ge=0, le=1e6)
     integrated: Name | None = key("the one facet set whose points carry the contact; both do if absent", other="hole")
-    interference: NotNegative = key("how far the surfaces are pushed together, in a stage first", "length", default=0.0)
-    overlap: NotNegative = key("how far the surfaces are drawn into each other, for that stage", "length", default=0.0)
+    interference: NotNegative = key(
+        "of a press fit that the mesh does not show: how far the surfaces, drawn in touch, are pushed together, in a "
+        "stage first; a drawn gap is taken off",
+        "length",
+        default=0.0,
+    )
+    overlap: NotNegative = key(
+        "of a press fit that the mesh shows: how deep the surfaces are drawn into each other, for that stage; instead "
+        "of interference",
+        "length",
+        default=0.0,
+    )
 
     @model_validator(mode="after")
     def _surfaces(self) -> Interaction:
         wanted, said = (1, "one facet set beside a rigid disc") if self.rigid else (2, "two facet sets")
         require(len(self.surfaces) == wanted, "surfaces", f"must name {said}")
         require(len({*self.surfaces}) == wanted, "surfaces", "must be two different facet sets")
+        taken = [name for name in self.surfaces if name in _OF_CONTACT or "/" in name]
+        said = f"must not name {taken}: contact.h5 has no room for such a name, rename the set in the mesh"
+        require(not taken, "surfaces", said)
         require(self.integrated in (None, *self.surfaces), "integrated", f"must be one of the surfaces {self.surfaces}")
         require(not (self.friction and self.law == "tied"), "friction", "is not for tied surfaces")
         fits = self.interference or self.overlap
@@ -85,7 +100,7 @@ class Interaction(Section):
 class Coupling(Section):
     """A reference point that stands for a set of facets: supports and loads may be on it."""
 
-    name: Name = key("name of the coupling", example="reference point")
+    name: PartName = key("name of the coupling", example="reference point")
     facets: Name = key("facet set", example="bore")
     point: Pair = key("the reference point", "length", example=[0.0, 0.0])
     kind: Literal["rigid", "distributing"] = key(
@@ -96,19 +111,23 @@ class Coupling(Section):
 class Support(Section):
     """What is held."""
 
-    name: Name = key("name of the support", example="clamp")
+    name: PartName = key("name of the support", example="clamp")
     on: Name = key("coupling, or facet, point or cell set: the first that has the name", example="clamp")
-    fixed: Freedoms = key("directions held; rotation is of couplings alone", example=["x", "y"])
+    fixed: Freedoms = key(
+        "directions held, also where a load's set shares nodes; rotation is of couplings alone", example=["x", "y"]
+    )
 
 
 class Load(Loading):
     """What moves or presses: one value, or a list of values at the ends of the path's stages."""
 
     kinds = ("displacement", "force", "pressure")
-    name: Name = key("name of the load", example="press")
+    name: PartName = key("name of the load", example="press")
     on: Name = key("disc's interaction, coupling, facet, point or cell set: the first of the name", example="flat")
     direction: Freedom | None = key("of displacement and force; rotation: of couplings", default=None, example="x")
-    displacement: Targets | None = key("displacement (rotation: angle in rad)", "length", default=None, example=0.1)
+    displacement: Targets | None = key(
+        "displacement, up to the size of the mesh (rotation: angle in rad)", "length", default=None, example=0.1
+    )
     force: Targets | None = key("force on the whole or moment; a facet set with it stays straight", "force", other=1e3)
     core: RigidCircle | None = key(
         "circle in which a force on cells is spread, less and less outward", other={"centre": [0.0, 0.0], "radius": 1.0}
@@ -121,6 +140,9 @@ class Load(Loading):
         directed = (self.direction is None) == (self.pressure is not None)
         said = "is missing" if self.pressure is None else "is not for a pressure, which acts along the normal"
         require(directed, "direction", said)
+        turns = self.direction == "rotation" and self.displacement is not None
+        said = "must be at most 1.5708, a right angle in radians: a coupling turns linearly"
+        require(not turns or max(map(abs, self.stages)) <= _RIGHT_ANGLE, "displacement", said)
         return self
 
 

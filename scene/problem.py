@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from archord.scene.columns import require_different
 from archord.scene.keys import key, require
 from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Path, Support
 from archord.scene.scene import STEPS, Checked, require_solids
@@ -55,6 +56,7 @@ class ProblemScene(Checked):
             place, other = ("interaction", part.name, "surfaces"), used.setdefault(name, part.name)
             require(other == part.name, place, f"must not name {name!r}, which {other!r} has already")
         self._directions()
+        require_different(self)
         require_solids({("body", name): body for name, body in self.solids.items()})
         self.require_open(STEPS)
         steps_of(self.path.steps, self.n_stages, "path.steps")

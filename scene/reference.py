@@ -12,7 +12,7 @@ from archord.scene.parts import Mesh
 from archord.scene.problem import FORMAT, ProblemScene
 from archord.scene.scene import FORMAT as JOINT_FORMAT
 from archord.scene.scene import Scene
-from archord.scene.shapes import PRESETS
+from archord.scene.shapes import PRESETS, BushingShape, ClevisShape, JointShape, LugShape
 
 _JOINT: dict[str, Any] = {name: info for name, info in Scene.model_fields.items() if name != "format"}
 _GENERAL: dict[str, Any] = {name: info for name, info in ProblemScene.model_fields.items() if name != "format"}
@@ -21,6 +21,34 @@ _GENERAL["mesh.circle"] = Mesh.model_fields["circle"]
 _LUG = {name: PRESETS["lug"].model_fields[name] for name in ("lug", "plate", "bushing")}
 _CLEVIS = {name: PRESETS["clevis"].model_fields[name] for name in ("clevis", "inner", "outer")}
 _RINGS = {name: PRESETS["bushing"].model_fields[name] for name in ("bushing", "sleeve", "housing", "load")}
+_SHAPED = {
+    "pin": '`"half"`, `"whole"` or `"none"`, for a rigid disc',
+    "rings": "list of [bore, outer] from the pin outward",
+    "core_radius": "ring: radius over R of the core that the force acts on",
+}
+_MEETING = (
+    "### Sets that meet\n",
+    "Supports, loads and rigid couplings may have nodes in common. The order of the sections has no part in what "
+    "holds there:\n",
+    "- A support wins over a displacement: its nodes stay, and a warning names the sets and a place.\n"
+    "- A set that moves as one must not meet a support that bends it: an edge under a force, and a rigid coupling. "
+    "The scene is refused, unless the set leaves the node at rest. Fix the same freedoms of the coupling, or load the "
+    "set by a pressure or a distributing coupling.\n"
+    "- A displacement is refused where supports hold every node of its set.\n"
+    "- All other motions of a node must be alike, in value and path. Different ones are refused.\n"
+    "- Supports that fix a node together have equal parts of its reaction.\n",
+    "### Press fits\n",
+    "The mesh shows a fit, or it does not. `overlap` is for surfaces that cross in the mesh: a pin of radius 10.03 is "
+    "drawn in a hole of radius 10. `interference` is for surfaces that lie on one line in the mesh: a pin of radius "
+    "10 is drawn in a hole of radius 10, and is made 0.03 too large.\n",
+    "```text\n"
+    "overlap = 0.03                     interference = 0.03\n"
+    "\n"
+    "  ------ edge of the pin, 10.03      ------ edge of the pin and edge of the hole, 10\n"
+    "  ------ edge of the hole, 10\n"
+    "```\n",
+    "Both at once count the fit twice: where they are alike the scene is refused.\n",
+)
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 _KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false", "array": "list"}
 
@@ -54,6 +82,8 @@ def reference() -> str:
         "A scene with the section `[mesh]` is a general one, of any bodies on any mesh. The sections units, stepping "
         "and output are those of joints. Headings in double brackets may stand any number of times.\n",
         *_tables(_GENERAL, {name: _JOINT[name] for name in ("units", "analysis", "stepping", "output")}),
+        *_shapes(),
+        *_MEETING,
         "## Presets\n",
         "A scene with `[lug]` (and `[plate]`, perhaps `[bushing]`), `[clevis]` (and `[inner]`, `[outer]`), or "
         "`[bushing]` (and `[[sleeve]]`, `[housing]`) without `[lug]`, stands for a general one, which "
@@ -79,6 +109,22 @@ def _tables(sections: dict[str, Any], before: dict[str, Any]) -> Iterator[str]:
         if table.rows:
             said = f"{info.description[0].upper()}{info.description[1:]}{', also' if known else ''}.\n"
             yield from (f"### {_heading(section, info)}\n", said, table.markdown())
+
+
+def _shapes() -> Iterator[str]:
+    """The section of a mesh that a preset draws."""
+    table = Table("kind", "has the keys of", "and")
+    shapes = {"lug": LugShape, "clevis": ClevisShape, "bushing": BushingShape, "joint": JointShape}
+    for name, shape in shapes.items():
+        more = [f"`{key}`: {_SHAPED[key]}" for key in _SHAPED if key in shape.model_fields]
+        table.add(f'`"{name}"`', f"[{name}]", "; ".join(more))
+    yield "### [mesh.shape]\n"
+    yield (
+        "Instead of a file: the shape of a preset, as `archord scene --expand` prints it. Its `kind` tells which keys "
+        "it has. `--set mesh.shape.radius=12.0` changes one. The other sections stay as they are, also the `overlap` "
+        "of an interaction, which is the clearance below 0.\n"
+    )
+    yield table.markdown()
 
 
 def _heading(section: str, info: Any) -> str:

@@ -19,6 +19,7 @@ LOADS = ("displacement", "displacement_absolute", "force", "relative_force")
 # shear or bulk modulus leave E by a factor below 1e6: round-off stays below the tolerances
 Ratio = Annotated[float, Field(ge=-0.999, le=0.499999)]
 _E, _NU = "Young's modulus, unless a material brings it", "Poisson's ratio, unless a material brings it"
+_STUCK = 1000.0  # coefficient of friction from which points are meant to stick
 MOST_STEPS = 10_000  # output steps
 _COERCIVE = 0.25  # gamma over the trace constant, from which on Nitsche's form is coercive
 Accuracy = Annotated[float, Field(ge=1e-5, le=0.1)]
@@ -44,6 +45,15 @@ _FORCES = {  # units of stress and length, and of the force that is stress times
 }
 _INCHES = {"in": "in", "inch": "in"}
 _LENGTHS = ("mm", "cm", "m", "um", *_INCHES, "ft")
+
+
+def friction_doubts(frictions: dict[str, float]) -> list[str]:
+    """A question for each coefficient, by its key, that may be one in per cent."""
+    doubted = {name: friction for name, friction in frictions.items() if 2 < friction < _STUCK}
+    return [
+        f"{name} = {friction:g} is far above what surfaces have: is it in per cent? Then give {friction / 100:g}"
+        for name, friction in doubted.items()
+    ]
 
 
 class Units(Section):

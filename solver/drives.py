@@ -24,11 +24,14 @@ from mpi4py import MPI
 from archord.geometry.basis import Array
 from archord.solver.contact.contact import Contact
 from archord.solver.contact.surface import RigidSurface
+from archord.solver.prescribed import Prescribed
 from archord.solver.problem import Body, Load, Mean, Problem, Rigid
 
 LOAD_DEGREE = 6  # of the quadrature of distributed forces
 MOVABLE = 1e-8  # stiffness of a rigid motion over the largest one, below which nothing holds it
 _SAME_PLACE = 1e-9  # of the distance between two anchors
+_DEPENDENT = 1e-12  # of the squared length of a mean's gradient: what is left of it is round-off
+_PART = 1e-3  # of a combination of means that displacements cannot follow
 
 
 class Drives:
@@ -39,6 +42,7 @@ class Drives:
     prescribed displacements; ``rate`` ``(d, n_local, 2)`` and ``applied`` ``(d, n_owned, 2)``, on the modelled part,
     are per unit of the levels, which are displacements where ``moving`` ``(d,)``. The levels ``unknown`` ``(m,)`` are
     solved for in units of ``weight`` ``(m,)``, as are their equations: displacements of bodies, and forces.
+    ``warnings`` are of displacements that nodes do not follow.
     """
 
     def __init__(self, problem: Problem, V: fem.FunctionSpace, contact: Contact, stiffness: float) -> None:
@@ -47,10 +51,11 @@ class Drives:
         self._x, self.stiffness = V.tabulate_dof_coordinates()[:, :2], stiffness
         self._drives = problem.all_drives
         self.names = names = [drive.name for drive in self._drives]
-        self.rate, self.applied = (np.zeros((len(names), n, 2)) for n in (self._n_local, self.n_owned))
-        self._supports = list(dict.fromkeys(s.name for s in problem.supports))
-        self._holder = np.full((self._n_local, 2), -1)  # which of them holds a displacement
-        self._hold()
+        self.applied = np.zeros((len(names), self.n_owned, 2))
+        self._prescribed = Prescribed(problem, V, self._drives)
+        self.rate = self._prescribed.rate
+        self._holder = self._prescribed.holder
+        self.warnings = self._prescribed.warnings
         for load in problem.loads:
             self.applied[names.index(load.drive)] += self._nodal_forces(load)
         for mean in problem.means:
@@ -71,29 +76,46 @@ class Drives:
                 rates = [given.moved_by().get(name, (0.0, 0.0)) for name in names]
                 disc.rate = np.array(rates + [(0.0, 0.0)] * len(anchors))
         self.fixed = self._holder >= 0
-        self.weight = np.array([self._weight(level, contact) for level in self.unknown])
+        self._require_independent()
+        largest = self._largest_rates(contact)
+        self.weight = np.array([self._weight(level, largest) for level in self.unknown])
         self.unknown_rate = self.weight[:, None, None] * self.rate[self.unknown]
         self.unknown_load = self.weight[:, None, None] * self.applied[self.unknown]
 
-    def _hold(self) -> None:
-        """Note what supports prescribe."""
-        for s in self.problem.supports:
-            nodes, number = self.problem.mesh.dofs_in(self.V, s.facets), self._supports.index(s.name)
-            self.rate[:, nodes[self._holder[nodes, s.axis] != number], s.axis] = 0.0
-            self._holder[nodes, s.axis] = number
-            if s.moves:
-                rate = s.rate(self._x[nodes]) if callable(s.rate) else s.rate
-                self.rate[self.names.index(s.drive), nodes, s.axis] = rate
+    def _require_independent(self) -> None:
+        """Raise ValueError where displacements that are free cannot give prescribed means all their values."""
+        means = self.unknown[~self.moving[self.unknown]]
+        if not len(means):
+            return
+        free = np.where(self.fixed[: self.n_owned], 0.0, self.applied[means]).reshape(len(means), -1)
+        rates = self.rate[self.unknown[self.moving[self.unknown]], : self.n_owned]
+        of_levels = self.comm.allreduce(np.tensordot(self.applied[means], rates, ((1, 2), (1, 2))))
+        products = self.comm.allreduce(free @ free.T) + of_levels @ of_levels.T
+        lengths = np.sqrt(self.comm.allreduce((self.applied[means] ** 2).sum(axis=(1, 2))))
+        smallest, modes = np.linalg.eigh(products / np.outer(lengths, lengths))
+        if smallest[0] < _DEPENDENT:
+            names = [repr(self.names[level]) for level in means[np.abs(modes[:, 0]) > _PART]]
+            raise ValueError(
+                f"the mean motions of {' and '.join(names)} cannot be prescribed: supports, or each other, decide on "
+                "them already; take one away, or give it a force"
+            )
 
-    def _weight(self, level: int, contact: Contact) -> float:
-        """The unit of a level: one that moves a node by 1 at most, or whose forces are of the size of the stiffness."""
-        if not self.moving[level]:
-            return self.stiffness / self.comm.allreduce(np.abs(self.applied[level]).sum())
-        rates = self.rate[level], *(disc.rate[level] for disc in contact.rigid)
-        largest = self.comm.allreduce(max(np.abs(rate).max(initial=0.0) for rate in rates), op=MPI.MAX)
-        if largest == 0:
+    def _largest_rates(self, contact: Contact) -> Array:
+        """The largest displacement ``(d,)`` of a node or a disc per unit of each level. Raises ValueError where a level
+        moves nothing."""
+        largest = np.abs(self.rate).max(axis=(1, 2), initial=0.0)
+        for disc in contact.rigid:
+            largest = np.maximum(largest, np.abs(disc.rate).max(axis=1))
+        self.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
+        for level in np.flatnonzero(self.moving & (largest == 0)):
             raise ValueError(f"the drive {self.names[level]!r} moves nothing: supports hold all that it would move")
-        return 1 / largest
+        return largest
+
+    def _weight(self, level: int, largest: Array) -> float:
+        """The unit of a level: one that moves a node by 1 at most, or whose forces are of the size of the stiffness."""
+        if self.moving[level]:
+            return 1 / largest[level]
+        return self.stiffness / self.comm.allreduce(np.abs(self.applied[level]).sum())
 
     def values(self, factor: float) -> Array:
         """What the drives prescribe ``(d,)`` at the load ``factor``."""
@@ -112,8 +134,12 @@ class Drives:
         return np.append(self.values(factor)[: len(largest)] / largest, self.problem.fitted(factor))
 
     def held_by(self, name: str) -> np.ndarray:
-        """Which displacements ``(n_owned, 2)`` the supports ``name`` prescribe."""
-        return self._holder[: self.n_owned] == (self._supports.index(name) if name in self._supports else np.nan)
+        """Which displacements ``(n_owned, 2)`` the supports ``name`` prescribe, the last ones where several do."""
+        return self._holder[: self.n_owned] == self._prescribed.names.index(name)
+
+    def share_of(self, name: str) -> Array:
+        """The part ``(n_owned, 2)`` that the supports ``name`` have of the reaction at each node."""
+        return self._prescribed.share_of(name)[: self.n_owned]
 
     def rigid_modes(self, body: Body) -> Array:
         """The rigid motions ``(3, n_local, 2)`` of the ``body``: along x, along y, and turning. Collective."""
@@ -146,7 +172,7 @@ class Drives:
                 here = nodes[np.abs(self._x[nodes] - place).max(axis=1) < _SAME_PLACE * np.abs(away).max()]
                 found.append(np.zeros((self._n_local, 2)))
                 found[-1][here, axis] = 1.0
-                self._holder[here, axis] = len(self._supports)
+                self._holder[here, axis] = len(self._prescribed.names)
         return np.array(found).reshape(len(found), self._n_local, 2)
 
     def measure(self, cells: str = "", facets: str = "") -> Any:

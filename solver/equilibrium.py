@@ -200,7 +200,7 @@ class Equilibrium:
         drives, means = self.drives, [mean.drive for mean in self.problem.means if mean.name == name]
         levels = [drives.names.index(drive) for drive in means]
         spread = np.tensordot(self.levels[levels], drives.applied[levels], 1)
-        return np.where(drives.held_by(name), self._reaction, 0.0) + spread
+        return drives.share_of(name) * self._reaction + spread
 
     def conjugates(self) -> Array:
         """What is conjugate to the levels ``(d,)``, of the modelled part: forces on what moves, that of contact on

@@ -44,7 +44,11 @@ class Drive:
 
     def value(self, factor: float) -> float:
         """The value at the load ``factor``."""
-        return float(np.interp(factor, np.arange(len(self.path)), self.path)) if len(self.path) else factor
+        return float(self.values(np.array(factor)))
+
+    def values(self, factors: Array) -> Array:
+        """The values at the load ``factors``."""
+        return np.interp(factors, np.arange(len(self.path)), self.path) if len(self.path) else factors
 
 
 @dataclass(frozen=True)
@@ -52,8 +56,12 @@ class Support:
     """Component ``axis`` of the displacement of a facet set is ``rate`` times that of the ``drive``.
 
     ``rate`` is a number, or a function of the nodes' positions ``(n, 2)`` that returns ``(n,)``. Supports of one
-    ``name`` have one reaction, and where they share nodes their drives add up; of different names the last one counts
-    there. Drives "x", "y", "turn" of one name, at rates 1, 1, ``(Y - y, x - X)``, are a rigid reference point (X, Y).
+    ``name`` have one reaction, and those of one set their drives add up. Drives "x", "y", "turn" of one name, at rates
+    1, 1, ``(Y - y, x - X)``, are a rigid reference point (X, Y).
+
+    Where sets share a node, a support without a rate wins over a displacement, with a warning. It must not meet a set
+    that moves as one, under a force or along both axes, unless that keeps the node at rest. All other supports of a
+    node must move it alike. Those that hold a node together have equal parts of its reaction.
     """
 
     name: str

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import basix.ufl
 import numpy as np
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
 from archord.geometry.basis import Array
@@ -31,6 +32,13 @@ if TYPE_CHECKING:
 _AT_REST = 10.0  # times the round-off: forces that are none
 
 
+def displacement_space(mesh: Mesh, degree: int) -> fem.FunctionSpace:
+    """Displacements of ``degree`` on ``mesh``, by their values at evenly spaced nodes. Collective."""
+    variant = basix.LagrangeVariant.equispaced
+    element = basix.ufl.element("P", mesh.basix_cell(), degree, shape=(2,), lagrange_variant=variant)
+    return fem.functionspace(mesh, element)
+
+
 class System:
     """``problem`` ready to be solved; forces and energies are those of the whole, its symmetric parts included.
 
@@ -41,10 +49,8 @@ class System:
     def __init__(self, problem: Problem, *, timer: Timer | None = None) -> None:
         self.problem, self.timer, self.comm = problem, timer or Timer(), problem.mesh.mesh.comm
         with self.timer("setup"):
-            variant = basix.LagrangeVariant.equispaced
-            mesh, degree = problem.mesh.mesh, problem.degree
-            element = basix.ufl.element("P", mesh.basix_cell(), degree, shape=(2,), lagrange_variant=variant)
-            self.V = fem.functionspace(mesh, element)
+            mesh = problem.mesh.mesh
+            self.V = displacement_space(mesh, problem.degree)
             materials = {problem.tag(body): body.material for body in problem.bodies}
             cells = {problem.tag(body): problem.cells_of(body) for body in problem.bodies}
             self.bulk = Bulk(self.V, cells, materials)
@@ -123,6 +129,11 @@ class System:
     def drive_displacement(self, name: str) -> float:
         """Displacement of the drive ``name``."""
         return float(self.driven()[0][self.drive_names.index(name)])
+
+    @property
+    def warnings(self) -> list[str]:
+        """Displacements that nodes do not follow, as supports fix them."""
+        return self.equilibrium.drives.warnings
 
     @property
     def stabilisation_energy(self) -> float:

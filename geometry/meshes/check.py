@@ -226,7 +226,9 @@ def _overlaps(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], allowed: float)
             away = np.linalg.norm(to - xi[..., None] * along, axis=2)
             depth = np.where(away.min(axis=1) > spare[away.argmin(axis=1)], away.min(axis=1), 0.0)
             if depth.any():
-                yield f"the body {a!r} lies {depth.max():.3g} deep in the body {b!r} at {_at(part[depth.argmax()])}"
+                deep, at = f"{depth.max():.3g}", _at(part[depth.argmax()])
+                cure = f"draw them apart, or, if they are pressed together, give their interaction overlap = {deep}"
+                yield f"the body {a!r} lies {deep} deep in the body {b!r} at {at}: {cure}"
                 break
 
 

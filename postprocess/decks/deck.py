@@ -82,8 +82,8 @@ def moved_sets(system: System, mesh: DeckMesh) -> list[Moved]:
     for s in system.problem.supports:
         nodes = mesh.node_sets[s.facets]
         own = drives.held_by(s.name)[mesh.dofs[nodes], s.axis]
-        rates = dict(zip(drives.names, drives.rate[:, mesh.dofs[nodes[own]], s.axis], strict=False))
-        rates = {drive: rate for drive, rate in rates.items() if rate.any()}
+        per_drive = [rate[mesh.dofs[nodes[own]], s.axis] for rate in drives.rate[: len(drives.names)]]
+        rates = {drive: rate for drive, rate in zip(drives.names, per_drive, strict=True) if rate.any()}
         if own.any():
             out[s.facets, s.axis] = Moved(s.facets, s.axis, nodes[own], rates, bool(own.all()))
     for i in system.problem.interactions:

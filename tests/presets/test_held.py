@@ -111,3 +111,98 @@ def test_a_tie_holds_in_both_directions(squares):
     tie = [{"name": "tie", "surfaces": ["lower t", "upper b"], "law": "tied"}]
     support = [{"name": "base", "on": "lower b", "fixed": ["x", "y"]}]
     assert account(squares, interaction=tie, support=support).warnings() == []
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """Makes two squares of 10 mm, of which the upper one is drawn this far above the lower one."""
+    folder = tmp_path_factory.mktemp("drawn")
+
+    def mesh(gap: float) -> str:
+        path = str(folder / f"{gap}.msh")
+        gmsh.initialize()
+        gmsh.option.setNumber("General.Terminal", 0)
+        for k, name in enumerate(("lower", "upper")):
+            face = gmsh.model.occ.addRectangle(0, k * (10 + gap), 0, 10, 10)
+            gmsh.model.occ.synchronize()
+            gmsh.model.addPhysicalGroup(2, [face], name=name)
+            for side, (_, line) in zip("brtl", gmsh.model.getBoundary([(2, face)], oriented=False), strict=True):
+                gmsh.model.addPhysicalGroup(1, [line], name=f"{name} {side}")
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 5)
+        gmsh.option.setNumber("Mesh.ElementOrder", 2)
+        gmsh.model.mesh.generate(2)
+        gmsh.write(path)
+        gmsh.finalize()
+        return path
+
+    return mesh
+
+
+def fit(file: str, **fits) -> GeneralAccount:
+    return account(file, interaction=[{"name": "fit", "surfaces": ["lower t", "upper b"]} | fits])
+
+
+@pytest.mark.parametrize(
+    ("gap", "fits", "said"),
+    [
+        (-0.1, {"interference": 0.1}, "'fit' are drawn 0.1 deep in each other, and its interference of 0.1 would push"),
+        (-0.1, {"interference": 0.1, "overlap": 0.1}, "give overlap = 0.1 alone"),
+        (-0.1, {"interference": 0.06, "overlap": 0.1}, "give overlap = 0.1 alone"),
+        (-0.1, {}, "'lower' lies 0.1 deep in the body 'upper' .* give their interaction overlap = 0.1"),
+    ],
+)
+def test_a_fit_is_not_counted_twice(drawn, gap, fits, said):
+    with pytest.raises(InputError, match=said):
+        fit(drawn(gap), **fits)
+
+
+@pytest.mark.parametrize(
+    ("gap", "fits", "said"),
+    [
+        (-0.1, {"overlap": 0.1}, []),
+        (0.0, {"interference": 0.1}, []),
+        (-0.1, {"overlap": 0.1, "interference": 0.02}, []),
+        (-0.02, {"interference": 0.1}, ["drawn 0.02 deep in each other, which adds to its interference of 0.1"]),
+        (0.04, {"interference": 0.1}, ["drawn 0.04 apart: of its interference of 0.1 only 0.06 presses"]),
+    ],
+)
+def test_a_fit_that_is_not_as_drawn_is_said(drawn, gap, fits, said):
+    warnings = fit(drawn(gap), **fits).warnings()
+    assert len(warnings) == len(said)
+    assert all(part in warning for part, warning in zip(said, warnings, strict=True))
+
+
+def by_force_on_an_edge(order):
+    parts = [{"name": "base", "on": "lower b", "fixed": ["x", "y"]}, {"name": "wall", "on": "upper l", "fixed": ["x"]}]
+    pull = {"name": "pull", "on": "upper b", "direction": "x", "force": 1.0}
+    press = {"name": "press", "on": "upper t", "direction": "y", "displacement": -0.01}
+    return {"support": parts[::order], "load": [pull, press][::order]}
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_force_on_an_edge_that_a_support_ends_is_refused(squares, order):
+    said = r"'wall' .on 'upper l'. fixes the node at .0, 10. in x, which 'pull' .on 'upper b'. moves together with"
+    with pytest.raises(InputError, match=said):
+        account(squares, **by_force_on_an_edge(order))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_displacement_of_a_body_leaves_its_support_at_rest(squares, order):
+    loads = [{"name": "all", "on": "upper", "direction": "x", "displacement": 0.1}]
+    loads += [{"name": "press", "on": "upper t", "direction": "y", "displacement": -0.01}]
+    (said,) = account(squares, load=loads[::order]).warnings()
+    assert said.startswith("'wall' (on 'upper l') fixes nodes that 'all' (on 'upper') would move in x, as at (0, 10)")
+
+
+def test_a_displacement_beyond_the_mesh_is_refused_before_the_solve(squares):
+    far = [{"name": "press", "on": "upper t", "direction": "y", "displacement": [-0.01, -20.5]}]
+    said = "the load 'press' moves 'upper t' by -20.5, but the whole mesh is 20 large"
+    with pytest.raises(InputError, match=said):
+        account(squares, load=far)
+    assert account(squares, load=far, analysis={"strain": "large"})
+
+
+@pytest.mark.parametrize(("friction", "asked"), [(0.3, False), (1.5, False), (15.0, True), (1e3, False)])
+def test_friction_in_per_cent_is_asked_about(squares, friction, asked):
+    warnings = fit(squares, friction=friction).warnings()
+    assert [warning.endswith("is it in per cent? Then give 0.15") for warning in warnings] == [True][:asked]

@@ -195,3 +195,65 @@ def test_the_example_is_a_scene():
     assert parse_any(tomllib.loads(example(general=True))).body[0].name == "pin"
     hidden = "\n".join(line.removeprefix("# ") for line in example(general=True).splitlines()[2:])
     assert tomllib.loads(hidden)["interaction"][0]["rigid"]["radius"] == 10.0
+
+
+NAMED = {
+    ("load", 0, "x [mm]"): 'load "x [mm]".name = "x [mm]" must not hold " [", which begins the unit',
+    ("load", 0, " press"): "must not begin or end with a space",
+    ("support", 0, "a\u2028b"): "must be text on one line",
+    ("support", 0, "contact force"): (
+        'interaction "contact".name = "contact" makes the column \'contact force x\' of history.csv, '
+        "as the support 'contact force' does: rename one of them"
+    ),
+    ("load", 0, "lug at"): None,
+    ("support", 0, "point x"): "is what results call a motion of the coupling 'point': rename one of them",
+    ("load", 0, "point rotation"): "is what results call a motion of the coupling 'point': rename one of them",
+    ("load", 0, 'a, "b"/δ'): None,
+    ("load", 0, "step"): None,
+}
+
+
+@pytest.mark.parametrize("case", NAMED)
+def test_names_that_would_lose_a_column_are_refused(case):
+    section, number, name = case
+    data = lug()
+    data[section][number]["name"] = name
+    if NAMED[case] is None:
+        assert parse_any(data)
+        return
+    with pytest.raises(InputError) as fault:
+        parse_any(data)
+    assert NAMED[case] in str(fault.value)
+
+
+@pytest.mark.parametrize("name", ["load", "accepted", ".", "..", "a/b", "/a"])
+def test_a_surface_has_a_name_that_contact_h5_can_hold(name):
+    data = lug()
+    data["interaction"][0]["surfaces"] = ["pin", name]
+    with pytest.raises(InputError, match="rename the set in the mesh"):
+        parse_any(data)
+
+
+def test_a_coupling_turns_by_a_right_angle_at_most():
+    data = lug()
+    data["load"].append({"name": "turn", "on": "point", "direction": "rotation", "displacement": 90.0})
+    with pytest.raises(InputError, match=r"must be at most 1.5708, a right angle in radians"):
+        parse_any(data)
+
+
+def test_an_override_changes_the_shape_of_a_preset(tmp_path):
+    path = tmp_path / "lug.toml"
+    data = tomllib.loads(LUG) | {
+        "mesh": {"shape": {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0}},
+    }
+    path.write_text(resolved(parse_any(data)))
+    assert load_scene(path, ["mesh.shape.radius=9.0"]).mesh.shape.radius == 9.0
+    for override, said in {
+        "mesh.shape.radius=-9.0": "--set mesh.shape.radius=-9.0: mesh.shape.radius must be",
+        "mesh.shape.radus=9.0": "did you mean radius?",
+        "mesh.shape.a.b=1": "must read section.key=value",
+        "mesh.form.radius=1": "must read section.key=value",
+    }.items():
+        with pytest.raises(InputError) as fault:
+            load_scene(path, [override])
+        assert said in str(fault.value)

@@ -1,0 +1,86 @@
+"""The columns of history.csv that parts of a general scene make, and names that do not go together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from archord.scene.keys import require
+
+if TYPE_CHECKING:
+    from archord.scene.parts import Coupling
+    from archord.scene.problem import ProblemScene
+
+_FREEDOMS = ("x", "y", "rotation")
+Column = tuple[str, str, str, str]  # section and name of the part, what its name is followed by, unit
+
+
+def part_columns(scene: ProblemScene) -> dict[str, str]:
+    """Units of the columns of loads, supports, interactions and bodies of ``scene``, by name and in order."""
+    return {f"{part} {what}": unit for _, part, what, unit in _columns(scene)}
+
+
+def supporting(scene: ProblemScene) -> list[str]:
+    """Names of what has a reaction: supports of sets, and rigid couplings."""
+    couplings = {coupling.name for coupling in scene.coupling}
+    supports = [support.name for support in scene.support if support.on not in couplings]
+    return [*supports, *(coupling.name for coupling in scene.coupling if coupling.kind == "rigid")]
+
+
+def require_different(scene: ProblemScene) -> None:
+    """Raise `Fault` where two parts of ``scene`` make one column, or a name is that of a coupling's motion."""
+    first: dict[str, tuple[str, str]] = {}
+    for section, part, what, _ in _columns(scene):
+        column = f"{part} {what}"
+        other = first.setdefault(column, (section, part))
+        said = f"makes the column {column!r} of history.csv, as the {other[0]} {other[1]!r} does: rename one of them"
+        require(other == (section, part), (section, part, "name"), said)
+    motions = {f"{c.name} {freedom}": c.name for c in scene.coupling for freedom in _motions(scene, c)}
+    given = {coupling.name: "coupling" for coupling in scene.coupling}
+    given |= {support.name: "support" for support in scene.support if support.name in supporting(scene)}
+    given |= {load.name: "load" for load in scene.load}
+    for name, section in given.items():
+        said = f"is what results call a motion of the coupling {motions.get(name)!r}: rename one of them"
+        require(name not in motions, (section, name, "name"), said)
+
+
+def _motions(scene: ProblemScene, coupling: Coupling) -> list[str]:
+    """Freedoms of the ``coupling`` that are solved for by a name made of its own.
+
+    They are free ones of a rigid coupling, held ones of a distributing one; a load gives its name
+    instead.
+    """
+    loaded = {load.direction for load in scene.load if load.on == coupling.name}
+    held = {freedom for support in scene.support if support.on == coupling.name for freedom in support.fixed}
+    solved = held if coupling.kind == "distributing" else {*_FREEDOMS} - held
+    return sorted(solved - loaded)
+
+
+def _columns(scene: ProblemScene) -> Iterator[Column]:
+    units = scene.units
+    length = units.length
+    thickness = scene.analysis.thickness
+    force = units.force_of(thickness)
+    moment = units.energy_of(thickness)
+    area = f"{length}{3 if thickness else 2}"  # displaced, over the thickness a volume
+    for load in scene.load:
+        moved, by = ("rad", moment) if load.direction == "rotation" else (length, force)
+        if load.kind == "pressure":
+            moved, by = area, units.stress
+        yield "load", load.name, "displacement", moved
+        yield "load", load.name, "force", by
+    couplings = {coupling.name for coupling in scene.coupling}
+    for name in supporting(scene):
+        section = "coupling" if name in couplings else "support"
+        for what, unit in (("x", force), ("y", force), ("moment", moment)):
+            yield section, name, what, unit
+    for interaction in scene.interaction:
+        pressed = {"force x": force, "force y": force, "largest pressure": units.stress}
+        placed = dict.fromkeys(("at x", "at y", "contact length", "largest slip"), length)
+        rubbed = {"moment": moment, "largest shear": units.stress} if interaction.friction else {}
+        for what, unit in (pressed | placed | {"arcs": ""} | rubbed).items():
+            yield "interaction", interaction.name, what, unit
+    for body in scene.body:
+        if body.yield_stress is not None:
+            for what, unit in (("peeq_max", ""), ("at x", length), ("at y", length)):
+                yield "body", body.name, what, unit

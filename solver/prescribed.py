@@ -1,0 +1,214 @@
+"""Prescribed displacements of nodes, and what holds where the sets of several supports share a node.
+
+What fixes a node wins over a displacement. Whatever else meets at a node must move it alike. So the order of supports
+has no part in a result.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from archord.geometry.basis import Array
+from archord.solver.problem import Drive, Problem, Support
+
+_ALIKE = 1e-9  # of the larger of two displacements: a difference that is round-off
+_AXES = "xy"
+Place = tuple[float, float]
+
+
+@dataclass
+class _Motion:
+    """What the supports of one name prescribe for one set along one axis.
+
+    nodes (k,): block dofs on this rank, ghosts included
+    rate (d, k): their displacement per unit of each drive
+    moves: whether any drive moves the set; if not, it is fixed
+    together: whether the set must move as one, as it does under a force, or where both axes are prescribed
+    """
+
+    name: str
+    facets: str
+    axis: int
+    nodes: np.ndarray
+    rate: Array
+    moves: bool = False
+    together: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.name!r}" if self.name == self.facets else f"{self.name!r} (on {self.facets!r})"
+
+
+class Prescribed:
+    """What the supports of ``problem`` prescribe for the nodes of ``V``, by its ``drives``. Collective.
+
+    names: those of the supports
+    rate (d, n_local, 2): displacements of the nodes per unit of each drive
+    holder (n_local, 2): number of the name that a displacement is prescribed by, the last of several; -1 if it is free
+    warnings: displacements that nodes do not follow, as supports fix them
+
+    Raises ValueError on all ranks where supports contradict each other.
+    """
+
+    def __init__(self, problem: Problem, V: fem.FunctionSpace, drives: list[Drive]) -> None:
+        self._problem, self._V, self._drives = problem, V, drives
+        self._comm = V.mesh.comm
+        self._x = V.tabulate_dof_coordinates()[:, :2]
+        self._size = self._comm.allreduce(np.abs(self._x).max(initial=0.0), op=MPI.MAX)
+        n_local = len(self._x)
+        self.names = list(dict.fromkeys(s.name for s in problem.supports))
+        self.rate = np.zeros((len(drives), n_local, 2))
+        self.holder = np.full((n_local, 2), -1)
+        self.warnings: list[str] = []
+        self._holds = np.zeros((len(self.names), n_local, 2), dtype=bool)
+        motions = self._collected()
+        self._course = _courses(drives)
+        fixing = [motion for motion in motions if not motion.moves]
+        moving = [motion for motion in motions if motion.moves]
+        for motion in fixing:
+            self._note(motion, motion.nodes)
+        fixed = self.holder >= 0
+        largest = np.array([np.abs(self._displaced(motion)).max(initial=0.0) for motion in moving])
+        self._comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
+        self._require_free(moving, fixing, fixed, _ALIKE * largest)
+        self._require_alike(moving, fixed, _ALIKE * largest)
+        meeting = np.zeros((n_local, 2))
+        for motion in moving:
+            free = ~fixed[motion.nodes, motion.axis]
+            nodes = motion.nodes[free]
+            self._note(motion, nodes)
+            self.rate[:, nodes, motion.axis] += motion.rate[:, free]
+            meeting[nodes, motion.axis] += 1
+        self.rate /= np.maximum(meeting, 1)
+
+    def share_of(self, name: str) -> Array:
+        """The part ``(n_local, 2)`` of the reaction at each node that is of the supports ``name``: equal parts where
+        several hold a node."""
+        if name not in self.names:
+            return np.zeros(self.holder.shape)
+        return self._holds[self.names.index(name)] / np.maximum(self._holds.sum(axis=0), 1)
+
+    def _collected(self) -> list[_Motion]:
+        """All motions, sorted by their names. Raises ValueError for a drive that is given twice."""
+        found: dict[tuple[str, str, int], _Motion] = {}
+        given: set[tuple[str, str, int, str]] = set()
+        number = {drive.name: k for k, drive in enumerate(self._drives)}
+        by_force = {drive.name for drive in self._drives if drive.control == "force"}
+        for s in self._problem.supports:
+            key = s.name, s.facets, s.axis
+            if key not in found:
+                nodes = self._problem.mesh.dofs_in(self._V, s.facets)
+                found[key] = _Motion(*key, nodes, np.zeros((len(self._drives), len(nodes))))
+            if not s.moves:
+                continue
+            if (*key, s.drive) in given:
+                raise ValueError(f"{s.name!r} gives {s.facets!r} two rates in {_AXES[s.axis]} by the drive {s.drive!r}")
+            given.add((*key, s.drive))
+            motion = found[key]
+            motion.rate[number[s.drive]] = self._rate(s, motion.nodes)
+            motion.moves = True
+            motion.together |= s.drive in by_force
+        for (name, facets, axis), motion in found.items():
+            motion.together |= (name, facets, 1 - axis) in found
+        return [found[key] for key in sorted(found)]
+
+    def _rate(self, support: Support, nodes: np.ndarray) -> Array | float:
+        return support.rate(self._x[nodes]) if callable(support.rate) else support.rate
+
+    def _note(self, motion: _Motion, nodes: np.ndarray) -> None:
+        name = self.names.index(motion.name)
+        self.holder[nodes, motion.axis] = name
+        self._holds[name, nodes, motion.axis] = True
+
+    def _displaced(self, motion: _Motion) -> Array:
+        """What tells apart how the motion's nodes are displaced along the path ``(k, d)``."""
+        return motion.rate.T @ self._course
+
+    def _require_free(self, moving: list[_Motion], fixing: list[_Motion], fixed: np.ndarray, round_off: Array) -> None:
+        """Warn where a motion meets what fixes. Raises ValueError where that leaves nothing of it, or bends a set that
+        must move as one."""
+        free = np.zeros(len(moving), dtype=np.int64)
+        met: list[tuple[int, int, Place]] = []
+        for m, motion in enumerate(moving):
+            held = fixed[motion.nodes, motion.axis]
+            free[m] = np.count_nonzero(~held)
+            away = np.abs(self._displaced(motion)).max(axis=1, initial=0.0) > round_off[m]
+            for f, fix in enumerate(fixing):
+                if fix.axis == motion.axis:
+                    met += self._first_place(m, f, np.intersect1d(motion.nodes[held & away], fix.nodes))
+        free = self._comm.allreduce(free)
+        for m, f, place in self._everywhere(met):
+            motion, fix = moving[m], fixing[f]
+            axis, at = _AXES[motion.axis], _at(place)
+            if not free[m]:
+                raise ValueError(
+                    f"{motion} moves nothing: supports fix all its nodes in {axis}, {fix} the one at {at}; "
+                    "move another set, or fix less"
+                )
+            if motion.together:
+                raise ValueError(
+                    f"{fix} fixes the node at {at} in {axis}, which {motion} moves together with all its set: "
+                    f"fix what moves the set in {axis}, too, leave the node out of one of the sets, or load the set by "
+                    "a pressure or a distributing coupling"
+                )
+            self.warnings.append(
+                f"{fix} fixes nodes that {motion} would move in {axis}, as at {at}: they stay where they are, and the "
+                "stress beside them grows as the mesh gets finer"
+            )
+
+    def _require_alike(self, moving: list[_Motion], fixed: np.ndarray, round_off: Array) -> None:
+        """Raise ValueError where two motions of a node that nothing fixes differ."""
+        met: list[tuple[int, int, Place]] = []
+        for a, b in combinations(range(len(moving)), 2):
+            first, second = moving[a], moving[b]
+            if first.axis != second.axis:
+                continue
+            common, i, j = np.intersect1d(first.nodes, second.nodes, return_indices=True)
+            difference = np.abs(self._displaced(first)[i] - self._displaced(second)[j])
+            unlike = difference.max(axis=1, initial=0.0) > max(round_off[a], round_off[b])
+            met += self._first_place(a, b, common[unlike & ~fixed[common, first.axis]])
+        for a, b, place in self._everywhere(met):
+            raise ValueError(
+                f"{moving[a]} and {moving[b]} move their common node at {_at(place)} differently in "
+                f"{_AXES[moving[a].axis]}: leave it out of one of the sets, let both move alike, or load one of them "
+                "by a pressure or a distributing coupling"
+            )
+
+    def _first_place(self, a: int, b: int, nodes: np.ndarray) -> list[tuple[int, int, Place]]:
+        """Where the motions ``a`` and ``b`` meet first, by x and y, at ``nodes`` of this rank; nothing without any."""
+        digits = _ALIKE * self._size
+        places = [tuple((np.round(x / digits) * digits + 0.0).tolist()) for x in self._x[nodes]]
+        return [(a, b, min(places))] if places else []
+
+    def _everywhere(self, met: list[tuple[int, int, Place]]) -> list[tuple[int, int, Place]]:
+        """What met on any rank, each pair once, in an order that all ranks agree on. Collective."""
+        first: dict[tuple[int, int], Place] = {}
+        for a, b, place in sorted(found for here in self._comm.allgather(met) for found in here):
+            first.setdefault((a, b), place)
+        return [(a, b, place) for (a, b), place in first.items()]
+
+
+def _courses(drives: list[Drive]) -> Array:
+    """What tells drives apart ``(d, d)``: rows of drives that move alike along the path are equal.
+
+    Displacements are compared at the load factors 0, 1, 2, ..., where paths have their corners. A drive under a force,
+    whose displacement is unknown, is like itself alone. Rows keep their scalar products when columns are reduced to d.
+    """
+    count = len(drives)
+    factors = np.arange(max((len(drive.path) for drive in drives), default=0) + 2.0)
+    courses = np.zeros((count, len(factors) + count))
+    for k, drive in enumerate(drives):
+        if drive.control == "force":
+            courses[k, len(factors) + k] = 1.0
+        else:
+            courses[k, : len(factors)] = drive.values(factors)
+    reduced: Array = np.asarray(np.linalg.qr(courses.T, mode="r"))
+    return reduced.T
+
+
+def _at(place: Place) -> str:
+    return f"({place[0]:g}, {place[1]:g})"
