@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from archord.output.disk import replace_file
+from archord.output.finished import fault_of_run
 from archord.output.folder import occupied, report_of
 from archord.scene.errors import InputError
 from archord.scene.keys import toml_value
@@ -33,13 +34,15 @@ Row = list[str]
 @dataclass(frozen=True)
 class Result:
     """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be written), "failed"
-    (an error), "interrupted", "busy" (another process solves it) or "open"; ``seconds`` are those of this process."""
+    (an error), "interrupted", "busy" (another process solves it) or "open", also where files of a finished case are
+    ``damaged``, as ``message`` says; ``seconds`` are those of this process."""
 
     run: str
     status: str
     message: str = ""
     steps: int = 0
     seconds: float = 0.0
+    damaged: bool = False
 
 
 def of_case(case: Case, folder: Path) -> Path:
@@ -55,6 +58,10 @@ def result_of(case: Case, folder: Path) -> Result:
     report = report_of(run)
     status, steps = report.get("status"), len(report.get("steps", []))
     between_meshes = case.scene.analysis.accuracy is not None and status == "done" and "accuracy" not in report
+    if status == "done" and not between_meshes:
+        fault = fault_of_run(run, case.scene, report)
+        if fault:
+            return Result(case.run, "open", f"{run}: {fault}", damaged=True)
     if status in ("done", "stopped", "interrupted") and not between_meshes:
         return Result(case.run, status, report.get("message", ""), steps)
     return Result(case.run, "open", steps=steps)
@@ -89,12 +96,18 @@ def part_of(cases: list[Case], part: str) -> list[Case]:
     return longest[int(found[1]) - 1 :: int(found[2])]
 
 
-def open_cases(cases: list[Case], folder: Path, *, retry: bool) -> tuple[list[Result], list[Case]]:
-    """What of ``cases`` has ended already, and those that are left; with ``retry`` also those that failed."""
+def open_cases(
+    cases: list[Case], folder: Path, *, retry: bool = False, force: bool = False
+) -> tuple[list[Result], list[Case], list[Result]]:
+    """What of ``cases`` has ended already, those that are left, and the damaged ones among them; with ``retry`` those
+    that stopped or failed are left, too, with ``force`` all."""
     over = ("done",) if retry else ("done", "stopped", "failed")
+    if force:
+        return [], cases, []
     results = [result_of(case, folder) for case in cases]
     left = [case for case, result in zip(cases, results, strict=True) if result.status not in over]
-    return [result for result in results if result.status in over], left
+    damaged = [result for result in results if result.damaged]
+    return [result for result in results if result.status in over], left, damaged
 
 
 def expected_seconds(scene: Scene) -> float:
@@ -128,7 +141,7 @@ def write_tables(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> 
 
 def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Row], list[Row]]:
     """Headings and rows of both tables."""
-    histories = {run: _history(folder / CASES / run) for run in found}
+    histories = {run: [] if found[run].damaged else _history(folder / CASES / run) for run in found}
     headings = sorted((rows[0] for rows in histories.values() if rows), key=len, reverse=True)
     history = list(dict.fromkeys(name for names in headings for name in names))  # of all: some bodies cannot yield
     last = [i for i, name in enumerate(history) if name not in _PER_STEP]
