@@ -105,7 +105,7 @@ def picture(folder: Path, output: Path | None) -> int:
 @click.option("--over", type=float, metavar="LENGTH", help="over P / LENGTH, the mean stress in a section")
 @output("table (.csv) or picture to write")
 def probe(folder: Path, angles: tuple[float, ...], over: float | None, output: Path | None, **asked: Any) -> int:
-    """Print a quantity along an edge or a line of a run, its largest value and where; and draw it."""
+    """Print a quantity along an edge or a line of a run, its largest and smallest value and where; and draw it."""
     from archord.postprocess.run import Run
     from archord.postprocess.tables import probe_text
 

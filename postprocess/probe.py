@@ -1,4 +1,5 @@
-"""A quantity along a named edge or a line of a run: its largest value, and where, and its factor over a section."""
+"""A quantity along a named edge or a line of a run: its largest and smallest value, and where, and its factor over a
+section."""
 
 from __future__ import annotations
 
@@ -45,8 +46,18 @@ class Probe:
 
     @property
     def largest(self) -> int:
-        """Number of the point with the largest value."""
+        """Number of the point with the largest value, the most tensile of a stress."""
         return int(np.argmax(self.values))
+
+    @property
+    def smallest(self) -> int:
+        """Number of the point with the smallest value, the most compressive of a stress."""
+        return int(np.argmin(self.values))
+
+    def where(self, k: int) -> str:
+        """The place of point ``k`` in words: its angle, or how far along the edge or line it is; and x and y."""
+        along = f"s = {self.s[k]:.6g}" if self.angle is None else f"{self.angle[k]:.4g}°"
+        return f"at {along}, x = {self.x[k, 0]:.6g}, y = {self.x[k, 1]:.6g}"
 
     def at(self, angle: float) -> float:
         """The value at an ``angle`` in degrees. Raises `InputError` if the edge has none there."""

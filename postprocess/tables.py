@@ -63,12 +63,13 @@ def comparison_text(comparison: Comparison) -> str:
 
 
 def probe_text(probe: Probe, angles: Iterable[float]) -> str:
-    """A quantity along an edge or a line, its largest value and where that is, and its values at ``angles``."""
-    k, unit = probe.largest, f" {probe.unit}".rstrip()
-    where = "" if probe.angle is None else f" at {probe.angle[k]:.4g}°"
+    """A quantity along an edge or a line, its largest and smallest value and where they are, and its values at
+    ``angles``."""
+    unit = f" {probe.unit}".rstrip()
     force = f"step {probe.step}, {probe.by or 'force'} = {probe.force:.6g} per unit thickness"
     lines = [_thinned(_table_of(probe.frame()), "-o FILE.csv"), "", f"{probe.quantity} along {probe.place}, {force}"]
-    lines += [f"largest: {probe.values[k]:.6g}{unit}{where}, x = {probe.x[k, 0]:.6g}, y = {probe.x[k, 1]:.6g}"]
+    for name, k in (("largest", probe.largest), ("smallest", probe.smallest)):
+        lines.append(f"{name}: {probe.values[k]:.6g}{unit} {probe.where(k)}")
     return "\n".join([*lines, *(f"at {angle:g}°: {probe.at(angle):.6g}{unit}" for angle in angles)])
 
 
