@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _SAME = 1e-9  # relative difference of a number in history.csv, of 12 digits, and in run.json
 _NOTHING = 1e-290
 
+
 def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Any]) -> None:
     """Replace ``path`` by the table of ``steps`` in one move; whole numbers stay whole. Raises `OSError`."""
     text = io.StringIO(newline="")

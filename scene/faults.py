@@ -5,7 +5,10 @@ from __future__ import annotations
 import difflib
 import json
 import re
+from types import SimpleNamespace
 from typing import Any, get_args
+
+from pydantic.fields import FieldInfo
 
 from archord.scene.keys import Fault, Section, toml_value
 
@@ -46,6 +49,16 @@ def in_sentences(
     meant = {(*place[:-1], _known_keys(model, place)["near"]) for place in unknown}
     errors = [error for error in errors if error["type"] != "missing" or error["loc"] not in meant]
     return "\n".join(_sentence(error, data, model, source, origin) for error in errors[:_MOST_SENTENCES])
+
+
+def of_section(errors: list[Any], data: dict[str, Any], section: type[Section]) -> str:
+    """`in_sentences` of a ``section`` that was made alone, from ``data``."""
+    name = section.__name__.lower()
+    place: tuple[str | int, ...] = (name, 0) if "name" in data else (name,)
+    shown = [data] if "name" in data else data
+    whole: Any = SimpleNamespace(model_fields={name: FieldInfo(annotation=section)})
+    placed = [{**error, "loc": (*place, *error["loc"])} for error in errors]
+    return in_sentences(placed, {name: shown}, whole, f"archord.{section.__name__}", {})
 
 
 def shortened(text: str, length: int = 80) -> str:
