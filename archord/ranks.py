@@ -6,6 +6,7 @@ MPI is loaded only by commands that all ranks work on, and only where a launcher
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Callable
 
@@ -33,6 +34,11 @@ def on_terminal() -> bool:
     """Whether somebody watches stdout. Under a launcher nobody can tell: Open MPI gives its ranks a terminal of their
     own even where it writes to a file itself."""
     return sys.stdout.isatty() and not any(name in os.environ for name in _RANK)
+
+
+def terminal_width() -> int:
+    """Characters of a line of the terminal that shows stdout; 0 where none does."""
+    return shutil.get_terminal_size().columns if on_terminal() else 0
 
 
 def run_on_ranks(command: str, work: Callable[[], int]) -> int:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
+import textwrap
 from collections.abc import Iterable
 from typing import Any
 
@@ -14,9 +16,11 @@ from archord.postprocess.probe import Probe
 from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.report.table import Table
-from archord.scene.faults import shortened
 
 _MOST = 40  # rows of a table
+_LONG = 100_000  # characters of a line, where no terminal breaks it
+_NARROW = 30  # the least of a wrapped line
+_CELL = 60  # of a key of a scene in a table
 _OF_A_JOINT = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "contact peeq_max")
 _SHOWN = ("step", "load_factor", "delta", *_OF_A_JOINT, "steps", "iterations", "cutbacks", "seconds")
 _OF_A_RUN = {  # what a comparison tells of each run
@@ -30,14 +34,16 @@ _OF_A_RUN = {  # what a comparison tells of each run
 }
 
 
-def run_text(run: Run) -> str:
-    """State, joint, history, peaks, cost and warnings of a run."""
+def run_text(run: Run, width: int = 0) -> str:
+    """State, joint, history, peaks, cost and warnings of a run, in lines no longer than ``width`` if that is given."""
     words = {"running": "running, or killed (if no archord works there, --restart continues it)"}
     state = f"{run.folder}: {words.get(run.status, run.status)}; {run.steps} of {len(run.scene.targets)} steps"
-    parts = [f"{state}: {run.message}" if run.message else state, Table("", "", rows=_facts(run), left=2)]
+    state = f"{state}: {run.message}" if run.message else state
+    parts = [*_lines(state, width or _LONG), "", _named(facts_of(run), width)]
     if run.steps:
-        parts += [_thinned(_history(run), run.folder / "history.csv"), _peaks(run)]
-    return "\n\n".join(map(str, (*parts, Table("", "", rows=_cost(run), left=2))))
+        history = _thinned(history_table(run), run.folder / "history.csv", width)
+        parts += ["", history, "", *_lines(peaks_of(run), width or _LONG)]
+    return "\n".join((*parts, "", _named(cost_of(run), width)))
 
 
 def sweep_text(sweep: Sweep) -> str:
@@ -58,8 +64,12 @@ def comparison_text(comparison: Comparison) -> str:
     parts = [_thinned(_differences(comparison, name, names), "history.csv") for name in comparison.values]
     rows = differing_keys([run.scene for run in comparison.runs])
     rows |= {name: [str(get(run)) for run in comparison.runs] for name, get in _OF_A_RUN.items()}
-    cells = ([key, *(shortened(value) or "-" for value in values)] for key, values in rows.items())
-    return "\n\n".join(map(str, (*parts, _note(comparison), Table("", *names, rows=cells, left=1 + len(names)))))
+    table = Table("", *names, left=1 + len(names))
+    for key, values in rows.items():
+        wrapped = (_lines(value, _CELL) or ["-"] for value in values)
+        for line in itertools.zip_longest([key], *wrapped, fillvalue=""):
+            table.add(*line)
+    return "\n\n".join(map(str, (*parts, _note(comparison), table)))
 
 
 def probe_text(probe: Probe, angles: Iterable[float]) -> str:
@@ -93,16 +103,36 @@ def _table_of(frame: Any) -> Table:
     return Table(*with_headings(frame), rows=(map(_cell, row) for row in frame.itertuples(index=False)))
 
 
-def _thinned(table: Table, whole: object) -> str:
-    """Up to 40 rows of the ``table``, evenly spaced, first and last included, and where the ``whole`` of it is."""
+def _named(rows: Iterable[tuple[str, str]], width: int) -> str:
+    """Text behind names, wrapped to lines no longer than ``width`` (or `_LONG`)."""
+    pairs = list(rows)
+    room = max(_NARROW, (width or _LONG) - 2 - max(len(name) for name, _ in pairs))
+    table = Table("", "", left=2)
+    for name, text in pairs:
+        first, *more = _lines(text, room) or [""]
+        table.add(name, first)
+        for line in more:
+            table.add("", line)
+    return str(table)
+
+
+def _lines(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False)
+
+
+def _thinned(table: Table, whole: object, width: int = 0) -> str:
+    """Up to 40 rows of the ``table``, evenly spaced, first and last included, and where the ``whole`` of it is; in
+    blocks of columns where a ``width`` is given."""
     n = len(table.rows)
+    if n > _MOST:
+        table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, _MOST)]
+    text = table.within(width) if width else str(table)
     if n <= _MOST:
-        return str(table)
-    table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, _MOST)]
-    return f"{table}\n{_MOST} of {n} rows; {whole} has all of them"
+        return text
+    return f"{text}\n{_MOST} of {n} rows; {whole} has all of them"
 
 
-def _facts(run: Run) -> Iterable[tuple[str, str]]:
+def facts_of(run: Run) -> Iterable[tuple[str, str]]:
     """What was solved: the joint, or the parts of a general scene; and on what mesh."""
     scene, mesh, plane = run.scene, run.summary.get("mesh", {}), f"plane {run.scene.analysis.plane}"
     if run.is_joint:
@@ -117,12 +147,12 @@ def _facts(run: Run) -> Iterable[tuple[str, str]]:
     for name, part in parts:
         keys = part.model_dump(exclude_none=True, exclude={"name"}).items()
         given = (f"{key} = {value}" for key, value in keys if value is not False and value not in ("", []))
-        yield name, shortened(", ".join(given))
+        yield name, ", ".join(given)
     counts = f"{mesh.get('cells', '?')} {mesh.get('kind', 'cells')} of degree {scene.analysis.degree}"
     yield "mesh", f"{counts}, {mesh.get('dofs', '?')} dofs; ranks: {run.summary.get('ranks', '?')}"
 
 
-def _history(run: Run) -> Table:
+def history_table(run: Run) -> Table:
     """The steps: loads and forces, pressures, angle, plastic strain, cost."""
     names = [name for name in _SHOWN if name in run.columns]
     if not run.is_joint:
@@ -131,7 +161,7 @@ def _history(run: Run) -> Table:
     return Table(*map(run.heading, names), rows=zip(*columns, strict=True))
 
 
-def _peaks(run: Run) -> str:
+def peaks_of(run: Run) -> str:
     """Largest values over the run, and where it first yielded."""
     h, said = run.columns, []
     names = [name for name in h if name in (*COMPARED, "peeq_max") or name.endswith(COMMON)]
@@ -147,7 +177,7 @@ def _peaks(run: Run) -> str:
     return f"largest: {', '.join(said)}"
 
 
-def _cost(run: Run) -> Iterable[tuple[str, str]]:
+def cost_of(run: Run) -> Iterable[tuple[str, str]]:
     """Iterations, errors, seconds by part, memory, versions, warnings."""
     for name in ("totals", "error_estimates", "seconds"):
         values = (f"{key} {value:.3g}" for key, value in run.summary.get(name, {}).items() if value is not None)
