@@ -29,7 +29,7 @@ def show(folder: Path, output: Path | None, pictures: bool) -> int:
         sweep = Sweep(folder)
         text, drawn = sweep_text(sweep), None
         if pictures and sweep.runs:
-            drawn = draw_runs(list(sweep.runs.values()), [f"case {case}" for case in sweep.runs], target)
+            drawn = draw_runs(list(sweep.runs.values()), [sweep.label(case) for case in sweep.runs], target)
     else:
         run = Run(folder)
         text, drawn = run_text(run, terminal_width()), draw_run(run, target) if pictures and run.steps else None

@@ -55,7 +55,8 @@ def sweep_text(sweep: Sweep) -> str:
     names = ["case", "run", *sweep.moving, "status", *(name for name in _SHOWN if name in cases and name != "delta")]
     lines += ["", _thinned(_table_of(cases[names]), sweep.folder / "cases.csv")]
     said = zip(cases["case"], cases["message"], strict=True)
-    return "\n".join([*lines, *(f"case {case}: {message}" for case, message in said if message)])
+    lines += [f"case {case}: {message}" for case, message in said if message]
+    return "\n".join([*lines, *(f"case {case} is left out: {fault}" for case, fault in sweep.unread.items())])
 
 
 def comparison_text(comparison: Comparison) -> str:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ from archord.postprocess.pictures.pictures import panels_of
 from archord.postprocess.pictures.problems import draw_outline
 from archord.postprocess.run import Run
 from archord.postprocess.tables import cost_of, facts_of, first_of_each_kind, history_table, peaks_of
+from archord.presets.measures import ENERGIES
 from archord.report.figure import new_figure
 from archord.report.table import Table
 from archord.report.version import VERSION
@@ -29,9 +29,12 @@ _PAGE = (8.27, 11.69)  # A4, in inches
 _MARGIN = 0.08  # of the page's width
 _SMALL = 7.0  # points
 _CHARACTERS = 112  # of a line of such text
-_LINES = 96  # of a page of it
+_LINES = 84  # of a page of it
+_LINES_BELOW = 58  # of a page below the mesh
+_TITLE = 36  # characters of a panel's title
 _ROWS = 30  # of the table of steps
-_MOST_PAGES = 2  # of that table
+_MOST_WARNINGS = 20
+
 _BALANCES = ("force_balance", "energy_balance", "newton_residual")
 
 
@@ -43,7 +46,7 @@ def write_report(run: Run, target: Path, *, force: bool = False) -> Path:
     run.number(None)
     check_target(target, force=force)
     # all is drawn before the file is begun: what a run lacks is told first
-    figures = [_problem_page(run), _results_page(run), *_table_pages(run)]
+    figures = list(_pages_of(run))
     new = new_name(target)
     try:
         with writing(target):
@@ -57,55 +60,55 @@ def write_report(run: Run, target: Path, *, force: bool = False) -> Path:
     return target
 
 
-def _problem_page(run: Run) -> Figure:
-    """State, scene and mesh; warnings, cost and versions."""
-    figure = _page(f"{run.folder.resolve().name}: {run.status}, {run.steps} of {len(run.scene.targets)} steps")
-    mesh, text = figure.subfigures(2, 1, height_ratios=[1, 2.2])
-    if run.scene.output.fields:
-        _draw_mesh(mesh.subplots(), run, run.fields(run.number(None)))
-    blocks = [run.message] if run.message else []
-    blocks += ["", *_listed(facts_of(run)), "", *_wrapped(peaks_of(run)), ""]
-    blocks += _listed(row for row in cost_of(run) if row[0] != "warning")
+def _text_of(run: Run) -> list[str]:
+    """What was solved, what came of it, cost, versions, warnings, and the table of steps, in lines."""
+    lines = [*_wrapped(run.message), *_listed(facts_of(run)), "", *_wrapped(peaks_of(run)), ""]
+    lines += _listed(row for row in cost_of(run) if row[0] != "warning")
     warnings = first_of_each_kind(run.warnings)
-    blocks += ["", *_listed([("warning", warning) for warning in warnings] or [("warnings", "none")])]
-    _put(text, blocks)
-    return figure
+    told = [("warning", warning) for warning in warnings[:_MOST_WARNINGS]]
+    if len(warnings) > _MOST_WARNINGS:
+        told.append(("", f"{len(warnings) - _MOST_WARNINGS} more in {run.folder / 'run.json'}"))
+    lines += ["", *_listed(told or [("warnings", "none")]), ""]
+    table = history_table(run)
+    n = len(table.rows)
+    if n > _ROWS:
+        table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, _ROWS)]
+        lines += [f"{_ROWS} of {n} steps; {run.folder / 'history.csv'} has all of them", ""]
+    return lines + table.within(_CHARACTERS).splitlines()
+
+
+def _pages_of(run: Run) -> Iterator[Figure]:
+    """The pages in their order; the text goes on behind the pictures where the first page is full."""
+    lines = _text_of(run)
+    figure = _page(f"{run.folder.resolve().name}: {run.status}, {run.steps} of {len(run.scene.targets)} steps")
+    room = _LINES
+    text: Any = figure
+    if run.scene.output.fields:
+        mesh, text = figure.subfigures(2, 1, height_ratios=[1, 2.2])
+        _draw_mesh(mesh.subplots(), run, run.fields(run.number(None)))
+        room = _LINES_BELOW
+    _put(text, lines[:room])
+    yield figure
+    yield _results_page(run)
+    for k in range(room, len(lines), _LINES):
+        figure = _page("continued")
+        _put(figure, lines[k : k + _LINES])
+        yield figure
 
 
 def _results_page(run: Run) -> Figure:
     """Field, contact pressure and forces, and how the solve converged."""
     figure = _page("results and convergence")
-    panels = [*panels_of(run), _iterations_panel(run), _balance_panel(run)]
+    panels = [*panels_of(run), _iterations_panel(run), _balance_panel(run), _energy_panel(run)]
     rows = (len(panels) + 1) // 2
     axes = figure.subplots(rows, 2, squeeze=False).ravel()
     for place, draw in zip(axes, panels, strict=False):
         draw(place)
+        title = [part for line in place.get_title().splitlines() for part in textwrap.wrap(line, _TITLE)]
+        place.set_title("\n".join(title), fontsize="medium")
     for place in axes[len(panels) :]:
         place.set_axis_off()
     return figure
-
-
-def _table_pages(run: Run) -> Iterable[Figure]:
-    """The table of steps, in blocks of columns; on two pages at most."""
-    table = history_table(run)
-    n = len(table.rows)
-    note = []
-    if n > _ROWS:
-        table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, _ROWS)]
-        note = ["", f"{_ROWS} of {n} steps; {run.folder / 'history.csv'} has all of them"]
-    blocks = table.within(_CHARACTERS).split("\n\n")
-    lines: list[str] = []
-    pages: list[list[str]] = []
-    for block in blocks:
-        own = [*block.splitlines(), ""]
-        if lines and len(lines) + len(own) > _LINES:
-            pages.append(lines)
-            lines = []
-        lines += own
-    for page in islice([*pages, lines + note], _MOST_PAGES):
-        figure = _page("steps")
-        _put(figure, page)
-        yield figure
 
 
 def _iterations_panel(run: Run) -> Any:
@@ -138,9 +141,21 @@ def _balance_panel(run: Run) -> Any:
             f"{name.replace('_', ' ')} {estimates[name]:.1e}" for name in _BALANCES if estimates.get(name) is not None
         ]
         axes.set(xlabel="step", ylabel="relative error")
-        axes.set_title("\n".join(textwrap.wrap(", ".join(told), 40)), fontsize="medium")
+        axes.set_title(", ".join(told))
         if axes.lines:
             axes.legend(frameon=False, fontsize="small")
+        axes.grid(alpha=0.3)
+
+    return draw
+
+
+def _energy_panel(run: Run) -> Any:
+    def draw(axes: Any) -> None:
+        for name in ("work", *ENERGIES):
+            if name in run.columns:
+                axes.plot(run.columns["step"], run.columns[name], ".-", label=name.replace("_", " "))
+        axes.set(xlabel="step", ylabel=f"energy [{run.units.get('work', '-')}]", title="energy balance")
+        axes.legend(frameon=False, fontsize="small")
         axes.grid(alpha=0.3)
 
     return draw
