@@ -82,7 +82,7 @@ def test_numbers_that_are_none_do_not_spoil_the_others(unloaded):
     assert axes.collections[0].get_clim() == (0, pytest.approx(np.nanmax(values)))
 
 
-def test_picture_takes_steps_field_and_edges(unloaded, tmp_path, refused, runs):
+def test_picture_takes_steps_field_and_edges(unloaded, tmp_path, refused, runs, capsys):
     """Of a general run and of a joint; what is not there is a sentence."""
     asked = [
         ["--step", "1", "--field", "displacement"],
@@ -94,6 +94,7 @@ def test_picture_takes_steps_field_and_edges(unloaded, tmp_path, refused, runs):
             target = tmp_path / f"{k}.png"
             assert command(["picture", folder, *options, "-o", str(target)]) == 0
             assert matplotlib.image.imread(target).std() > 0.05
+    capsys.readouterr()
     target = ["-o", str(tmp_path / "no.png")]
     assert "has no field 'strain'; its fields are stress, " in refused(
         ["picture", str(unloaded.folder), "--field", "strain", *target]
@@ -111,7 +112,7 @@ def test_show_cuts_no_word(unloaded):
     assert set(wide.split()) <= set(narrow.split())
 
 
-def test_a_report_is_a_pdf_of_two_or_three_pages(unloaded, runs, tmp_path, refused):
+def test_a_report_is_a_pdf_of_two_or_three_pages(unloaded, runs, tmp_path, refused, capsys):
     """With and without fields or warnings; one that is there is kept without --force."""
     bare = shutil.copytree(runs["coarse"], tmp_path / "bare")
     text = (bare / "scene.toml").read_text()
@@ -124,9 +125,11 @@ def test_a_report_is_a_pdf_of_two_or_three_pages(unloaded, runs, tmp_path, refus
         assert content.startswith(b"%PDF")
         assert content.rstrip().endswith(b"%%EOF")
         assert len(re.findall(rb"/Type /Page\b", content)) in (2, 3)
+        capsys.readouterr()
         assert "is there already" in refused(["report", str(folder), "-o", str(target)])
         assert command(["report", str(folder), "-o", str(target), "--force"]) == 0
     assert not list(tmp_path.glob("*.new"))
+    capsys.readouterr()
     assert "cannot be written" in refused(["report", str(bare), "-o", str(tmp_path / "no" / "x.pdf")])
 
 
