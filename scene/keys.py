@@ -72,7 +72,8 @@ class _InSentences(ModelMetaclass):
     absent, and bad values raise `InputError`, a sentence for each fault. Scenes check their sections without it."""
 
     def __call__(cls, *values: Any, **keys: Any) -> Any:
-        if cls.__init__ is not BaseModel.__init__:  # a whole scene, which says more
+        made: Any = cls
+        if made.__init__ is not BaseModel.__init__:  # a whole scene, which says more
             return super().__call__(*values, **keys)
         from archord.scene import faults
 
@@ -83,7 +84,7 @@ class _InSentences(ModelMetaclass):
         try:
             return super().__call__(**given)
         except ValidationError as error:
-            raise InputError(faults.of_section(error.errors(), given, cls)) from None
+            raise InputError(faults.of_section(error.errors(), given, made)) from None
 
 
 class Section(BaseModel, metaclass=_InSentences):
