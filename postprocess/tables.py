@@ -52,7 +52,10 @@ def sweep_text(sweep: Sweep) -> str:
     cases = sweep.cases
     if same := [f"{key} = {_cell(cases[key].iloc[0])}" for key in sweep.keys if key not in sweep.moving]:
         lines += [f"in all cases: {', '.join(same)}"]
-    names = ["case", "run", *sweep.moving, "status", *(name for name in _SHOWN if name in cases and name != "delta")]
+    ends = [name for name in _SHOWN if name in cases and name != "delta"]
+    if "load_factor" in cases:
+        ends[1:1] = [name for name in cases if name.endswith((" displacement", *COMMON))]
+    names = ["case", "run", *sweep.moving, "status", *ends]
     lines += ["", _thinned(_table_of(cases[names]), sweep.folder / "cases.csv")]
     said = zip(cases["case"], cases["message"], strict=True)
     lines += [f"case {case}: {message}" for case, message in said if message]

@@ -16,6 +16,7 @@ from archord.output.disk import replace_file
 from archord.output.finished import fault_of_run
 from archord.output.folder import occupied, report_of
 from archord.scene.errors import InputError
+from archord.scene.file import AnyScene
 from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
 from archord.studies.cases import Case, Sweep
@@ -27,6 +28,7 @@ _COST = ("message", "steps", "seconds [s]", "iterations", "cutbacks", "cells", "
 _PER_STEP = ("step", "iterations", "cutbacks", "seconds [s]")  # of history.csv; cases.csv has sums of them
 _DOFS_PER_CELL = {2: 4.3, 3: 9.5}
 _STEP = {False: 1.7e-5, True: 2.8e-5}  # seconds per dof of an elastic and of a plastic output step
+_GENERAL = 0.5  # seconds of an output step of a general scene
 _LINEAR = 3e4  # dofs up to which a step costs in proportion to them
 Row = list[str]
 
@@ -110,12 +112,15 @@ def open_cases(
     return [result for result in results if result.status in over], left, damaged
 
 
-def expected_seconds(scene: Scene) -> float:
-    """About how long ``scene`` will take on one rank of a machine of 2020, in a process that has solved before.
+def expected_seconds(scene: AnyScene) -> float:
+    """About how long ``scene`` will take on one rank of a machine of 2020, in a process that has solved before; of a
+    general scene, whose mesh is not known yet, a guess.
 
     Fitted by hand to runs of 2 450 to 8 336 dofs, elastic and plastic (README); beyond ``_LINEAR`` dofs the
     factorisation of a plane mesh grows as dofs^1.5 (George 1973).
     """
+    if not isinstance(scene, Scene):
+        return _GENERAL * len(scene.targets)
     dofs = _DOFS_PER_CELL[scene.analysis.degree] * scene.joint.expected_cells
     step = 0.02 + _STEP[scene.plastic] * dofs * max(1.0, (dofs / _LINEAR) ** 0.5)
     return 0.1 + 2e-5 * dofs + len(scene.targets) * step
@@ -169,8 +174,10 @@ def _history(run: Path) -> list[Row]:
     return []
 
 
-def heading(key: str, scene: Scene) -> str:
-    """The dotted ``key`` with its unit: ``joint.clearance [mm]``."""
+def heading(key: str, scene: AnyScene) -> str:
+    """The dotted ``key`` with its unit: ``joint.clearance [mm]``; without, of a general scene."""
+    if not isinstance(scene, Scene):
+        return key
     section, _, name = key.partition(".")
     extra = type(getattr(scene, section)).model_fields[name].json_schema_extra
     kind = extra.get("unit") if isinstance(extra, dict) else None
