@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from archord.output.folder import is_sweep
@@ -14,6 +15,7 @@ from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.scene import file as scene_file
 from archord.scene.errors import InputError
+from archord.scene.faults import shortened
 from archord.scene.file import ABSENT, AnyScene
 from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
@@ -41,8 +43,8 @@ def load_scene(path: str | Path, changes: Mapping[str, Any] | None = None) -> An
 def Problem(
     mesh: Any,
     *,
-    bodies: Sequence[Any],
-    loads: Sequence[Any],
+    bodies: Sequence[Any] = (),
+    loads: Sequence[Any] = (),
     interactions: Sequence[Any] = (),
     couplings: Sequence[Any] = (),
     supports: Sequence[Any] = (),
@@ -57,9 +59,15 @@ def Problem(
         mesh = {"file": str(mesh)} if isinstance(mesh, (str, Path)) else plain(mesh)
         scene_file.find_mesh(mesh, Path())
     else:
+        if not isinstance(mesh, (tuple, ModuleType)) and not hasattr(mesh, "facet_sets"):
+            kinds = "a mesh file, gmsh with a model, (mesh, cells, facets) of dolfinx, or a Mesh"
+            raise InputError(f"archord.Problem: mesh must be {kinds}, not {shortened(repr(mesh))}.")
         name = f"mesh {len(LIVE) + 1}{GIVEN}"
         LIVE[name], mesh = mesh, {"file": name}
     parts = {"body": bodies, "interaction": interactions, "coupling": couplings, "support": supports, "load": loads}
+    for name, part in parts.items():
+        if not isinstance(part, (list, tuple)):
+            raise InputError(f"archord.Problem: {name} must be a list of parts, not {shortened(repr(part))}.")
     sections |= {"mesh": mesh, **{name: list(part) for name, part in parts.items()}}
     return ProblemScene(**sections)
 

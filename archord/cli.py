@@ -23,7 +23,7 @@ _HEARD = 0.3  # seconds in which a launcher (MPICH's) hands on what a rank said,
 
 FILES = {
     "solve_commands": ("solve", "scene", "mesh"),
-    "result_commands": ("show", "compare", "export", "export-deck", "picture", "probe"),
+    "result_commands": ("show", "compare", "export", "export-deck", "picture", "report", "probe"),
     "margin_command": ("margin",),
     "sweep_commands": ("sweep",),
     "law_commands": ("laws", "law", "fit"),

@@ -11,10 +11,19 @@ import click
 
 Decorator = Callable[[Any], Any]
 PATH = click.Path(path_type=Path)
+_SENTENCE = 1000  # characters: longer than any
 
 
 class Group(click.Group):
     """Commands; of a name that is none of them the message says which may be meant."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Each command with the whole first sentence of its help, wrapped."""
+        found = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        rows = [(name, command.get_short_help_str(_SENTENCE)) for name, command in found if command is not None]
+        if rows:
+            with formatter.section("Commands"):
+                formatter.write_dl(rows)
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         """The command of ``args``. Raises `click.UsageError`."""

@@ -6,6 +6,7 @@ MPI is loaded only by commands that all ranks work on, and only where a launcher
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Callable
 
@@ -35,6 +36,11 @@ def on_terminal() -> bool:
     return sys.stdout.isatty() and not any(name in os.environ for name in _RANK)
 
 
+def terminal_width() -> int:
+    """Characters of a line of the terminal that shows stdout; 0 where none does."""
+    return shutil.get_terminal_size().columns if on_terminal() else 0
+
+
 def run_on_ranks(command: str, work: Callable[[], int]) -> int:
     """Exit code of ``work``, done by all ranks for a command of `COLLECTIVE`, else by rank 0 alone.
 
@@ -53,6 +59,9 @@ def run_on_ranks(command: str, work: Callable[[], int]) -> int:
     if launcher_rank() != 0:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
     code = work()
+    if code == 1 and launcher_rank() == 0:
+        said = "ends with exit code 1, for what is told above; the launcher may add a page about that code"
+        print(f"archord {command}: {said}.", file=sys.stderr, flush=True)
     if code == 2:
         from mpi4py import MPI
 

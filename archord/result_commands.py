@@ -1,4 +1,4 @@
-"""Commands that read what solves left: `show`, `compare`, `export`, `picture`, `probe`; and `export-deck`."""
+"""Commands that read what solves left: `show`, `compare`, `export`, `picture`, `report`, `probe`; and `export-deck`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from archord.options import SCENE, argument, file, flag, output, overrides, pictures
+from archord.ranks import terminal_width
 from archord.scene.errors import InputError
 
 
@@ -28,10 +29,10 @@ def show(folder: Path, output: Path | None, pictures: bool) -> int:
         sweep = Sweep(folder)
         text, drawn = sweep_text(sweep), None
         if pictures and sweep.runs:
-            drawn = draw_runs(list(sweep.runs.values()), [f"case {case}" for case in sweep.runs], target)
+            drawn = draw_runs(list(sweep.runs.values()), [sweep.label(case) for case in sweep.runs], target)
     else:
         run = Run(folder)
-        text, drawn = run_text(run), draw_run(run, target) if pictures and run.steps else None
+        text, drawn = run_text(run, terminal_width()), draw_run(run, target) if pictures and run.steps else None
     print(text, *([f"\n{drawn}"] if drawn else []), sep="\n")
     return 0
 
@@ -83,13 +84,33 @@ def export(folder: Path, vtk: Path | None, csv: Path | None, step: int | None, f
 
 @click.command()
 @argument("folder", "RUN", "run folder")
+@click.option(
+    "--step", "steps", type=int, multiple=True, metavar="N", help="step to draw; repeated: of curves [last, or loaded]"
+)
+@click.option(
+    "--field", default="", help="stress, peeq, displacement, pressure, mean_stress, stress_xx, p1, ... [peeq or stress]"
+)
+@click.option("--edge", "edges", multiple=True, metavar="NAME", help="draw the field along this edge [hoop stress]")
 @output("file to draw [RUN/picture.png]")
-def picture(folder: Path, output: Path | None) -> int:
-    """Draw a run: plastic zone, contact pressure, P(delta)."""
+def picture(folder: Path, steps: tuple[int, ...], field: str, edges: tuple[str, ...], output: Path | None) -> int:
+    """Draw a run: a field on the bodies, contact pressure or a field along edges, and the force of the loads."""
     from archord.postprocess.pictures.pictures import draw_run
     from archord.postprocess.run import Run
 
-    print(draw_run(Run(folder), output or folder / "picture.png"))
+    print(draw_run(Run(folder), output or folder / "picture.png", steps=steps, field=field, edges=edges))
+    return 0
+
+
+@click.command()
+@argument("folder", "RUN", "run folder")
+@output("PDF file to write [RUN/report.pdf]")
+@flag("--force", "overwrite a file that is there")
+def report(folder: Path, output: Path | None, force: bool) -> int:
+    """Write a run as a PDF report: scene, mesh, pictures, convergence, balances, steps, warnings, versions."""
+    from archord.postprocess.pictures.report import write_report
+    from archord.postprocess.run import Run
+
+    print(write_report(Run(folder), output or folder / "report.pdf", force=force))
     return 0
 
 
@@ -105,7 +126,7 @@ def picture(folder: Path, output: Path | None) -> int:
 @click.option("--over", type=float, metavar="LENGTH", help="over P / LENGTH, the mean stress in a section")
 @output("table (.csv) or picture to write")
 def probe(folder: Path, angles: tuple[float, ...], over: float | None, output: Path | None, **asked: Any) -> int:
-    """Print a quantity along an edge or a line of a run, its largest value and where; and draw it."""
+    """Print a quantity along an edge or a line of a run, its largest and smallest value and where; and draw it."""
     from archord.postprocess.run import Run
     from archord.postprocess.tables import probe_text
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 @click.option("--array", default="1/1", metavar="I/N", help="solve part I of N of the cases, for a job array")
 @flag("--gather", "write the tables of what is there and stop")
 @flag("--retry", "try cases again that stopped or failed")
+@flag("--force", "solve all cases again, and overwrite their results")
 @quiet()
 def sweep(
     file: Path,
@@ -36,6 +37,7 @@ def sweep(
     array: str,
     gather: bool,
     retry: bool,
+    force: bool,
     quiet: bool,
 ) -> int:
     """Solve all cases of a sweep; under mpirun side by side, on one rank each.
@@ -44,6 +46,8 @@ def sweep(
     changed solves what is new.
     """
     begun = perf_counter()
+    if force + gather + retry > 1:
+        raise click.UsageError("choose one of --force, --gather and --retry")
     from mpi4py import MPI
 
     from archord.output.ranks import agreed
@@ -74,7 +78,11 @@ def sweep(
         if gather and not (folder / FILE).exists():
             raise InputError(f"{folder}: holds no sweep to gather.")
         claim(design, folder)
-        ended, left = ([], []) if gather else open_cases(mine, folder, retry=retry)
+        if gather:
+            return design, mine, [], []
+        ended, left, damaged = open_cases(mine, folder, retry=retry, force=force)
+        for result in damaged:
+            print(f"archord: warning: {result.message}: the case is solved again.", file=sys.stderr, flush=True)
         if ended:
             say(f"{len(ended)} of {len(mine)} cases are there already")
         return design, mine, ended, left
@@ -96,13 +104,15 @@ def sweep(
     if comm.bcast(bool(cases)):
         from archord.studies.farm import solve_cases  # imports PETSc, on all ranks together
 
-        received = solve_cases(comm, cases, folder, ended)
+        received = solve_cases(comm, cases, folder, ended, force=force)
 
     def concluded() -> bool:
         known = write_tables(design, folder, results)
         counts = Counter(result.status for result in known.values())
         told = ", ".join(f"{n} {status}" for status, n in sorted(counts.items()))
         say(f"{told} in {perf_counter() - begun:.1f} s, tables in {folder}")
+        for result in (result for result in known.values() if result.damaged):
+            print(f"archord: warning: {result.message}.", file=sys.stderr)
         failed = [(case, known[case.run]) for case in mine if known[case.run].status in ("stopped", "failed")]
         for case, result in failed:
             print(f"archord: case {case.number}, {case.run}: {result.status}: {result.message}.", file=sys.stderr)

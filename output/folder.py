@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from archord.output.disk import new_name
-from archord.report.readable import require_file
+from archord.output.seal import read_report
 from archord.scene.errors import InputError
 
 FILES = ("scene.toml", "history.csv", "fields.vtkhdf", "fields.xdmf", "fields.h5", "contact.h5", "run.json")
@@ -85,8 +84,7 @@ def refuse_folder(scene: Path) -> None:
 def report_of(folder: Path) -> dict[str, Any]:
     """The run.json in ``folder``; empty if there is none that can be read."""
     with suppress(OSError, ValueError):
-        report = json.loads(require_file(folder / "run.json").read_text(encoding="utf-8"))
-        if isinstance(report, dict):
+        if isinstance(report := read_report(folder / "run.json"), dict):
             return report
     return {}
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,9 @@ from archord.output.disk import replace_file
 
 if TYPE_CHECKING:
     from archord.presets.account import Column
+
+_SAME = 1e-9  # relative difference of a number in history.csv, of 12 digits, and in run.json
+_NOTHING = 1e-290
 
 
 def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Any]) -> None:
@@ -27,8 +31,34 @@ def write_history(path: Path, columns: Sequence[Column], steps: Sequence[Any]) -
 
 def read_history(path: str | Path) -> dict[str, list[float]]:
     """The columns of a history.csv by name without unit: ``read_history(p)["P"]``, ``["P/(E* R)"]``, ... A last row
-    that does not end in a line break (a copy cut short) is ignored."""
+    that does not end in a line break (a copy cut short) is ignored. Raises `OSError`, and `ValueError` for what is
+    no table of numbers."""
     text = Path(path).read_bytes().decode()
     heading, *rows = csv.reader(io.StringIO(text[: text.rfind("\n") + 1], newline=""))
     names = [h.split(" [")[0] for h in heading]
+    if any(len(row) != len(names) for row in rows):
+        raise ValueError("rows are not as long as the headings")
     return {name: [float(row[i]) for row in rows] for i, name in enumerate(names)}
+
+
+def fault_of_history(columns: Mapping[str, Sequence[float]], report: Mapping[str, Any]) -> str:
+    """Where the ``columns`` of a history.csv contradict the steps of the run.json ``report``, in words; nothing where
+    they agree. A run that goes on or was killed may have one row more."""
+    steps = report["steps"]
+    rows = len(columns["step"])
+    if rows < len(steps):
+        return f"has {rows} of the {len(steps)} steps of run.json: it was cut short"
+    if rows > len(steps) and report["status"] == "done":
+        return f"has {rows} steps, run.json has {len(steps)}"
+    if list(columns["step"]) != list(range(1, rows + 1)):
+        return f"does not count its steps from 1 to {rows}"
+    for k, step in enumerate(steps):
+        values = step.get("values", step)
+        lost = [name for name in step.get("values", ()) if name not in columns]
+        if lost:
+            return f"has no column {lost[0]!r}, which run.json has"
+        for name in values.keys() & columns.keys():
+            told, here = values[name], columns[name][k]
+            if isinstance(told, int | float) and not math.isclose(told, here, rel_tol=_SAME, abs_tol=_NOTHING):
+                return f"has {name} = {here:g} at step {k + 1}, run.json {told:g}: one of the two was changed"
+    return ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from contextlib import suppress
 from dataclasses import dataclass, fields
@@ -13,7 +12,9 @@ import numpy as np
 
 from archord.output import checkpoint as checkpoints
 from archord.output.checkpoint import Checkpoint
+from archord.output.finished import history_fault
 from archord.output.folder import CHECKPOINT
+from archord.output.seal import TABLES, fault_of, read_report, require_intact
 from archord.presets.account import record_type
 from archord.report.readable import require_file
 from archord.scene.errors import InputError
@@ -61,20 +62,30 @@ def plan_restart(folder: Path, scene: AnyScene | None = None, *, extend: bool = 
     if extend and step == total:
         raise InputError(f"{folder}: ends at {scene.targets[-1]:g} already; {scene.loading} goes no further.")
     if step == total and start.report["status"] == "done":
-        if lost := _lost_tables(folder, scene):
+        lost = _lost_tables(folder, scene, start.report)
+        if lost:
             return Plan(scene, start, f"the run in {folder} is finished: writing {' and '.join(lost)} again")
         return Plan(scene, None, f"the run in {folder} is finished: nothing to do", finished=True)
-    return Plan(scene, start, f"{'extending' if extend else 'continuing'} {folder} after step {step} of {total}")
+    said = f"{'extending' if extend else 'continuing'} {folder} after step {step} of {total}"
+    changed = [name for name in TABLES if fault_of(folder, name, start.report.get("files", {}))]
+    return Plan(scene, start, f"{said}, writing {' and '.join(changed)} again" if changed else said)
 
 
-def _lost_tables(folder: Path, scene: AnyScene) -> list[str]:
-    """Those of the files that a run makes from the others which are missing, or lack the last step."""
-    parts = {"history.csv": f"\n{len(scene.targets)},"} | ({"fields.xdmf": "</Xdmf>"} if scene.output.fields else {})
-    texts = dict.fromkeys(parts, "")
-    for name in parts:
-        with suppress(OSError, ValueError):
-            texts[name] = require_file(folder / name).read_text(encoding="utf-8")
-    return [name for name, part in parts.items() if part not in texts[name] or not texts[name].endswith("\n")]
+def _lost_tables(folder: Path, scene: AnyScene, report: dict[str, Any]) -> list[str]:
+    """Those of the files that a run makes from the others which are missing, changed, or lack a step."""
+    seals = report.get("files", {})
+    lost = [name for name in TABLES if fault_of(folder, name, seals)]
+    if "history.csv" not in lost and history_fault(folder, report):
+        lost.append("history.csv")
+    if scene.output.fields and not _ends(folder / "fields.xdmf", "</Xdmf>\n"):
+        lost.append("fields.xdmf")
+    return lost
+
+
+def _ends(path: Path, ending: str) -> bool:
+    with suppress(OSError, ValueError):
+        return require_file(path).read_text(encoding="utf-8").endswith(ending)
+    return False
 
 
 def _start(folder: Path, scene: AnyScene) -> Start:
@@ -92,14 +103,17 @@ def _start(folder: Path, scene: AnyScene) -> Start:
         raise InputError(f"{path}: its {n} steps are not the first ones of the scene's path; {said}.")
     path = folder / "run.json"
     try:
-        report = json.loads(require_file(path).read_text(encoding="utf-8"))
+        report = read_report(path)
         record = record_type(scene)
         names = [field.name for field in fields(record)]
         done = [record(**{name: step[name] for name in names if name in step}) for step in report["steps"][: n - 1]]
         if len(done) < n - 1 or not {"status", "started", "command", "warnings"} <= report.keys():
             raise KeyError("steps")
     except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(f"{path}: is missing or lacks some of the {n - 1} steps before the checkpoint's.") from None
+        said = f"is missing, was changed, or lacks some of the {n - 1} steps before the checkpoint's"
+        raise InputError(f"{path}: {said}.") from None
+    seals = report.get("files", {})
+    require_intact(folder, [name for name in seals if name not in TABLES])
     return Start(checkpoint, report, done)
 
 

@@ -160,6 +160,7 @@ class _Output:
         with system.timer("checkpoint"):
             checkpoint = self._start.checkpoint if self._start else None
             known, step, position, work = resume(self._order, self.folder / CHECKPOINT, checkpoint)
+        self._on_root(lambda: self._report.unseal())
         self._write(self.account.record(**known), step, self.account.profiles())
         self._on_root(lambda: replace_file(self.folder / "scene.toml", self._scene))
         return position, work

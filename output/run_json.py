@@ -17,6 +17,7 @@ import numpy as np
 
 from archord.kernels.compat import versions
 from archord.output.disk import replace_file
+from archord.output.seal import report_text, seals_of
 from archord.presets.account import Account
 from archord.presets.joint_account import APART
 from archord.presets.measures import WORK_OFF
@@ -86,9 +87,11 @@ class Report:
         self.write()
 
     def finish(self, warnings: list[str], **ending: Any) -> list[str]:
-        """Note how the run ended, and what else to warn of; returns all warnings. Raises `OSError`."""
+        """Note how the run ended, what else to warn of, and what its files are by then; returns all warnings. Raises
+        `OSError`."""
         self.content |= _finite(ending)
         self._others += warnings
+        self.content["files"] = seals_of(self.path.parent)
         self.write()
         return self.content["warnings"]
 
@@ -102,8 +105,13 @@ class Report:
             "seconds": self._seconds(),
             "error_estimates": self._errors(),
         }
-        lines = [f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items()]
-        replace_file(self.path, "{\n" + ",\n".join(lines) + "\n}\n")
+        replace_file(self.path, report_text(content))
+
+    def unseal(self) -> None:
+        """Let run.json, as it was before, say nothing of files that are going to be written. Raises `OSError`."""
+        if "files" in self._before:
+            before = {name: value for name, value in self._before.items() if name != "files"}
+            replace_file(self.path, report_text(before))
 
     def _totals(self) -> dict[str, int]:
         counts, before = self.system.timer.counts, self._before.get("totals", {})

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from archord.materials.material import Array
+from archord.output.seal import require_intact
 from archord.output.step_file import step_name
 from archord.presets.arc import ArcProfile
 from archord.presets.edge import OF_FRICTION, PER_STEP, SurfaceProfile
@@ -20,11 +21,12 @@ from archord.scene.scene import Scene
 
 @contextmanager
 def opened(folder: str | Path, name: str, step: int) -> Iterator[h5py.File]:
-    """The open ``name``.h5 of a run ("contact", "fields"), which holds the step. Raises `InputError` if it is missing,
-    and in place of what reading it raises."""
+    """The open ``name``.h5 of a run ("contact", "fields"), which holds the step. Raises `InputError` if it is missing
+    or was changed after the run, and in place of what reading it raises."""
     path = Path(folder) / f"{name}.h5"
     if not path.is_file():
         raise InputError(f"{folder}: is not a complete run folder: {path.name} is missing.")
+    require_intact(Path(folder), [path.name, f"{name}/{step_name(0)}.h5", f"{name}/{step_name(step)}.h5"])
     try:
         with h5py.File(path) as file:
             if int(file["accepted"][()]) < step:

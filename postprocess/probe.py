@@ -1,4 +1,5 @@
-"""A quantity along a named edge or a line of a run: its largest value, and where, and its factor over a section."""
+"""A quantity along a named edge or a line of a run: its largest and smallest value, and where, and its factor over a
+section."""
 
 from __future__ import annotations
 
@@ -41,12 +42,23 @@ class Probe:
     x: Array  # (n, 2) undeformed
     s: Array  # (n,) along each piece of the edge, the body on its left; of arcs the radius times the angle
     values: Array  # (n,)
+    length: str = ""  # the unit of x and s
     angle: Array | None = None  # (n,) of arcs: degrees about their centre, counterclockwise from the x axis
 
     @property
     def largest(self) -> int:
-        """Number of the point with the largest value."""
+        """Number of the point with the largest value, the most tensile of a stress."""
         return int(np.argmax(self.values))
+
+    @property
+    def smallest(self) -> int:
+        """Number of the point with the smallest value, the most compressive of a stress."""
+        return int(np.argmin(self.values))
+
+    def where(self, k: int) -> str:
+        """The place of point ``k`` in words: its angle, or how far along the edge or line it is; and x and y."""
+        along = f"s = {self.s[k]:.6g}" if self.angle is None else f"{self.angle[k]:.4g}°"
+        return f"at {along}, x = {self.x[k, 0]:.6g}, y = {self.x[k, 1]:.6g}"
 
     def at(self, angle: float) -> float:
         """The value at an ``angle`` in degrees. Raises `InputError` if the edge has none there."""
@@ -87,7 +99,10 @@ def probe(run: Run, edge: str, quantity: str, step: int, line: Sequence[float]) 
     points = _inside(run, line, quantity, step) if line else along(run, edge, quantity, step)
     unit = run.scene.units.length if quantity in ("ux", "uy", "gap") else run.scene.units.stress
     unit = "rad" if quantity == "principal_angle" else "" if quantity.startswith(_UNITLESS) else unit
-    return Probe(edge or "line", quantity, unit, step, *_driving(run, step), *points)
+    x, s, values, *angle = points
+    of_arc = angle[0] if angle else None
+    force, by = _driving(run, step)
+    return Probe(edge or "line", quantity, unit, step, force, by, x, s, values, run.scene.units.length, of_arc)
 
 
 def _contact(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
@@ -107,6 +122,7 @@ def _contact(run: Run, edge: str, quantity: str, step: int) -> tuple[Any, ...]:
     centre, radius = circle
     middle, half = _angle(means[0], centre), np.degrees(arc.width / (2 * radius))
     angle = _rising(_angle(x, centre), middle - half, middle + half)
+    angle -= 360 * np.floor(angle.min() / 360)
     order = np.argsort(angle)
     return x[order], np.radians(angle[order]) * radius, values[order], angle[order]
 

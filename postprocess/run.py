@@ -6,7 +6,6 @@ Arrays and tables are read when they are asked for, and pandas is imported only 
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +15,8 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
 from archord.output.folder import is_sweep
-from archord.output.history import read_history
+from archord.output.history import fault_of_history, read_history
+from archord.output.seal import ChangedError, read_report, require_intact
 from archord.postprocess.arc import read_contact
 from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import BODIES, Fields, read_fields, read_points
@@ -69,9 +69,10 @@ class Run:
         for name in ("scene.toml", "history.csv", "run.json"):
             if not (self.folder / name).is_file():
                 raise InputError(f"{self.folder}: is not a run folder: {name} is missing.")
+        self.summary: dict[str, Any] = self._read_report()  # before the history, which a run writes first
+        require_intact(self.folder, ["scene.toml"])
         self.scene: Any = load_scene(self.folder / "scene.toml")
         self.is_joint = isinstance(self.scene, Scene)
-        self.summary: dict[str, Any] = self._read_report()  # before the history, which a run writes first
         self.columns, self.units = self._read_history()
         self.status, self.message, self.warnings = (self.summary[key] for key in ("status", "message", "warnings"))
         self.steps = len(self.columns["step"])
@@ -166,22 +167,23 @@ class Run:
                 raise ValueError("numbers that are not finite")
         except (ValueError, IndexError, KeyError, OSError):
             raise InputError(f"{path}: cannot be read as the history of a run.") from None
-        rows, steps = len(columns["step"]), len(self.summary["steps"])
-        if rows < steps:
+        if fault := fault_of_history(columns, self.summary):
             cure = f"archord solve {self.folder} --restart writes it again"
-            raise InputError(f"{path}: has {rows} of the {steps} steps of run.json: it was cut short; {cure}.")
+            raise InputError(f"{path}: {fault}; {cure}.")
+        require_intact(self.folder, ["history.csv"])
         named = (heading.partition(" [") for heading in headings)
         return columns, {name: unit.removesuffix("]") for name, _, unit in named if unit}
 
     def _read_report(self) -> dict[str, Any]:
         path = self.folder / "run.json"
         try:
-            report = json.loads(path.read_text(encoding="utf-8"))
+            report = read_report(path)
             _Report.model_validate(report, strict=True)
         except ValidationError as error:
             place = ".".join(map(str, error.errors()[0]["loc"]))
             fault = f": {place}: {error.errors()[0]['msg'].lower()}" if place else ""
             raise InputError(f"{path}: cannot be read as the report of a run{fault}.") from None
-        except (OSError, ValueError):
-            raise InputError(f"{path}: cannot be read as the report of a run.") from None
+        except (OSError, ValueError) as error:
+            fault = f": {error}" if isinstance(error, ChangedError) else ""
+            raise InputError(f"{path}: cannot be read as the report of a run{fault}.") from None
         return report

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -75,8 +74,36 @@ class Sweep:
     @cached_property
     def runs(self) -> dict[int, Run]:
         """The runs by case that have an accepted step and can be read; cases that share a run by the first of them."""
-        found = {}
-        for case in self.cases.drop_duplicates("run")["case"]:
-            with suppress(InputError):
+        return {case: run for case, run in self._found[0].items() if run.steps}
+
+    @property
+    def unread(self) -> dict[int, str]:
+        """Why runs of cases that are done cannot be read, in words, by case."""
+        return self._found[1]
+
+    def label(self, case: int) -> str:
+        """What is varied and how in a ``case``, for legends: ``clearance = 0.05 mm, E = 210000 MPa``."""
+        row = self.cases[self.cases["case"] == case].iloc[0]
+        units = self.cases.attrs["units"]
+        short = {key: key.rpartition(".")[2] for key in self.moving}
+        names = list(short.values())
+        said = []
+        for key, name in short.items():
+            value = row[key]
+            shown = "none" if value != value else f"{value:.6g}" if isinstance(value, float) else str(value)
+            named = name if names.count(name) == 1 else key
+            said.append(f"{named} = {shown} {units.get(key, '')}".rstrip())
+        return ", ".join(said) or f"case {case}"
+
+    @cached_property
+    def _found(self) -> tuple[dict[int, Run], dict[int, str]]:
+        """Runs that can be read, and why those of other cases that are done cannot."""
+        found, faults = {}, {}
+        first = self.cases.drop_duplicates("run")
+        for case, status in zip(first["case"], first["status"], strict=True):
+            try:
                 found[int(case)] = self.run(int(case))
-        return {case: run for case, run in found.items() if run.steps}
+            except InputError as error:
+                if status == "done":
+                    faults[int(case)] = str(error)
+        return found, faults

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import textwrap
 from collections.abc import Iterable
 from typing import Any
 
@@ -14,9 +16,11 @@ from archord.postprocess.run import Run
 from archord.postprocess.sweep import Sweep
 from archord.report.doubts import kind
 from archord.report.table import Table
-from archord.scene.faults import shortened
 
 _MOST = 40  # rows of a table
+_LONG = 100_000  # characters of a line, where no terminal breaks it
+_NARROW = 30  # the least of a wrapped line
+_CELL = 60  # of a key of a scene in a table
 _OF_A_JOINT = ("delta/dR", "P", "P/(E* R)", "p0", "p0/E*", "eps", "peeq_max", "contact peeq_max")
 _SHOWN = ("step", "load_factor", "delta", *_OF_A_JOINT, "steps", "iterations", "cutbacks", "seconds")
 _OF_A_RUN = {  # what a comparison tells of each run
@@ -30,14 +34,16 @@ _OF_A_RUN = {  # what a comparison tells of each run
 }
 
 
-def run_text(run: Run) -> str:
-    """State, joint, history, peaks, cost and warnings of a run."""
+def run_text(run: Run, width: int = 0) -> str:
+    """State, joint, history, peaks, cost and warnings of a run, in lines no longer than ``width`` if that is given."""
     words = {"running": "running, or killed (if no archord works there, --restart continues it)"}
     state = f"{run.folder}: {words.get(run.status, run.status)}; {run.steps} of {len(run.scene.targets)} steps"
-    parts = [f"{state}: {run.message}" if run.message else state, Table("", "", rows=_facts(run), left=2)]
+    state = f"{state}: {run.message}" if run.message else state
+    parts = [*_lines(state, width or _LONG), "", _named(facts_of(run), width)]
     if run.steps:
-        parts += [_thinned(_history(run), run.folder / "history.csv"), _peaks(run)]
-    return "\n\n".join(map(str, (*parts, Table("", "", rows=_cost(run), left=2))))
+        history = _thinned(history_table(run), run.folder / "history.csv", width)
+        parts += ["", history, "", *_lines(peaks_of(run), width or _LONG)]
+    return "\n".join((*parts, "", _named(cost_of(run), width)))
 
 
 def sweep_text(sweep: Sweep) -> str:
@@ -46,10 +52,14 @@ def sweep_text(sweep: Sweep) -> str:
     cases = sweep.cases
     if same := [f"{key} = {_cell(cases[key].iloc[0])}" for key in sweep.keys if key not in sweep.moving]:
         lines += [f"in all cases: {', '.join(same)}"]
-    names = ["case", "run", *sweep.moving, "status", *(name for name in _SHOWN if name in cases and name != "delta")]
+    ends = [name for name in _SHOWN if name in cases and name != "delta"]
+    if "load_factor" in cases:
+        ends[1:1] = [name for name in cases if name.endswith((" displacement", *COMMON))]
+    names = ["case", "run", *sweep.moving, "status", *ends]
     lines += ["", _thinned(_table_of(cases[names]), sweep.folder / "cases.csv")]
     said = zip(cases["case"], cases["message"], strict=True)
-    return "\n".join([*lines, *(f"case {case}: {message}" for case, message in said if message)])
+    lines += [f"case {case}: {message}" for case, message in said if message]
+    return "\n".join([*lines, *(f"case {case} is left out: {fault}" for case, fault in sweep.unread.items())])
 
 
 def comparison_text(comparison: Comparison) -> str:
@@ -58,17 +68,22 @@ def comparison_text(comparison: Comparison) -> str:
     parts = [_thinned(_differences(comparison, name, names), "history.csv") for name in comparison.values]
     rows = differing_keys([run.scene for run in comparison.runs])
     rows |= {name: [str(get(run)) for run in comparison.runs] for name, get in _OF_A_RUN.items()}
-    cells = ([key, *(shortened(value) or "-" for value in values)] for key, values in rows.items())
-    return "\n\n".join(map(str, (*parts, _note(comparison), Table("", *names, rows=cells, left=1 + len(names)))))
+    table = Table("", *names, left=1 + len(names))
+    for key, values in rows.items():
+        wrapped = (_lines(value, _CELL) or ["-"] for value in values)
+        for line in itertools.zip_longest([key], *wrapped, fillvalue=""):
+            table.add(*line)
+    return "\n\n".join(map(str, (*parts, _note(comparison), table)))
 
 
 def probe_text(probe: Probe, angles: Iterable[float]) -> str:
-    """A quantity along an edge or a line, its largest value and where that is, and its values at ``angles``."""
-    k, unit = probe.largest, f" {probe.unit}".rstrip()
-    where = "" if probe.angle is None else f" at {probe.angle[k]:.4g}°"
+    """A quantity along an edge or a line, its largest and smallest value and where they are, and its values at
+    ``angles``."""
+    unit = f" {probe.unit}".rstrip()
     force = f"step {probe.step}, {probe.by or 'force'} = {probe.force:.6g} per unit thickness"
     lines = [_thinned(_table_of(probe.frame()), "-o FILE.csv"), "", f"{probe.quantity} along {probe.place}, {force}"]
-    lines += [f"largest: {probe.values[k]:.6g}{unit}{where}, x = {probe.x[k, 0]:.6g}, y = {probe.x[k, 1]:.6g}"]
+    for name, k in (("largest", probe.largest), ("smallest", probe.smallest)):
+        lines.append(f"{name}: {probe.values[k]:.6g}{unit} {probe.where(k)}")
     return "\n".join([*lines, *(f"at {angle:g}°: {probe.at(angle):.6g}{unit}" for angle in angles)])
 
 
@@ -92,16 +107,36 @@ def _table_of(frame: Any) -> Table:
     return Table(*with_headings(frame), rows=(map(_cell, row) for row in frame.itertuples(index=False)))
 
 
-def _thinned(table: Table, whole: object) -> str:
-    """Up to 40 rows of the ``table``, evenly spaced, first and last included, and where the ``whole`` of it is."""
+def _named(rows: Iterable[tuple[str, str]], width: int) -> str:
+    """Text behind names, wrapped to lines no longer than ``width`` (or `_LONG`)."""
+    pairs = list(rows)
+    room = max(_NARROW, (width or _LONG) - 2 - max(len(name) for name, _ in pairs))
+    table = Table("", "", left=2)
+    for name, text in pairs:
+        first, *more = _lines(text, room) or [""]
+        table.add(name, first)
+        for line in more:
+            table.add("", line)
+    return str(table)
+
+
+def _lines(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False)
+
+
+def _thinned(table: Table, whole: object, width: int = 0) -> str:
+    """Up to 40 rows of the ``table``, evenly spaced, first and last included, and where the ``whole`` of it is; in
+    blocks of columns where a ``width`` is given."""
     n = len(table.rows)
+    if n > _MOST:
+        table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, _MOST)]
+    text = table.within(width) if width else str(table)
     if n <= _MOST:
-        return str(table)
-    table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, _MOST)]
-    return f"{table}\n{_MOST} of {n} rows; {whole} has all of them"
+        return text
+    return f"{text}\n{_MOST} of {n} rows; {whole} has all of them"
 
 
-def _facts(run: Run) -> Iterable[tuple[str, str]]:
+def facts_of(run: Run) -> Iterable[tuple[str, str]]:
     """What was solved: the joint, or the parts of a general scene; and on what mesh."""
     scene, mesh, plane = run.scene, run.summary.get("mesh", {}), f"plane {run.scene.analysis.plane}"
     if run.is_joint:
@@ -116,12 +151,12 @@ def _facts(run: Run) -> Iterable[tuple[str, str]]:
     for name, part in parts:
         keys = part.model_dump(exclude_none=True, exclude={"name"}).items()
         given = (f"{key} = {value}" for key, value in keys if value is not False and value not in ("", []))
-        yield name, shortened(", ".join(given))
+        yield name, ", ".join(given)
     counts = f"{mesh.get('cells', '?')} {mesh.get('kind', 'cells')} of degree {scene.analysis.degree}"
     yield "mesh", f"{counts}, {mesh.get('dofs', '?')} dofs; ranks: {run.summary.get('ranks', '?')}"
 
 
-def _history(run: Run) -> Table:
+def history_table(run: Run) -> Table:
     """The steps: loads and forces, pressures, angle, plastic strain, cost."""
     names = [name for name in _SHOWN if name in run.columns]
     if not run.is_joint:
@@ -130,7 +165,7 @@ def _history(run: Run) -> Table:
     return Table(*map(run.heading, names), rows=zip(*columns, strict=True))
 
 
-def _peaks(run: Run) -> str:
+def peaks_of(run: Run) -> str:
     """Largest values over the run, and where it first yielded."""
     h, said = run.columns, []
     names = [name for name in h if name in (*COMPARED, "peeq_max") or name.endswith(COMMON)]
@@ -146,7 +181,7 @@ def _peaks(run: Run) -> str:
     return f"largest: {', '.join(said)}"
 
 
-def _cost(run: Run) -> Iterable[tuple[str, str]]:
+def cost_of(run: Run) -> Iterable[tuple[str, str]]:
     """Iterations, errors, seconds by part, memory, versions, warnings."""
     for name in ("totals", "error_estimates", "seconds"):
         values = (f"{key} {value:.3g}" for key, value in run.summary.get(name, {}).items() if value is not None)

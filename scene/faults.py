@@ -5,7 +5,10 @@ from __future__ import annotations
 import difflib
 import json
 import re
+from types import SimpleNamespace
 from typing import Any, get_args
+
+from pydantic.fields import FieldInfo
 
 from archord.scene.keys import Fault, Section, toml_value
 
@@ -53,6 +56,16 @@ def keys_of(models: list[Any], section: str) -> list[str]:
     fields = [model.model_fields[section] for model in models if section in model.model_fields]
     kinds = [kind for field in fields for kind in _sections(field.annotation).values()]
     return sorted({key for kind in kinds for key in kind.model_fields})
+
+
+def of_section(errors: list[Any], data: dict[str, Any], section: type[Section]) -> str:
+    """`in_sentences` of a ``section`` that was made alone, from ``data``."""
+    name = section.__name__.lower()
+    place: tuple[str | int, ...] = (name, 0) if "name" in data else (name,)
+    shown = [data] if "name" in data else data
+    whole: Any = SimpleNamespace(model_fields={name: FieldInfo(annotation=section)})
+    placed = [{**error, "loc": (*place, *error["loc"])} for error in errors]
+    return in_sentences(placed, {name: shown}, whole, f"archord.{section.__name__}", {})
 
 
 def shortened(text: str, length: int = 80) -> str:

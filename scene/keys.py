@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic._internal._model_construction import ModelMetaclass  # pydantic has no public name for it
+
+from archord.scene.errors import InputError
 
 Name = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f]*$")]  # text on one line
 Positive = Annotated[float, Field(gt=0)]
@@ -62,7 +66,38 @@ def _part_name(name: str) -> str:
 PartName = Annotated[Name, AfterValidator(_part_name)]  # of a part of a scene, which heads columns of tables
 
 
-class Section(BaseModel):
+def plain(value: Any) -> Any:
+    """``value`` as a TOML file would give it: tables, lists and numbers of Python."""
+    if isinstance(value, BaseModel):
+        value = value.model_dump(exclude_unset=True)
+    if isinstance(value, Mapping):
+        return {str(name): plain(part) for name, part in value.items() if part is not None}
+    if isinstance(value, (list, tuple)):
+        return [plain(part) for part in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+class _InSentences(ModelMetaclass):
+    """Makes a section that Python code asks for as a scene makes it: numbers and lists may be numpy's, None means
+    absent, and bad values raise `InputError`, a sentence for each fault. Scenes check their sections without it."""
+
+    def __call__(cls, *values: Any, **keys: Any) -> Any:
+        made: Any = cls
+        if made.__init__ is not BaseModel.__init__:  # a whole scene, which says more
+            return super().__call__(*values, **keys)
+        from archord.scene import faults
+
+        if values:
+            known = ", ".join(cls.model_fields)
+            raise InputError(f"archord.{cls.__name__}: takes its keys by name, as name=value; they are {known}.")
+        given = plain(keys)
+        try:
+            return super().__call__(**given)
+        except ValidationError as error:
+            raise InputError(faults.of_section(error.errors(), given, made)) from None
+
+
+class Section(BaseModel, metaclass=_InSentences):
     """A section of a scene: no unknown keys, no conversions, no numbers that are not finite, not to be changed."""
 
     # a section that no scene uses is not built: that of all takes as long as all the rest of a start

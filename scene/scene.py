@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from archord.materials.elasticity import contact_modulus
 from archord.scene.errors import InputError
 from archord.scene.faults import in_sentences
 from archord.scene.geometry import JointGeometry
-from archord.scene.keys import Section, key, require
+from archord.scene.keys import Section, key, plain, require
 from archord.scene.sections import Analysis, Load, Output, Pin, Solid, Stepping, Units
 
 FORMAT = 1  # version of the scene format: rises when a scene gets a meaning that an older archord would get wrong
@@ -218,14 +218,3 @@ def require_solids(solids: Mapping[tuple[str, ...], Solid]) -> None:
         require(strong, (*place, "yield_stress"), f"must be at least {_WEAKEST:g} times E, in the same unit")
         allowed = not isinstance(solid.hardening, float) or solid.hardening <= solid.E / _WEAKEST
         require(allowed, (*place, "hardening"), f"must not exceed {1 / _WEAKEST:g} times E, in the same unit")
-
-
-def plain(value: Any) -> Any:
-    """``value`` as a TOML file would give it: tables, lists and numbers of Python."""
-    if isinstance(value, BaseModel):
-        value = value.model_dump(exclude_unset=True)
-    if isinstance(value, Mapping):
-        return {str(name): plain(part) for name, part in value.items() if part is not None}
-    if isinstance(value, (list, tuple)):
-        return [plain(part) for part in value]
-    return value.tolist() if hasattr(value, "tolist") else value

@@ -7,7 +7,6 @@ meshes follow until both errors together are small enough. Each mesh is an ordin
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
@@ -22,6 +21,7 @@ from archord.output.disk import WriteError, replace_file
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
+from archord.output.seal import read_report, report_text
 from archord.postprocess.convergence import Curve, mesh_error, step_error
 from archord.presets.joint_account import UNSEEN
 from archord.scene.errors import InputError
@@ -195,11 +195,11 @@ class _Search:
 
         def note() -> None:
             path = self.folder / "run.json"
-            content = json.loads(path.read_text(encoding="utf-8"))
+            content = read_report(path)
             content |= {"status": outcome.status, "message": outcome.message, "warnings": outcome.warnings}
             content["accuracy"] = asdict(accuracy)
             content["error_estimates"] |= {"mesh": mesh, "steps": steps}
-            replace_file(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+            replace_file(path, report_text(content))
 
         try:
             agreed(self.comm, note)

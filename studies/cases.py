@@ -22,8 +22,12 @@ from archord.scene.faults import shortened
 from archord.scene.file import (
     ABSENT,
     ALTERNATIVES,
+    PRESETS,
+    AnyScene,
+    find_mesh,
     in_order,
     override_key,
+    parse_any,
     parse_scene,
     put,
     read_targets,
@@ -132,6 +136,7 @@ def load_sweep(path: Path, overrides: Sequence[str] = ()) -> SweepFile:
     for override in in_order(overrides, "--set "):
         override_key(sweep.base, override)
     read_targets(sweep.base, source)
+    find_mesh(sweep.base.get("mesh"), source.parent)
     for table in (*sweep.list_, sweep.zip, sweep.grid):
         if "load.path" in table:
             table["load.path"] = _absolute(table["load.path"], path.parent)
@@ -160,12 +165,13 @@ class Case:
 
     number: int
     overrides: Overrides
-    scene: Scene
+    scene: AnyScene
     run: str
 
     def value(self, key: str) -> Any:
         """What the case's scene says for the dotted ``key``; None if nothing."""
-        if key == "load.path":  # the scene holds the targets that were in the file
+        # a scene holds the targets that were in the file of its path, and a preset's scene none of the preset's keys
+        if key == "load.path" or not isinstance(self.scene, Scene):
             return self.overrides.get(key)
         section, _, name = key.partition(".")
         return getattr(getattr(self.scene, section), name)
@@ -194,7 +200,7 @@ def read_sweep(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
     varied = factors(file)
     given = {override.partition("=")[0].strip(): None for override in overrides}
     try:
-        keys = _checked_keys([*varied, ("--set", [given])])
+        keys = _checked_keys([*varied, ("--set", [given])], "joint" in file.base)
         rows = combinations(varied)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -254,16 +260,16 @@ def combinations(found: list[Factor]) -> list[Overrides]:
     return [dict(itertools.chain.from_iterable(choice.items() for choice in row)) for row in rows]
 
 
-def _checked_keys(found: list[Factor]) -> list[str]:
+def _checked_keys(found: list[Factor], joint: bool) -> list[str]:
     """All dotted keys that vary. Raises `InputError` for one that no scene has or that cannot vary, and for a quantity
-    that two factors give."""
+    that two factors give. Keys of a ``joint`` have two parts; those of other scenes may name a part between."""
     keys: list[str] = []
     given: dict[tuple[str, str], str] = {}
     for source, choices in found:
         own: dict[tuple[str, str], str] = {}
         for key in dict.fromkeys(key for choice in choices for key in choice):
             section, _, name = key.partition(".")
-            if not name or "." in name:
+            if not name or ("." in name and joint):
                 raise InputError(f"{source} {key}: must read section.key, like joint.clearance.")
             if section == "units" and source != "--set":
                 raise InputError(f"{source} {key}: cannot vary; all cases of a table have the same units.")
@@ -280,7 +286,7 @@ def _checked_keys(found: list[Factor]) -> list[str]:
 _LATER = {"friction": 0.0, "strain": "small"}  # keys of analysis that the first version did not have, and what it did
 
 
-def run_name(scene: Scene) -> str:
+def run_name(scene: AnyScene) -> str:
     """Twelve hexadecimal digits that stand for the resolved scene, its output in the words of the first version that
     solved it so, and how archord solves it."""
     data, fields = tomllib.loads(resolved(scene)), scene.output.fields
@@ -290,9 +296,13 @@ def run_name(scene: Scene) -> str:
     return hashlib.sha256(f"archord {_SOLVED_ALIKE_SINCE}\n{tomli_w.dumps(data)}".encode()).hexdigest()[:12]
 
 
-def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> Scene:
+def _scene(base: dict[str, Any], overrides: Overrides, path: Path) -> AnyScene:
     """The base with ``overrides``, checked. Raises `InputError`."""
     data = copy.deepcopy(base)
+    if "joint" not in data and any(name in data for name in ("mesh", *PRESETS)):
+        for key, value in overrides.items():
+            override_key(data, f"{key}={toml_value(value)}")
+        return parse_any(data, str(path))
     for override in in_order(f"{key}={toml_value(value)}" for key, value in overrides.items()):
         key = override.partition("=")[0]
         section, _, name = key.partition(".")

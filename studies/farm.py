@@ -36,9 +36,11 @@ _BACKOFF = 0.005  # seconds between two looks of idle ranks and of the manager
 _interrupt = Interrupt()  # of this rank
 
 
-def solve_cases(comm: MPI.Intracomm, cases: list[Case], folder: Path, report: Callable[[Result], Any]) -> int:
+def solve_cases(
+    comm: MPI.Intracomm, cases: list[Case], folder: Path, report: Callable[[Result], Any], *, force: bool = False
+) -> int:
     """Solve ``cases`` (known on rank 0), the longest first, into the sweep's ``folder``; returns the signal that
-    interrupted them, or 0. Collective.
+    interrupted them, or 0. With ``force`` all from the beginning, whatever is there. Collective.
 
     On rank 0 ``report(result)`` follows each, from any thread but never from two at once. After a signal no case is
     begun and those that are running stop at the next iteration.
@@ -51,18 +53,18 @@ def solve_cases(comm: MPI.Intracomm, cases: list[Case], folder: Path, report: Ca
         with Interrupt() as _interrupt:
             if comm.size == 1:
                 for case in cases:
-                    report(solve_case(case, folder))
+                    report(solve_case(case, folder, force))
             else:
                 with MPICommExecutor(comm, root=0, backoff=_BACKOFF) as executor:
                     if executor is not None:
-                        _share(executor, cases, folder, report)
+                        _share(executor, cases, folder, report, force)
             arrived_before(comm)  # asleep: those that are done leave their cores to the others
             return max(comm.allgather(_interrupt.received))
     finally:
         gc.unfreeze()
 
 
-def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Result], Any]) -> None:
+def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Result], Any], force: bool) -> None:
     """Hand ``cases`` to the other ranks, and solve here from the end of the list."""
     lock = threading.Lock()
 
@@ -72,25 +74,26 @@ def _share(executor: Any, cases: list[Case], folder: Path, report: Callable[[Res
             with lock:
                 report(Result(of[future].run, "failed", f"{error}") if error else future.result())
 
-    of = {executor.submit(solve_case, case, folder): case for case in cases}
+    of = {executor.submit(solve_case, case, folder, force): case for case in cases}
     for future in of:
         future.add_done_callback(ended)
     if MPI.Query_thread() == MPI.THREAD_MULTIPLE:  # else the manager's thread must be the only one that calls MPI
         for future, case in reversed(of.items()):
             if future.cancel():
-                result = solve_case(case, folder)
+                result = solve_case(case, folder, force)
                 with lock:
                     report(result)
 
 
-def solve_case(case: Case, folder: Path) -> Result:
-    """Solve ``case`` into its run folder on this rank alone, or finish what is there; after a signal begin nothing.
+def solve_case(case: Case, folder: Path, force: bool = False) -> Result:
+    """Solve ``case`` into its run folder on this rank alone, or without ``force`` finish what is there; after a signal
+    begin nothing.
     Whatever goes wrong in a case is its result."""
     if _interrupt.received:
         return Result(case.run, "open")
     begun, run = perf_counter(), of_case(case, folder)
     try:
-        result = _solved(case, run)
+        result = _solved(case, run, force)
     except Exception as error:
         sentence = " ".join(f"{type(error).__name__}: {error}".split())
         with suppress(OSError):
@@ -100,10 +103,10 @@ def solve_case(case: Case, folder: Path) -> Result:
     return replace(result, seconds=perf_counter() - begun)
 
 
-def _solved(case: Case, run: Path) -> Result:
+def _solved(case: Case, run: Path, force: bool) -> Result:
     """Raises whatever goes wrong twice: what is there may not be continued, e.g. by another gmsh, and is replaced."""
     # what is there of a scene that asks for an accuracy is one of its meshes: it cannot be continued
-    for going_on in (case.scene.analysis.accuracy is None, False):
+    for going_on in (case.scene.analysis.accuracy is None and not force, False):
         try:
             claim_folder(run, force=True)
             (run / FAILURE).unlink(missing_ok=True)

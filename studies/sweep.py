@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from archord.output.disk import replace_file
+from archord.output.finished import fault_of_run
 from archord.output.folder import occupied, report_of
 from archord.report.readable import require_file
 from archord.scene.errors import InputError
+from archord.scene.file import AnyScene
 from archord.scene.keys import toml_value
 from archord.scene.scene import Scene
 from archord.studies.cases import Case, Sweep
@@ -27,6 +29,7 @@ _COST = ("message", "steps", "seconds [s]", "iterations", "cutbacks", "cells", "
 _PER_STEP = ("step", "iterations", "cutbacks", "seconds [s]")  # of history.csv; cases.csv has sums of them
 _DOFS_PER_CELL = {2: 4.3, 3: 9.5}
 _STEP = {False: 1.7e-5, True: 2.8e-5}  # seconds per dof of an elastic and of a plastic output step
+_GENERAL = 0.5  # seconds of an output step of a general scene
 _LINEAR = 3e4  # dofs up to which a step costs in proportion to them
 Row = list[str]
 
@@ -34,13 +37,15 @@ Row = list[str]
 @dataclass(frozen=True)
 class Result:
     """How a case ended: ``status`` is "done", "stopped" (no equilibrium, or a file that cannot be written), "failed"
-    (an error), "interrupted", "busy" (another process solves it) or "open"; ``seconds`` are those of this process."""
+    (an error), "interrupted", "busy" (another process solves it) or "open", also where files of a finished case are
+    ``damaged``, as ``message`` says; ``seconds`` are those of this process."""
 
     run: str
     status: str
     message: str = ""
     steps: int = 0
     seconds: float = 0.0
+    damaged: bool = False
 
 
 def of_case(case: Case, folder: Path) -> Path:
@@ -56,6 +61,10 @@ def result_of(case: Case, folder: Path) -> Result:
     report = report_of(run)
     status, steps = report.get("status"), len(report.get("steps", []))
     between_meshes = case.scene.analysis.accuracy is not None and status == "done" and "accuracy" not in report
+    if status == "done" and not between_meshes:
+        fault = fault_of_run(run, case.scene, report)
+        if fault:
+            return Result(case.run, "open", f"{run}: {fault}", damaged=True)
     if status in ("done", "stopped", "interrupted") and not between_meshes:
         return Result(case.run, status, report.get("message", ""), steps)
     return Result(case.run, "open", steps=steps)
@@ -90,20 +99,29 @@ def part_of(cases: list[Case], part: str) -> list[Case]:
     return longest[int(found[1]) - 1 :: int(found[2])]
 
 
-def open_cases(cases: list[Case], folder: Path, *, retry: bool) -> tuple[list[Result], list[Case]]:
-    """What of ``cases`` has ended already, and those that are left; with ``retry`` also those that failed."""
+def open_cases(
+    cases: list[Case], folder: Path, *, retry: bool = False, force: bool = False
+) -> tuple[list[Result], list[Case], list[Result]]:
+    """What of ``cases`` has ended already, those that are left, and the damaged ones among them; with ``retry`` those
+    that stopped or failed are left, too, with ``force`` all."""
     over = ("done",) if retry else ("done", "stopped", "failed")
+    if force:
+        return [], cases, []
     results = [result_of(case, folder) for case in cases]
     left = [case for case, result in zip(cases, results, strict=True) if result.status not in over]
-    return [result for result in results if result.status in over], left
+    damaged = [result for result in results if result.damaged]
+    return [result for result in results if result.status in over], left, damaged
 
 
-def expected_seconds(scene: Scene) -> float:
-    """About how long ``scene`` will take on one rank of a machine of 2020, in a process that has solved before.
+def expected_seconds(scene: AnyScene) -> float:
+    """About how long ``scene`` will take on one rank of a machine of 2020, in a process that has solved before; of a
+    general scene, whose mesh is not known yet, a guess.
 
     Fitted by hand to runs of 2 450 to 8 336 dofs, elastic and plastic (README); beyond ``_LINEAR`` dofs the
     factorisation of a plane mesh grows as dofs^1.5 (George 1973).
     """
+    if not isinstance(scene, Scene):
+        return _GENERAL * len(scene.targets)
     dofs = _DOFS_PER_CELL[scene.analysis.degree] * scene.joint.expected_cells
     step = 0.02 + _STEP[scene.plastic] * dofs * max(1.0, (dofs / _LINEAR) ** 0.5)
     return 0.1 + 2e-5 * dofs + len(scene.targets) * step
@@ -129,7 +147,7 @@ def write_tables(sweep: Sweep, folder: Path, results: Iterable[Result] = ()) -> 
 
 def _rows(sweep: Sweep, folder: Path, found: dict[str, Result]) -> tuple[list[Row], list[Row]]:
     """Headings and rows of both tables."""
-    histories = {run: _history(folder / CASES / run) for run in found}
+    histories = {run: [] if found[run].damaged else _history(folder / CASES / run) for run in found}
     headings = sorted((rows[0] for rows in histories.values() if rows), key=len, reverse=True)
     history = list(dict.fromkeys(name for names in headings for name in names))  # of all: some bodies cannot yield
     last = [i for i, name in enumerate(history) if name not in _PER_STEP]
@@ -157,8 +175,10 @@ def _history(run: Path) -> list[Row]:
     return []
 
 
-def heading(key: str, scene: Scene) -> str:
-    """The dotted ``key`` with its unit: ``joint.clearance [mm]``."""
+def heading(key: str, scene: AnyScene) -> str:
+    """The dotted ``key`` with its unit: ``joint.clearance [mm]``; without, of a general scene."""
+    if not isinstance(scene, Scene):
+        return key
     section, _, name = key.partition(".")
     extra = type(getattr(scene, section)).model_fields[name].json_schema_extra
     kind = extra.get("unit") if isinstance(extra, dict) else None

@@ -118,3 +118,58 @@ def test_a_mesh_of_another_process_is_said_to_be_gone(tmp_path):
     scene = archord.ProblemScene(mesh={"file": "mesh 7 given from Python"}, **parts)
     with pytest.raises(archord.InputError, match="mesh 7 given from Python: is gone with the process that gave it"):
         archord.solve(scene, tmp_path / "run")
+
+
+PARTS = {
+    archord.Body: {"name": "lug", "E": 210e3, "nu": 0.3},
+    archord.Interaction: {"name": "contact", "surfaces": ["pin", "hole"]},
+    archord.Coupling: {"name": "point", "facets": "bore", "point": [0.0, 0.0]},
+    archord.Support: {"name": "clamp", "on": "clamp", "fixed": ["x"]},
+    archord.Load: {"name": "pull", "on": "flat", "direction": "x", "displacement": 0.1},
+    archord.Mesh: {"file": "a.msh"},
+}
+FAULTS = [
+    (archord.Body, {"nu": None}, 'archord.Body: body "lug".nu is missing.'),
+    (archord.Body, {"E": "steel"}, 'archord.Body: body "lug".E = "steel" must be a number.'),
+    (archord.Body, {"E": float("nan")}, 'archord.Body: body "lug".E = NaN must be a finite number.'),
+    (archord.Body, {"young": 1.0}, 'archord.Body: body "lug".young = 1.0 is not a known key; '),
+    (archord.Body, {"name": None}, "archord.Body: body.name is missing."),
+    (archord.Body, {"material": "S999"}, 'archord.Body: body "lug".'),
+    (archord.Body, {"yield_stress": 300.0, "hardening": [[0, 3], [1, 2]]}, 'archord.Body: body "lug".hardening = '),
+    (archord.Interaction, {"surfaces": ["pin"]}, 'archord.Interaction: interaction "contact".surfaces = ["pin"] must'),
+    (archord.Interaction, {"law": "tied", "friction": 0.1}, 'archord.Interaction: interaction "contact".friction'),
+    (archord.Coupling, {"point": [0.0]}, 'archord.Coupling: coupling "point".point = [0.0] must have 2 or more'),
+    (archord.Support, {"fixed": ["z"]}, 'archord.Support: support "clamp".fixed = ["z"]: entry 1 must be '),
+    (archord.Load, {"displacement": None}, 'archord.Load: load "pull".displacement is missing (or force, pressure).'),
+    (archord.Load, {"force": 1.0}, 'archord.Load: load "pull".displacement = 0.1 must not be given together'),
+    (archord.Mesh, {"file": None}, "archord.Mesh: mesh.file is missing (or shape)."),
+    (archord.Mesh, {"refine": -1}, "archord.Mesh: mesh.refine = -1 must be at least 0."),
+    (archord.Problem, {"bodies": 3}, "archord.Problem: body must be a list of parts, not 3."),
+    (archord.Problem, {"mesh": None}, "archord.Problem: mesh must be a mesh file, gmsh with a model, "),
+    (archord.Problem, {"loads": []}, "scene: load = [] must not be empty."),
+    (archord.Problem, {"bodis": []}, "scene: bodis = [] is not a known key; "),
+    (archord.Problem, {"analysis": {"plane": "axisymmetric"}}, 'scene: analysis.plane = "axisymmetric" must be '),
+]  # fmt: skip
+PARTS[archord.Problem] = {
+    "mesh": "a.msh",
+    "bodies": [archord.Body(**PARTS[archord.Body])],
+    "loads": [archord.Load(**PARTS[archord.Load])],
+}
+
+
+@pytest.mark.parametrize(("make", "change", "said"), FAULTS)
+def test_a_part_from_python_is_refused_in_a_sentence(make, change, said):
+    """As the section of a scene file is, and when it is made; what is right makes one."""
+    right = PARTS[make]
+    assert make(**right)
+    with pytest.raises(archord.InputError) as error:
+        make(**(right | change))
+    assert str(error.value).startswith(said)
+    assert "\n" not in str(error.value)
+
+
+def test_parts_take_keys_and_numbers_of_numpy():
+    with pytest.raises(archord.InputError, match=r"archord\.Body: takes its keys by name, as name=value; they are "):
+        archord.Body("lug")
+    body = archord.Body(name="lug", E=np.float32(2.0), nu=np.float64(0.25), yield_stress=None)
+    assert (body.E, body.nu, body.model_fields_set) == (2.0, 0.25, {"name", "E", "nu"})

@@ -1,6 +1,5 @@
 """What commands refuse: one sentence, exit code 2, nothing written, and runs that stay as they are."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import pytest
 
 from archord.postprocess.run import _NEEDED, Run
 from archord.scene.errors import InputError
+from tests.output.run_files import rewrite_report
 from tests.test_cli import SCENE, archord
 
 JOINT = ["--radius", "10", "--clearance", "0.05", "--E-star", "115385"]
@@ -121,6 +121,7 @@ def test_a_broken_run_is_one_sentence(runs, tmp_path, monkeypatch, refused, comm
     """A file cut short (to so many bytes), missing or with another text: no table, no picture."""
     monkeypatch.chdir(tmp_path)
     file = shutil.copytree(runs["coarse"], tmp_path / "run") / name
+    rewrite_report(tmp_path / "run", files={})  # of what was sealed less is read before it is refused
     whole = file.read_bytes()
     file.unlink()
     if content is not None:
@@ -147,6 +148,6 @@ def test_a_broken_run_is_one_sentence(runs, tmp_path, monkeypatch, refused, comm
 def test_a_report_of_other_types_is_one_sentence(runs, tmp_path, key, value):
     """It names the key, wherever in it the fault is."""
     path = shutil.copytree(runs["coarse"], tmp_path / "run") / "run.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    rewrite_report(path.parent, **{key: value})
     with pytest.raises(InputError, match=rf"run\.json: cannot be read as the report of a run: {key}.*\.$"):
         Run(path.parent)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from archord.postprocess.curve import gap_name
 from archord.postprocess.fields import magnification, magnified
-from archord.postprocess.pictures.problems import draw_cells, draw_outline
+from archord.postprocess.pictures.problems import draw_field, draw_outline, shown_step, shown_steps
 from archord.postprocess.run import Run
 from archord.scene.scene import Scene
 
-_STEPS = 4  # whose pressure is drawn
 _BEFORE: dict[str, Any] = {"color": "0.55", "lw": 0.9}
 
 
@@ -41,11 +41,11 @@ def force_panel(axes: Any, run: Run) -> None:
     axes.secondary_yaxis("right", **_over(unit)).set_ylabel("P / (E* R)")
 
 
-def arc_panel(axes: Any, run: Run) -> None:
-    """Mean contact pressure of each facet over the angle from the contact axis, at up to four steps: of the hole, and
-    dashed of the pin."""
-    scene, shown = run.scene, {max(1, round(run.steps * k / _STEPS)) for k in range(1, _STEPS + 1)}
-    for i, step in enumerate(sorted(shown)):
+def arc_panel(axes: Any, run: Run, steps: Sequence[int] = ()) -> None:
+    """Mean contact pressure of each facet over the angle from the contact axis, at ``steps`` (up to four): of
+    the hole, and dashed of the pin."""
+    scene = run.scene
+    for i, step in enumerate(steps or shown_steps(run)):
         arcs = run.contact(step)
         for side, arc in arcs.items():
             angle, p = arc.facet_means()
@@ -60,10 +60,10 @@ def arc_panel(axes: Any, run: Run) -> None:
     axes.secondary_yaxis("right", **_over(scene.E_star)).set_ylabel("p / E*")
 
 
-def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
-    """`draw_cells` at ``step`` (the last) on the deformed joint near the contact, with its outline before (grey) and
-    after; displacement and clearance are magnified by the factor in the title."""
-    scene, fields = run.scene, run.fields(step)
+def field_panel(axes: Any, run: Run, step: int | None = None, field: str = "") -> None:
+    """`draw_field` at ``step`` (that of `shown_step`) on the deformed joint near the contact, with its outline before
+    (grey) and after; displacement and clearance are magnified by the factor in the title."""
+    scene, fields = run.scene, run.fields(step or shown_step(run))
     factor = magnification(scene, fields)
     x, ring, R = magnified(scene, fields, factor), scene.joint.is_ring, scene.joint.radius
     gap = max(0.0, factor * scene.joint.dR)
@@ -73,7 +73,7 @@ def field_panel(axes: Any, run: Run, step: int | None = None) -> None:
     near = (corners.max(axis=1) > [0, low]).all(axis=1) & (corners.min(axis=1) < [right, high]).all(axis=1)
     # in a ring the core on which the load acts does not count for the range of colours
     away = np.hypot(*fields.coordinates[fields.cells[:, :3]].mean(axis=1).T) > (R / 2 if ring else 0)
-    draw_cells(axes, run, fields, x, near, away)
+    draw_field(axes, run, fields, x, near, away, field)
     draw_outline(axes, fields, magnified(scene, fields, factor, displaced=False), **_BEFORE)
     draw_outline(axes, fields, x, color="black", lw=1.1)
     if scene.pin.rigid:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import compress
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,18 +34,41 @@ def save_figure(figure: Figure, target: Path) -> Path:
     return target
 
 
-def draw_run(run: Run, target: Path | str) -> Path:
-    """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``; returns the file. Raises
-    `InputError`."""
-    run.number(None)
-    draws: list[Any] = [problems.field_panel, problems.contact_panel, problems.load_panel]
-    if run.is_joint:
-        draws = [joint.field_panel, joint.arc_panel, joint.force_panel]
-    draws = list(compress(draws, (run.scene.output.fields, run.has_contact, True)))
+def draw_run(
+    run: Run, target: Path | str, *, steps: Sequence[int] = (), field: str = "", edges: Sequence[str] = ()
+) -> Path:
+    """Draw field, if the run wrote it, contact pressure and forces of ``run`` as ``target``; returns the file.
+
+    The ``field``, by default PEEQ or von Mises stress, is that of the first of ``steps``, by default the last step, or
+    of an unloaded run that with the largest load. Named ``edges`` of the mesh take the place of the contact pressure:
+    along them the ``field``, or the hoop stress, is drawn at all ``steps``. Raises `InputError`.
+    """
+    draws = panels_of(run, steps=steps, field=field, edges=edges)
     figure = new_figure(5.0 * len(draws), 4.4)
     for axes, draw in zip(np.atleast_1d(figure.subplots(1, len(draws))), draws, strict=True):
-        draw(axes, run)
+        draw(axes)
     return save_figure(figure, Path(target))
+
+
+def panels_of(
+    run: Run, *, steps: Sequence[int] = (), field: str = "", edges: Sequence[str] = ()
+) -> list[Callable[[Any], None]]:
+    """What `draw_run` draws, a function of the axes each. Raises `InputError` for a step that the run does not have."""
+    run.number(None)
+    numbers = [run.number(step) for step in steps]
+    kind: Any = joint if run.is_joint else problems
+    pressure = joint.arc_panel if run.is_joint else problems.contact_panel
+    forces = joint.force_panel if run.is_joint else problems.load_panel
+    draws: list[Callable[[Any], None]] = []
+    of_body = "" if edges and field in problems.OF_EDGES else field
+    if run.scene.output.fields or of_body:
+        draws.append(lambda axes: kind.field_panel(axes, run, numbers[0] if numbers else None, of_body))
+    if edges:
+        draws.append(lambda axes: problems.edge_panel(axes, run, edges, field, numbers))
+    elif run.has_contact:
+        draws.append(lambda axes: pressure(axes, run, numbers))
+    draws.append(lambda axes: forces(axes, run))
+    return draws
 
 
 def draw_probe(probe: Probe, target: Path) -> Path:
@@ -59,7 +81,8 @@ def draw_probe(probe: Probe, target: Path) -> Path:
             with_headings(probe.frame()).to_csv(new, index=False, float_format="%.12g", lineterminator="\n")
         return target
     figure = new_figure(6.0, 4.4)
-    problems.draw_probes(figure.subplots(), [probe], [f"{probe.place}, step {probe.step}"])
+    label = f"{probe.place}, step {probe.step}"
+    problems.draw_probes(figure.subplots(), [probe], [label], probe.length)
     return save_figure(figure, target)
 
 

@@ -267,7 +267,7 @@ def test_only_step_control_may_change(halted):
         (lambda run: (run / "fields" / "0001.h5").unlink(), r"fields\.h5: is missing or damaged"),
         (lambda run: (run / "contact.h5").unlink(), r"contact\.h5: is missing or damaged"),
         (lambda run: (run / "run.json").unlink(), r"run\.json: is missing"),
-        (lambda run: (run / "run.json").write_text("{"), r"run\.json: is missing or lacks some of the 1 step"),
+        (lambda run: (run / "run.json").write_text("{"), r"run\.json: is missing, was changed, or lacks some"),
         (lambda run: os.truncate(run / "checkpoint.h5", 5000), r"checkpoint\.h5: is damaged"),
     ],
 )

@@ -18,15 +18,15 @@ from tests.output.vtk_reader import VtkFile
 REFERENCE = {0.1: (3.424, 3.78), 0.3: (3.072, 3.190)}
 
 
-def solved(folder, size, displacement, analysis=None, **shape):
+def solved(folder, size, displacement, analysis=None, lug=None, **shape):
     """An elastic lug with a hole of radius 10, its half or whole, in as many steps as there are displacements."""
-    lug = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
-    lug |= {"element_size": size, "growth": 0.3, **shape}
+    lug_shape = {"kind": "lug", "radius": 9.9, "clearance": 0.1, "width": 40.0, "edge_distance": 20.0, "length": 60.0}
+    lug_shape |= {"element_size": size, "growth": 0.3, **shape}
     steel = {"E": 210000.0, "nu": 0.3}
     half = shape.get("half", True)
     scene = archord.Problem(
-        {"shape": lug},
-        bodies=[{"name": name} | steel for name in ("pin", "lug")],
+        {"shape": lug_shape},
+        bodies=[{"name": "pin"} | steel, {"name": "lug"} | (lug or steel)],
         interactions=[{"name": "contact", "surfaces": ["pin", "hole"]}],
         supports=[
             {"name": "axis", "on": "axis", "fixed": ["y"]},
@@ -170,6 +170,21 @@ def test_the_command_prints_and_draws(lug, tmp_path, capsys):
     assert heading == ["s", "angle [°]", "x", "y", "hoop/(P/L)"]
     assert len(rows) == len(factor.s)
     assert (tmp_path / "probe.png").stat().st_size > 10_000
+
+
+def test_residual_stress_is_told_where_it_is_compressive(tmp_path, capsys):
+    """A hole that yielded in tension is pressed together when unloaded: the smallest value says so."""
+    plastic = {"E": 210000.0, "nu": 0.3, "yield_stress": 355.0, "hardening": 1000.0}
+    run = solved(tmp_path / "run", 2.0, [0.35, 0.0], lug=plastic)
+    assert command(["probe", str(run.folder), "--edge", "hole"]) == 0
+    printed = capsys.readouterr().out
+    hoop = run.probe("hole")
+    k = hoop.smallest
+    assert hoop.values[k] == hoop.values.min() < -100 < hoop.values[hoop.largest]
+    assert 60 < hoop.angle[k] < 95  # where the largest stress of the loaded hole was
+    assert f"smallest: {hoop.values[k]:.6g} MPa at {hoop.angle[k]:.4g}°, x = {hoop.x[k, 0]:.6g}, y = " in printed
+    line = run.probe(line=[0.0, 10.0, 0.0, 20.0], quantity="stress_xx")
+    assert line.where(line.smallest).startswith(f"at s = {line.s[line.smallest]:.6g}, x = 0, y = 1")
 
 
 def test_general_runs_are_shown_compared_and_exported(lug, tmp_path, capsys):

@@ -1,6 +1,5 @@
 """``archord show`` as a user runs it."""
 
-import json
 import shutil
 
 import matplotlib.image
@@ -11,7 +10,7 @@ from archord.cli import run as command
 from archord.postprocess.pictures.joint import field_panel
 from archord.postprocess.run import Run
 from archord.report.figure import new_figure
-from tests.output.run_files import solved
+from tests.output.run_files import rewrite_report, solved
 
 
 def test_show_prints_the_run_and_draws_it(runs, tmp_path, capsys):
@@ -66,8 +65,7 @@ def test_show_draws_what_there_is_of_other_runs(tmp_path, capsys):
 def test_a_long_history_is_thinned_and_a_killed_run_shown_as_far_as_it_came(runs, tmp_path, capsys):
     """Forty rows, first and last included, and where the others are; half a row at the end does not count."""
     copy = shutil.copytree(runs["coarse"], tmp_path / "run")
-    report = json.loads((copy / "run.json").read_text())
-    (copy / "run.json").write_text(json.dumps(report | {"status": "running"}))
+    rewrite_report(copy, files={}, status="running", steps=[])
     heading, *rows = (copy / "history.csv").read_text().splitlines()
     long = [f"{k},{rows[-1].partition(',')[2]}" for k in range(1, 101)]
     (copy / "history.csv").write_text("\n".join([heading, *long, "101,0.0"]))

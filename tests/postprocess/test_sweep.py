@@ -82,3 +82,19 @@ def test_broken_tables_are_one_sentence(tmp_path, refused, text):
 def test_a_sweep_is_no_run(sweep, refused, command):
     said = f"{sweep}: is a sweep, not a run; its runs are the folders in {sweep}/cases.\n"
     assert refused([*command.split(), str(sweep), *[str(sweep)] * (command == "compare")]) == said
+
+
+def test_a_legend_has_the_varied_values(sweep, tmp_path, capsys):
+    """Not the names of cases; a case that is done and cannot be read is told, not left out in silence."""
+    copy = shutil.copytree(sweep, tmp_path / "sweep")
+    loaded = archord.load(copy)
+    assert len(loaded.moving) > 0
+    for case in loaded.runs:
+        label = loaded.label(case)
+        for key in loaded.moving:
+            assert f"{key.rpartition('.')[2]} = " in label
+    assert len({loaded.label(case) for case in loaded.runs}) == len(loaded.runs)
+    assert loaded.unread == {}
+    (loaded.run(2).folder / "history.csv").write_text("")
+    assert command(["show", str(copy), "--no-pictures"]) == 0
+    assert "case 2 is left out: " in capsys.readouterr().out

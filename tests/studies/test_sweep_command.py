@@ -1,5 +1,7 @@
 """archord sweep as a user runs it, in this process: what is solved, what is not solved again, what the tables say."""
 
+import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -7,7 +9,7 @@ import pytest
 from archord.cli import run
 from archord.output.history import read_history
 from archord.studies.cases import read_sweep
-from archord.studies.sweep import result_of
+from archord.studies.sweep import of_case, result_of
 from tests.studies.parts import SOFT, STUCK, break_mesh, numbers, sweep, table, times, written
 
 
@@ -197,3 +199,53 @@ def test_absent_keys_lists_and_identical_cases(tmp_path, capsys):
     assert len(list((out / "cases").iterdir())) == 4
     assert [row["block.yield_stress [E*]"] for row in rows] == ["", "", "", "0.05", "0.05", "0.05"]
     assert [row["load.displacement"] for row in rows] == 2 * ["0.5", "[0.5, 0.2]", "[0.5, 0.2]"]
+
+
+def _cut(run: Path) -> None:
+    os.truncate(run / "history.csv", 200)
+
+
+def _swap(run: Path) -> None:
+    other = next(case for case in sorted(run.parent.iterdir()) if case != run)
+    shutil.rmtree(run)
+    shutil.copytree(other, run)
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (_cut, "history.csv has 200 bytes, not the "),
+        (_swap, "scene.toml is that of another scene"),
+        (lambda run: os.truncate(run / "contact.h5", 2000), "contact.h5 has 2000 bytes, not the "),
+    ],
+)
+def test_a_case_whose_files_disagree_is_solved_again(solved, tmp_path, capsys, damage, said):
+    """Not called done with empty columns: the tables are what they were; a gathering has no numbers for it."""
+    out = shutil.copytree(solved / "out", tmp_path / "out")
+    design = read_sweep(solved / "some.sweep.toml")
+    case = design.distinct[2]
+    damage(of_case(case, out))
+    assert sweep(solved / "some.sweep.toml", "-o", out, "--gather", "-q") == 0
+    assert said in capsys.readouterr().err
+    row = table(out / "cases.csv")[2]
+    assert (row["status"], row["P [E* R]"]) == ("open", "")
+    assert said in row["message"]
+    assert sweep(solved / "some.sweep.toml", "-o", out) == 0
+    printed = capsys.readouterr()
+    assert f"{case.run}: {said}" in printed.err
+    assert printed.err.count("the case is solved again") == 1
+    assert "5 of 6 cases are there already" in printed.out
+    assert numbers(out) == numbers(solved / "out")
+
+
+def test_force_solves_all_cases_again(solved, tmp_path, capsys):
+    """And nothing else goes with it that keeps cases."""
+    out = shutil.copytree(solved / "out", tmp_path / "out")
+    before = times(out)
+    assert sweep(solved / "some.sweep.toml", "-o", out, "--force") == 0
+    assert "there already" not in capsys.readouterr().out
+    own = {case.run for case in read_sweep(solved / "some.sweep.toml").distinct}
+    kept = [name for name, now in times(out).items() if now <= before[name]]
+    assert own.isdisjoint(name.split("/")[1] for name in kept)
+    assert numbers(out) == numbers(solved / "out")
+    assert sweep(solved / "some.sweep.toml", "-o", out, "--force", "--gather") == 2

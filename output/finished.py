@@ -1,0 +1,47 @@
+"""Whether a run that says that it is done is a finished run of a scene: whether its files agree with run.json."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from archord.output.history import fault_of_history, read_history
+from archord.output.seal import faults_of
+from archord.scene.file import AnyScene, load_scene, resolved
+
+
+def fault_of_run(folder: Path, scene: AnyScene, report: dict[str, Any]) -> str:
+    """Why the run in ``folder`` with the run.json ``report`` is no finished run of ``scene``, in words; nothing where
+    its files agree. Of large files only the size is read."""
+    if not _is_of(folder, scene):
+        return "scene.toml is that of another scene"
+    faults = faults_of(folder, report.get("files", {}), quick=True)
+    if faults:
+        return "; ".join(f"{name} {fault}" for name, fault in faults.items())
+    fault = history_fault(folder, report)
+    return f"history.csv {fault}" if fault else ""
+
+
+def history_fault(folder: Path, report: dict[str, Any]) -> str:
+    """What is wrong with the history.csv in ``folder``, in words; nothing where it agrees with the ``report``."""
+    path = folder / "history.csv"
+    try:
+        if not path.read_bytes().endswith(b"\n"):
+            return "was cut short"
+        return fault_of_history(read_history(path), report)
+    except OSError as error:
+        return f"cannot be read ({error.strerror})"
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return "is no table of the run's steps"
+
+
+def _is_of(folder: Path, scene: AnyScene) -> bool:
+    """Whether scene.toml holds ``scene``; of one that leaves the mesh to an accuracy it holds another mesh."""
+    if scene.analysis.accuracy is not None:
+        return True
+    wanted = resolved(scene)
+    path = folder / "scene.toml"
+    try:
+        return path.read_text(encoding="utf-8") == wanted or resolved(load_scene(path)) == wanted
+    except (OSError, ValueError):  # an InputError is a ValueError
+        return False

@@ -1,0 +1,230 @@
+"""A run as a report of two or three pages: what was solved, how it went, what came of it, as a PDF file."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from archord.output.disk import new_name
+from archord.output.user_file import check_target, writing
+from archord.postprocess.fields import Fields
+from archord.postprocess.pictures.pictures import panels_of
+from archord.postprocess.pictures.problems import draw_outline
+from archord.postprocess.run import Run
+from archord.postprocess.tables import cost_of, facts_of, first_of_each_kind, history_table, peaks_of
+from archord.presets.measures import ENERGIES
+from archord.report.figure import new_figure
+from archord.report.table import Table
+from archord.report.version import VERSION
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_PAGE = (8.27, 11.69)  # A4, in inches
+_MARGIN = 0.08  # of the page's width
+_SMALL = 7.0  # points
+_CHARACTERS = 112  # of a line of such text
+_LINES = 84  # of a page of it
+_LINES_BELOW = 58  # of a page below the mesh
+_TITLE = 36  # characters of a panel's title
+_ROWS = 30  # of the table of steps
+_MOST_WARNINGS = 20
+
+_BALANCES = ("force_balance", "energy_balance", "newton_residual")
+
+
+def write_report(run: Run, target: Path, *, force: bool = False) -> Path:
+    """Write the report of ``run`` as the PDF file ``target``; returns it. The file is written beside and moved. Raises
+    `InputError` for a run without an accepted step, and if ``target`` is there and ``force`` is not given."""
+    from matplotlib.backends.backend_pdf import PdfPages
+
+    run.number(None)
+    check_target(target, force=force)
+    # all is drawn before the file is begun: what a run lacks is told first
+    figures = list(_pages_of(run))
+    new = new_name(target)
+    try:
+        with writing(target):
+            with PdfPages(new, metadata={"Title": f"archord: {run.folder}", "Creator": f"archord {VERSION}"}) as pages:
+                for number, figure in enumerate(figures, 1):
+                    _foot(figure, run, number, len(figures))
+                    pages.savefig(figure)
+            new.replace(target)
+    finally:
+        new.unlink(missing_ok=True)
+    return target
+
+
+def _text_of(run: Run) -> list[str]:
+    """What was solved, what came of it, cost, versions, warnings, and the table of steps, in lines."""
+    lines = [*_wrapped(run.message), *_listed(facts_of(run)), "", *_wrapped(peaks_of(run)), ""]
+    lines += _listed(row for row in cost_of(run) if row[0] != "warning")
+    warnings = first_of_each_kind(run.warnings)
+    told = [("warning", warning) for warning in warnings[:_MOST_WARNINGS]]
+    if len(warnings) > _MOST_WARNINGS:
+        told.append(("", f"{len(warnings) - _MOST_WARNINGS} more in {run.folder / 'run.json'}"))
+    lines += ["", *_listed(told or [("warnings", "none")]), ""]
+    table = history_table(run)
+    n = len(table.rows)
+    if n > _ROWS:
+        table.rows = [table.rows[round(k)] for k in np.linspace(0, n - 1, _ROWS)]
+        lines += [f"{_ROWS} of {n} steps; {run.folder / 'history.csv'} has all of them", ""]
+    return lines + table.within(_CHARACTERS).splitlines()
+
+
+def _pages_of(run: Run) -> Iterator[Figure]:
+    """The pages in their order; the text goes on behind the pictures where the first page is full."""
+    lines = _text_of(run)
+    figure = _page(f"{run.folder.resolve().name}: {run.status}, {run.steps} of {len(run.scene.targets)} steps")
+    room = _LINES
+    text: Any = figure
+    if run.scene.output.fields:
+        mesh, text = figure.subfigures(2, 1, height_ratios=[1, 2.2])
+        _draw_mesh(mesh.subplots(), run, run.fields(run.number(None)))
+        room = _LINES_BELOW
+    _put(text, lines[:room])
+    yield figure
+    yield _results_page(run)
+    for k in range(room, len(lines), _LINES):
+        figure = _page("continued")
+        _put(figure, lines[k : k + _LINES])
+        yield figure
+
+
+def _results_page(run: Run) -> Figure:
+    """Field, contact pressure and forces, and how the solve converged."""
+    figure = _page("results and convergence")
+    panels = [*panels_of(run), _iterations_panel(run), _balance_panel(run), _energy_panel(run)]
+    rows = (len(panels) + 1) // 2
+    axes = figure.subplots(rows, 2, squeeze=False).ravel()
+    for place, draw in zip(axes, panels, strict=False):
+        draw(place)
+        title = [part for line in place.get_title().splitlines() for part in textwrap.wrap(line, _TITLE)]
+        place.set_title("\n".join(title), fontsize="medium")
+    for place in axes[len(panels) :]:
+        place.set_axis_off()
+    return figure
+
+
+def _iterations_panel(run: Run) -> Any:
+    def draw(axes: Any) -> None:
+        steps = run.columns["step"]
+        axes.bar(steps, run.columns["iterations"], color="tab:blue", label="Newton iterations")
+        if any(run.columns["cutbacks"]):
+            axes.plot(steps, run.columns["cutbacks"], "o", color="tab:red", label="cutbacks")
+        totals = run.summary["totals"]
+        said = f"{totals.get('newton_iterations', 0):g} iterations, {totals.get('cutbacks', 0):g} cutbacks"
+        axes.set(xlabel="step", ylabel="number", title=said)
+        axes.legend(frameon=False, fontsize="small")
+        axes.grid(alpha=0.3)
+
+    return draw
+
+
+def _balance_panel(run: Run) -> Any:
+    def draw(axes: Any) -> None:
+        steps = run.columns["step"]
+        balance = np.abs(np.nan_to_num(run.columns.get("force_balance", [0.0] * run.steps)))
+        residuals = [_last_residual(step) for step in run.summary["steps"]]
+        curves = {"force balance": balance, "last residual": residuals[: run.steps]}
+        for name, values in curves.items():
+            shown = [value if value else np.nan for value in values]
+            if np.isfinite(shown).any():
+                axes.semilogy(steps[: len(shown)], shown, ".-", label=name)
+        estimates = run.summary.get("error_estimates", {})
+        told = [
+            f"{name.replace('_', ' ')} {estimates[name]:.1e}" for name in _BALANCES if estimates.get(name) is not None
+        ]
+        axes.set(xlabel="step", ylabel="relative error")
+        axes.set_title(", ".join(told))
+        if axes.lines:
+            axes.legend(frameon=False, fontsize="small")
+        axes.grid(alpha=0.3)
+
+    return draw
+
+
+def _energy_panel(run: Run) -> Any:
+    def draw(axes: Any) -> None:
+        for name in ("work", *ENERGIES):
+            if name in run.columns:
+                axes.plot(run.columns["step"], run.columns[name], ".-", label=name.replace("_", " "))
+        axes.set(xlabel="step", ylabel=f"energy [{run.units.get('work', '-')}]", title="energy balance")
+        axes.legend(frameon=False, fontsize="small")
+        axes.grid(alpha=0.3)
+
+    return draw
+
+
+def _last_residual(step: dict[str, Any]) -> float:
+    """The residual with which the last solve of a step ended; NaN where none is known."""
+    solves = [residuals for residuals in step.get("residuals", []) if residuals]
+    last = solves[-1][-1] if solves else None
+    return float("nan") if last is None else float(last)
+
+
+def _draw_mesh(axes: Any, run: Run, fields: Fields) -> None:
+    """The cells as they were drawn, each body in a tint, and the outline."""
+    from matplotlib import colormaps
+    from matplotlib.collections import PolyCollection
+
+    x, corners = fields.coordinates, 3 if fields.cells.shape[1] == 6 else 4
+    for k, (name, tag) in enumerate(fields.bodies.items()):
+        cells = x[fields.cells[fields.body == tag][:, :corners]]
+        tint = colormaps["Pastel2"](k % 8)
+        axes.add_collection(PolyCollection(cells, facecolors=[tint], edgecolors="0.5", linewidths=0.2, label=name))
+    draw_outline(axes, fields, x, color="black", lw=0.8)
+    axes.autoscale_view()
+    length = run.scene.units.length
+    axes.set(aspect="equal", xlabel=f"x [{length}]", ylabel=f"y [{length}]", title="mesh")
+    axes.legend(frameon=False, fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _page(title: str) -> Figure:
+    figure = new_figure(*_PAGE)
+    figure.get_layout_engine().set(rect=(0.03, 0.04, 0.94, 0.93), hspace=0.04, wspace=0.06)
+    figure.suptitle(title, x=_MARGIN, ha="left", fontsize="large", fontweight="bold")
+    return figure
+
+
+def _foot(figure: Figure, run: Run, number: int, of: int) -> None:
+    when = datetime.now(UTC).strftime("%Y-%m-%d")
+    said = f"archord {run.summary['versions'].get('archord', '?')}, report by {VERSION}, {when}; {run.folder}"
+    figure.text(_MARGIN, 0.015, said, fontsize=_SMALL, color="0.4")
+    figure.text(1 - _MARGIN, 0.015, f"{number} / {of}", fontsize=_SMALL, color="0.4", ha="right")
+
+
+def _listed(rows: Iterable[tuple[str, str]]) -> list[str]:
+    """Text behind names, wrapped."""
+    table = Table("", "", left=2)
+    for name, text in rows:
+        first, *more = textwrap.wrap(text, _CHARACTERS - 26, break_long_words=True) or [""]
+        table.add(name[:24], first)
+        for line in more:
+            table.add("", line)
+    return str(table).splitlines()
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, _CHARACTERS)
+
+
+def _put(figure: Any, lines: Sequence[str]) -> None:
+    """Lines of small text from the top of a page or its part."""
+    text = "\n".join(lines)
+    # not for mathtext: a dollar in a name is a dollar
+    figure.text(
+        _MARGIN,
+        0.96,
+        text,
+        va="top",
+        family="monospace",
+        fontsize=_SMALL,
+        parse_math=False,
+        transform=figure.transSubfigure,
+    )

@@ -1,0 +1,153 @@
+"""Pictures of chosen steps, fields and edges; reports; and what is drawn where there is nothing to colour."""
+
+import re
+import shutil
+from dataclasses import replace
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+import archord
+from archord.cli import run as command
+from archord.postprocess.pictures.problems import draw_field, shown_step
+from archord.postprocess.run import Run
+from archord.postprocess.tables import run_text
+from archord.report.figure import new_figure
+from tests.output.run_files import rewrite_report
+from tests.postprocess.test_probe import solved
+
+
+@pytest.fixture(scope="module")
+def unloaded(tmp_path_factory):
+    """A lug that is pulled and let go again: no force at the last step."""
+    return solved(tmp_path_factory.mktemp("unloaded") / "run", 2.5, [0.1, 0.2, 0.0])
+
+
+def _drawn(run, fields=None, **asked):
+    """The axes of a field and of its scale of colours."""
+    figure = new_figure(5.0, 4.0)
+    axes = figure.subplots()
+    fields = fields or run.fields(shown_step(run))
+    everywhere = np.ones(len(fields.cells), dtype=bool)
+    draw_field(axes, run, fields, fields.deformed, everywhere, everywhere, **asked)
+    figure.canvas.draw()
+    return figure.axes
+
+
+def test_the_largest_load_is_drawn_where_the_last_step_has_none(unloaded, runs):
+    assert unloaded.columns["pull force"][-1] < 1e-6 * unloaded.columns["pull force"][1]
+    assert shown_step(unloaded) == 2
+    assert shown_step(Run(runs["plastic"])) == 8
+
+
+@pytest.mark.parametrize(
+    ("field", "label"),
+    [
+        ("", "von Mises stress [MPa]"),
+        ("stress", "von Mises stress [MPa]"),
+        ("displacement", "displacement [mm]"),
+        ("pressure", "contact pressure [MPa]"),
+        ("stress_xx", "stress xx [MPa]"),
+        ("p1", "p1 [MPa]"),
+    ],
+)
+def test_the_scale_of_colours_has_the_fields_name_unit_and_range(unloaded, field, label):
+    """A field of both signs has 0 in its middle."""
+    axes, bar = _drawn(unloaded, field=field)
+    assert bar.get_ylabel() == label
+    low, high = axes.collections[0].get_clim()
+    assert low == pytest.approx(-high) if field in ("stress_xx", "p1") else low == 0
+    if field == "displacement":
+        assert high == pytest.approx(np.hypot(*unloaded.fields(2).displacement.T).max(), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("stress", "said"), [(0.0, "0 everywhere"), (3.5, "3.5 everywhere"), (np.nan, "no finite number")]
+)
+def test_a_field_without_a_range_is_told_and_not_coloured(unloaded, stress, said):
+    """A body that is held all over has no stress: no scale that would end at nothing."""
+    fields = unloaded.fields(2)
+    axes = _drawn(unloaded, replace(fields, von_mises=np.full(len(fields.cells), stress), peeq=None))
+    assert len(axes) == 1
+    assert axes[0].texts[0].get_text() == f"von Mises stress [MPa]: {said}"
+
+
+def test_numbers_that_are_none_do_not_spoil_the_others(unloaded):
+    """The scale ends at the largest finite one."""
+    fields = unloaded.fields(2)
+    values = fields.von_mises.copy()
+    values[:3] = np.nan
+    axes, _ = _drawn(unloaded, replace(fields, von_mises=values))
+    assert axes.collections[0].get_clim() == (0, pytest.approx(np.nanmax(values)))
+
+
+def test_picture_takes_steps_field_and_edges(unloaded, tmp_path, refused, runs, capsys):
+    """Of a general run and of a joint; what is not there is a sentence."""
+    asked = [
+        ["--step", "1", "--field", "displacement"],
+        ["--edge", "hole", "--edge", "pin"],
+        ["--field", "hoop", "--edge", "hole"],
+    ]
+    for folder in (str(unloaded.folder), str(runs["plastic"])):
+        for k, options in enumerate(asked[: 3 if folder == str(unloaded.folder) else 1]):
+            target = tmp_path / f"{k}.png"
+            assert command(["picture", folder, *options, "-o", str(target)]) == 0
+            assert matplotlib.image.imread(target).std() > 0.05
+    capsys.readouterr()
+    target = ["-o", str(tmp_path / "no.png")]
+    assert "has no field 'strain'; its fields are stress, " in refused(
+        ["picture", str(unloaded.folder), "--field", "strain", *target]
+    )
+    assert "has no edge 'rim'" in refused(["picture", str(unloaded.folder), "--edge", "rim", *target])
+    assert "has no step 9" in refused(["picture", str(unloaded.folder), "--step", "9", *target])
+    assert not (tmp_path / "no.png").exists()
+
+
+def test_show_cuts_no_word(unloaded):
+    """In a terminal of 80 characters every line fits, and what is said is what is said without one."""
+    wide, narrow = run_text(unloaded), run_text(unloaded, 80)
+    assert " ... " not in wide
+    assert max(map(len, narrow.splitlines())) <= 80
+    assert set(wide.split()) <= set(narrow.split())
+
+
+def test_a_report_is_a_pdf_of_two_or_three_pages(unloaded, runs, tmp_path, refused, capsys):
+    """With and without fields or warnings; one that is there is kept without --force."""
+    bare = shutil.copytree(runs["coarse"], tmp_path / "bare")
+    text = (bare / "scene.toml").read_text()
+    (bare / "scene.toml").write_text(re.sub(r"fields = .*", "fields = false", text))
+    rewrite_report(bare, files={}, warnings=[f"step 1: {'very ' * k}strange" for k in range(60)])
+    for folder in (unloaded.folder, runs["plastic"], bare):
+        target = tmp_path / f"{folder.name}.pdf"
+        assert command(["report", str(folder), "-o", str(target)]) == 0
+        content = target.read_bytes()
+        assert content.startswith(b"%PDF")
+        assert content.rstrip().endswith(b"%%EOF")
+        assert len(re.findall(rb"/Type /Page\b", content)) in (2, 3)
+        capsys.readouterr()
+        assert "is there already" in refused(["report", str(folder), "-o", str(target)])
+        assert command(["report", str(folder), "-o", str(target), "--force"]) == 0
+    assert not list(tmp_path.glob("*.new"))
+    capsys.readouterr()
+    assert "cannot be written" in refused(["report", str(bare), "-o", str(tmp_path / "no" / "x.pdf")])
+
+
+def test_a_report_that_fails_keeps_the_old_one(unloaded, tmp_path, monkeypatch):
+    """Whatever goes wrong while it is written."""
+    from matplotlib.backends import backend_pdf
+
+    target = tmp_path / "x.pdf"
+    target.write_text("old")
+
+    def full(self, figure):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(backend_pdf.PdfPages, "savefig", full)
+    assert command(["report", str(unloaded.folder), "-o", str(target), "--force"]) == 2
+    assert target.read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["x.pdf"]
+
+
+def test_the_command_is_a_public_function(unloaded, tmp_path):
+    assert archord.draw_run(unloaded, tmp_path / "a.png", steps=[1, 2], field="stress", edges=["hole"]).is_file()

@@ -1,0 +1,62 @@
+"""Sweeps of general scenes and of presets: cases, names, tables, pictures."""
+
+import pytest
+
+import archord
+from archord.cli import run
+from archord.studies.cases import read_sweep
+from tests.studies.parts import sweep, table
+
+LUG = """
+[grid]
+lug.width = [36.0, 40.0]
+load.displacement = [0.05, 0.1]
+[base]
+lug = { radius = 9.9, clearance = 0.1, edge_distance = 20.0, length = 60.0, width = 40.0, element_size = 3.0 }
+pin = { E = 210000.0, nu = 0.3 }
+plate = { E = 210000.0, nu = 0.3 }
+load = { displacement = 0.1, steps = 1 }
+"""
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("general")
+    (folder / "lug.sweep.toml").write_text(LUG)
+    assert sweep(folder / "lug.sweep.toml", "-o", folder / "out", "-q") == 0
+    return folder
+
+
+def test_each_case_of_a_preset_is_what_solve_makes_of_it(swept, tmp_path):
+    (tmp_path / "base.toml").write_text(LUG.partition("[base]")[2])
+    keys = ["--set", "lug.width=36.0", "--set", "load.displacement=0.1"]
+    assert run(["solve", str(tmp_path / "base.toml"), *keys, "-o", str(tmp_path / "alone"), "-q"]) == 0
+    rows = table(swept / "out" / "cases.csv")
+    assert [(row["lug.width"], row["load.displacement"]) for row in rows][1] == ("36", "0.1")
+    alone = archord.load(tmp_path / "alone")
+    assert float(rows[1]["pull force [N/mm]"]) == pytest.approx(alone.columns["pull force"][-1], rel=1e-12)
+    assert {row["status"] for row in rows} == {"done"}
+
+
+def test_a_general_sweep_is_shown_and_gone_on_with(swept, capsys):
+    assert run(["show", str(swept / "out")]) == 0
+    assert "pull force [N/mm]" in capsys.readouterr().out
+    assert archord.load(swept / "out").label(2) == "width = 36, displacement = 0.1"
+    assert sweep(swept / "lug.sweep.toml", "-o", swept / "out") == 0
+    assert "4 of 4 cases are there already" in capsys.readouterr().out
+
+
+def test_keys_of_named_parts_vary(tmp_path):
+    """As ``--set`` names them; a name that is none is refused once."""
+    general = tmp_path / "g.toml"
+    (tmp_path / "lug.toml").write_text(LUG.partition("[base]")[2])
+    from archord.scene.file import load_scene, resolved
+
+    general.write_text(resolved(load_scene(tmp_path / "lug.toml")))
+    (tmp_path / "a.sweep.toml").write_text(f'base = "{general}"\n[grid]\nbody.lug.E = [1e5, 2e5]\n')
+    design = read_sweep(tmp_path / "a.sweep.toml")
+    assert [case.scene.solids["lug"].E for case in design.cases] == [1e5, 2e5]
+    assert len({case.run for case in design.cases}) == 2
+    (tmp_path / "b.sweep.toml").write_text(f'base = "{general}"\n[grid]\nbody.log.E = [1e5]\n')
+    with pytest.raises(archord.InputError, match="with a name among"):
+        read_sweep(tmp_path / "b.sweep.toml")
