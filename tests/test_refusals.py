@@ -32,7 +32,7 @@ RUN, OTHER = "{coarse}", "{elastic}"
         (["reproduce", "fig2", "-o", f"{RUN}/history.csv"], f"{RUN}/history.csv: cannot be used for results: File"),
         (["export-deck", SCENE, "-o", RUN], f"{RUN}: cannot be written: it is a folder."),
         (["mesh", "nowhere.msh"], "nowhere.msh: No such file or directory."),
-        (["mesh", "empty"], "empty: is none of the files of meshes that are read: .msh, .inp, .xdmf."),
+        (["mesh", "empty"], "empty: is none of the files of meshes that are read: .msh, .inp, .xdmf, .npz."),
         (
             ["mesh", "x.msh", "--set", "mesh.scal=2"],
             "--set mesh.scal=2: mesh.scal is not a known key; did you mean ",

@@ -46,7 +46,8 @@ def test_a_killed_run_goes_on_and_says_where(tmp_path, whole):
     result = archord("solve", "run", "--restart", cwd=tmp_path)
     lines = result.stdout.splitlines()
     assert lines[0] == f"continuing run after step {steps} of 12."
-    assert [line.split()[0] for line in lines[3:-1]] == [str(k) for k in range(steps + 1, 13)]
+    rows = [line.split()[0] for line in lines[1:-1] if line[:5].strip().isdigit()]
+    assert rows == [str(k) for k in range(steps + 1, 13)]
     same_run(whole, tmp_path / "run", 1e-12)
     again = archord("solve", SCENE, *COARSE, "-o", "run", "--restart", cwd=tmp_path)
     assert again.stdout == "the run in run is finished: nothing to do.\n"
