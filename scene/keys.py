@@ -102,3 +102,12 @@ class Section(BaseModel, metaclass=_InSentences):
 
     # a section that no scene uses is not built: that of all takes as long as all the rest of a start
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True)
+
+
+def unused(section: BaseModel, name: str, key: str, needed: str) -> list[str]:
+    """A warning of the ``key`` of a ``section`` of this ``name`` that is not its default, as it goes with what is
+    ``needed`` alone."""
+    value = getattr(section, key)
+    if value == type(section).model_fields[key].default:
+        return []
+    return [f"{name}.{key} = {value:g} has no effect: it goes with {needed}"]

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from archord.scene.columns import require_different
-from archord.scene.keys import key, require
+from archord.scene.keys import key, require, unused
 from archord.scene.parts import Body, Coupling, Interaction, Load, Mesh, Path, Support
 from archord.scene.scene import STEPS, Checked, require_solids
 from archord.scene.sections import ProblemAnalysis, ProblemOutput, Stepping, Units, steps_of
@@ -81,6 +81,12 @@ class ProblemScene(Checked):
             place, held = ("load", load.name, "on"), {(load.on, "x"), (load.on, "y")} <= seen.keys()
             require(load.on not in couplings | discs, place, "must be a facet set for a pressure")
             require(not held, place, "must not be held in x and y: a pressure moves nothing there")
+
+    @property
+    def doubts(self) -> list[str]:
+        """What to warn of before anything is solved."""
+        fit = "an overlap or an interference"
+        return [*super().doubts, *([] if self.fits else unused(self.path, "path", "fit_steps", fit))]
 
     @property
     def n_stages(self) -> int:

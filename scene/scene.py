@@ -13,7 +13,7 @@ from archord.materials.elasticity import contact_modulus
 from archord.scene.errors import InputError
 from archord.scene.faults import in_sentences
 from archord.scene.geometry import JointGeometry
-from archord.scene.keys import Section, key, plain, require
+from archord.scene.keys import Section, key, plain, require, unused
 from archord.scene.sections import Analysis, Load, Output, Pin, Solid, Stepping, Units
 
 FORMAT = 1  # version of the scene format: rises when a scene gets a meaning that an older archord would get wrong
@@ -128,7 +128,18 @@ class Scene(Checked):
     @property
     def doubts(self) -> list[str]:
         """What to warn of before anything is solved."""
-        return [*super().doubts, *self.doubts_of_strain, *self._doubts_of_path]
+        return [*super().doubts, *self.doubts_of_strain, *self._doubts_of_path, *self._unused]
+
+    @property
+    def _unused(self) -> list[str]:
+        """Warnings of keys that say nothing about this joint."""
+        joint, load = self.joint, self.load
+        found: list[str] = []
+        if not joint.is_ring:
+            found += unused(load, "load", "core_radius", 'joint.model = "ring"')
+        if joint.edge_angle is None:
+            found += unused(joint, "joint", "edge_ratio", "joint.edge_angle")
+        return found
 
     @property
     def _doubts_of_path(self) -> list[str]:

@@ -25,6 +25,7 @@ _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
 _INTO = 0.02, 1e-3  # of a side: how deep bodies may overlap by their sides being straight, or curved
 _PIECES = 8  # of a side, as a polygon
 _AT_ONCE = 2_000_000  # pairs of points and pieces
+_POLYGONAL = 1e-3  # of the clearance: sagitta from which corners of straight sides show in the pressure
 _COARSE = 0.05  # of the clearance: sagitta of straight sides that spoils it
 _MOTIONS = ("x", "y", "rotation")
 _HELD = 1e-8  # singular value over the largest one, below which a motion is free
@@ -255,10 +256,13 @@ def _sagitta(mesh: PlaneMesh, *pair: str | float) -> Iterator[str]:
         bulge = np.linalg.norm(middle - (start + end) / 2, axis=1)
         deepest = max(deepest, sagitta[bulge < sagitta / 2].max(initial=0.0))
     first, second = [*radii, *(radius for radius in pair if not isinstance(radius, str))]
-    if deepest > _COARSE * abs(first - second):
-        arcs = f"the arcs {' and '.join(map(repr, names))} have straight sides with a sagitta of {deepest:.2g}"
-        remedy = "give order = 2 in [mesh] and a [[mesh.circle]] for each, or a mesh that is curved"
-        yield f"{arcs}, too much for their clearance of {abs(first - second):.2g}; {remedy}"
+    clearance = abs(first - second)
+    arcs = f"the arcs {' and '.join(map(repr, names))} have straight sides with a sagitta of {deepest:.2g}"
+    remedy = "give order = 2 in [mesh] and a [[mesh.circle]] for each, or a mesh that is curved"
+    if deepest > _COARSE * clearance:
+        yield f"{arcs}, too much for their clearance of {clearance:.2g}; {remedy}"
+    elif deepest > _POLYGONAL * clearance:
+        yield f"{arcs}: their corners make the largest pressure too high, by a fifth and more; {remedy}"
 
 
 def free_motions(
