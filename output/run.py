@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
+from archord.kernels.interrupt import Interrupt, Interrupted
 from archord.kernels.stale_jit import without_stale_forms
 from archord.output.checkpoint import halt, resume
 from archord.output.checkpoint import write as write_checkpoint
@@ -29,7 +30,6 @@ from archord.presets.measures import Work
 from archord.report.timer import Timer
 from archord.scene.file import AnyScene
 from archord.solver.coarse_start import coarse_start
-from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.load_path import Position
 from archord.solver.mesh_order import MeshOrder
 from archord.solver.stepping import Step, StepFailure, StepRules, march

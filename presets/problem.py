@@ -59,7 +59,7 @@ def scene_mesh(scene: ProblemScene, comm: MPI.Comm) -> TaggedMesh:
     if mesh.shape is not None:
         shape = mesh.shape.arguments()
         return _SHAPES[shape.pop("kind")](comm, degree=scene.analysis.degree, **shape)
-    from archord.geometry.meshes.read import read_mesh, tagged  # with scipy, which solves of presets do without
+    from archord.geometry.meshes.formats.read import read_mesh, tagged  # with scipy, which solves of presets do without
 
     source = LIVE.get(mesh.file or "", mesh.file)
     if source == mesh.file and mesh.file.endswith(GIVEN):
@@ -72,7 +72,7 @@ def scene_mesh(scene: ProblemScene, comm: MPI.Comm) -> TaggedMesh:
 def given_mesh(scene: ProblemScene, comm: MPI.Comm) -> PlaneMesh | None:
     """The mesh given from Python, as `scene_mesh` takes it before it scales and refines it: on rank 0, None elsewhere.
     Collective."""
-    from archord.geometry.meshes.read import plane_mesh_of, tagged
+    from archord.geometry.meshes.formats.read import plane_mesh_of, tagged
 
     source = LIVE[scene.mesh.file or ""]
     given = tagged(*source) if isinstance(source, tuple) else source

@@ -15,12 +15,12 @@ from petsc4py import PETSc
 
 from archord.geometry.basis import Array
 from archord.kernels.compat import ghosted_vector
+from archord.kernels.interrupt import Interrupt, Interrupted
 from archord.materials.material import Points
 from archord.report.timer import BEFORE_SOLVING, Timer
 from archord.solver.bulk import Bulk
 from archord.solver.contact.contact import Contact
 from archord.solver.drives import Drives
-from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.linear.bordered import Border, Bordered
 from archord.solver.linear.choose import choose
 from archord.solver.linear.strategy import Facts

@@ -17,6 +17,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from archord.kernels.interrupt import Interrupt, Interrupted
 from archord.output.disk import WriteError, replace_file
 from archord.output.ranks import agreed
 from archord.output.restart import Start
@@ -27,7 +28,6 @@ from archord.presets.joint_account import UNSEEN
 from archord.scene.errors import InputError
 from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
-from archord.solver.interrupt import Interrupt, Interrupted
 from archord.solver.system import System
 from archord.studies.mesh_family import MeshFamily, ProblemFamily
 

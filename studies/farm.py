@@ -22,12 +22,12 @@ from typing import Any
 from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
 
+from archord.kernels.interrupt import Interrupt
 from archord.output.disk import replace_file
 from archord.output.folder import claim_folder
 from archord.output.ranks import arrived_before
 from archord.output.restart import plan_restart
 from archord.scene.errors import InputError
-from archord.solver.interrupt import Interrupt
 from archord.studies.accuracy import solve_to_accuracy
 from archord.studies.cases import Case
 from archord.studies.sweep import FAILURE, Result, of_case

@@ -18,6 +18,7 @@ ROOMS = [
     "materials",
     "geometry",
     "geometry.meshes",
+    "geometry.meshes.formats",
     "geometry.shapes",
     "scene",
     "solver.contact",

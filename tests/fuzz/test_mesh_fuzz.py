@@ -13,7 +13,7 @@ from dolfinx import io
 from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import distribute, gathered
-from archord.geometry.meshes.read import read_mesh
+from archord.geometry.meshes.formats.read import read_mesh
 from archord.postprocess.pictures.mesh import mesh_text
 from tests.forked import _FORKS
 from tests.geometry.meshes.test_read import INPUT, MORE, draw

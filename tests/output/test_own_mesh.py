@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 import archord
 from archord.geometry.meshes.fenicsx import gathered
+from archord.geometry.meshes.formats.read import read_mesh, tagged
 from archord.geometry.meshes.plane_mesh import PlaneMesh
-from archord.geometry.meshes.read import read_mesh, tagged
 from archord.geometry.meshes.stored import store_mesh, stored_mesh
 from archord.output.restart import plan_restart
 from archord.output.run import solve_scene

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import gathered
-from archord.geometry.meshes.read import read_mesh
+from archord.geometry.meshes.formats.read import read_mesh
 
 PART = """*Part, name=Bar
 *Node

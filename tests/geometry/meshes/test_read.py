@@ -18,7 +18,7 @@ from dolfinx.mesh import (
 from mpi4py import MPI
 
 from archord.geometry.meshes.fenicsx import gathered
-from archord.geometry.meshes.read import read_mesh, tagged
+from archord.geometry.meshes.formats.read import read_mesh, tagged
 from archord.geometry.meshes.refine import Circle
 
 CIRCLES = [Circle("arc", (0.0, 0.0), 1.0), Circle("hole", (0.0, 0.0), 1.01)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.geometry.meshes.read import read_mesh
+from archord.geometry.meshes.formats.read import read_mesh
 
 XDMF = """<Xdmf><Domain><Grid>
 <Topology TopologyType="Triangle"><DataItem Dimensions="1 3">0 1 2</DataItem></Topology>

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from dolfinx.cpp.io import perm_gmsh
 
-from archord.geometry.meshes.abaqus_blocks import Options, Rows, Scope, number_of, scoped_blocks
+from archord.geometry.meshes.formats.abaqus_blocks import Options, Rows, Scope, number_of, scoped_blocks
 from archord.geometry.meshes.plane_mesh import PlaneMesh, in_basix_order, one_kind, outer_sides
 
 _KINDS = re.compile(r"(CP[ES][3468]|T[23]D[23])[A-Z]*")  # with the number of nodes

@@ -15,14 +15,14 @@ import numpy as np
 from dolfinx.mesh import Mesh, MeshTags, meshtags
 from mpi4py import MPI
 
-from archord.geometry.meshes.abaqus import read_abaqus
 from archord.geometry.meshes.check import faults
 from archord.geometry.meshes.fenicsx import distribute, gathered, own_gmsh, strips
+from archord.geometry.meshes.formats.abaqus import read_abaqus
+from archord.geometry.meshes.formats.xdmf import read_xdmf
 from archord.geometry.meshes.plane_mesh import PlaneMesh, flat
 from archord.geometry.meshes.refine import Circle, refined
 from archord.geometry.meshes.stored import store_mesh, stored_mesh
 from archord.geometry.meshes.tagged_mesh import TaggedMesh
-from archord.geometry.meshes.xdmf import read_xdmf
 from archord.report.readable import require_file
 
 _HEADERS = (b"$MeshFormat", b"$NOD", b"$Comments")

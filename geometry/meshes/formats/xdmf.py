@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 from dolfinx.cpp.io import perm_vtk
 
-from archord.geometry.meshes.beside import beside
+from archord.geometry.meshes.formats.beside import beside
 from archord.geometry.meshes.plane_mesh import SOLID, PlaneMesh, in_basix_order
 from archord.report.readable import require_memory
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.geometry.meshes.beside import beside
+from archord.geometry.meshes.formats.beside import beside
 
 Options = dict[str, str]
 Rows = list[list[str]]
