@@ -149,9 +149,13 @@ def check_mesh(
         inside = {body: np.isin(mesh.bodies, mesh.cell_sets[cells]) for body, cells in bodies.items()}
         checks = [iter(faults(mesh)), _of_bodies(mesh, inside, millimetres)]
         checks += [_of_surface(mesh, inside, name) for name in surfaces]
-        checks += [*(_sagitta(mesh, *pair) for pair in pairs if len(pair) == 2), _overlaps(mesh, inside, overlap)]
+        straight = {_COARSE: list[str](), _POLYGONAL: list[str]()}
+        for pair in pairs:
+            if len(pair) == 2:
+                _sagitta(mesh, pair, straight)
+        checks += [iter(straight[_COARSE]), _overlaps(mesh, inside, overlap)]
         found = next((said for check in checks for said in check), "")
-        warnings = distorted(mesh)
+        warnings = distorted(mesh) + straight[_POLYGONAL]
         warnings += [said for body, cells in inside.items() for said in cracks(mesh, body, cells)]
     found, warnings = tagged.mesh.comm.bcast((found, warnings))
     if found:
@@ -242,9 +246,10 @@ def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
         yield f"the body {body!r} has {len(pairs)} pairs of nodes at the same place, as at {at}: a crack, if not merged"
 
 
-def _sagitta(mesh: PlaneMesh, *pair: str | float) -> Iterator[str]:
-    """What is said if a round surface beside another, or beside a disc of that radius, has straight sides, whose
-    sagitta h^2/(8 R) spoils the clearance."""
+def _sagitta(mesh: PlaneMesh, pair: Sequence[str | float], said: dict[float, list[str]]) -> None:
+    """Add to what is ``said`` if a round surface beside another, or beside a disc of that radius, has straight sides,
+    by the part of the clearance that their sagitta h^2/(8 R) exceeds: `_COARSE`, which spoils the clearance, or
+    `_POLYGONAL`."""
     radii, deepest, names = [], 0.0, [name for name in pair if isinstance(name, str)]
     for name in names:
         edges = mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])]
@@ -260,9 +265,10 @@ def _sagitta(mesh: PlaneMesh, *pair: str | float) -> Iterator[str]:
     arcs = f"the arcs {' and '.join(map(repr, names))} have straight sides with a sagitta of {deepest:.2g}"
     remedy = "give order = 2 in [mesh] and a [[mesh.circle]] for each, or a mesh that is curved"
     if deepest > _COARSE * clearance:
-        yield f"{arcs}, too much for their clearance of {clearance:.2g}; {remedy}"
+        said[_COARSE].append(f"{arcs}, too much for their clearance of {clearance:.2g}; {remedy}")
     elif deepest > _POLYGONAL * clearance:
-        yield f"{arcs}: their corners make the largest pressure too high, by a fifth and more; {remedy}"
+        corners = "their corners make the largest pressure too high, by a fifth and more"
+        said[_POLYGONAL].append(f"{arcs}: {corners}; {remedy}")
 
 
 def free_motions(
