@@ -115,8 +115,8 @@ def test_ctrl_c_ends_the_program_too(tmp_path, monkeypatch):
 def test_a_mesh_of_another_process_is_said_to_be_gone(tmp_path):
     """As its run folder's scene.toml names it."""
     parts = {"body": [{"name": "plate", "E": 1.0, "nu": 0.3}], "load": [{"name": "p", "on": "edge", "pressure": 1.0}]}
-    scene = archord.ProblemScene(mesh={"file": "mesh 7 given from Python"}, **parts)
-    with pytest.raises(archord.InputError, match="mesh 7 given from Python: is gone with the process that gave it"):
+    scene = archord.ProblemScene(mesh={"file": "mesh 700 given from Python"}, **parts)
+    with pytest.raises(archord.InputError, match="mesh 700 given from Python: is gone with the process that gave it"):
         archord.solve(scene, tmp_path / "run")
 
 

@@ -149,7 +149,7 @@ def test_every_file_that_names_the_version_names_the_same():
         "pyproject.toml": r'^version = "(.*)"',
         "CITATION.cff": r"^version: (.*)",
         "conda/recipe.yaml": r'^  version: "(.*)"',
-        "CHANGELOG.md": r"^## (.*)",
+        "CHANGELOG.md": r"^## (\d.*)",
     }
     found = {file: re.search(regex, (ROOT / file).read_text(encoding="utf-8"), re.M) for file, regex in said.items()}
     assert len({match and match[1] for match in found.values()}) == 1, found
