@@ -32,11 +32,20 @@ class Recovery:
         springs = self.equilibrium.springs
         for guess, afar in guesses:
             if springs is not None and (afar or not springs.idle):
-                with self.equilibrium.timer("contact"):
-                    guess, afar = springs.rigid.at_rest(load, guess), True
+                guess, afar = self._at_rest(load, guess), True
             if self._solve_in_stages(guess, afar):
                 break
         return Newton.together(self._solves)
+
+    def _at_rest(self, load: float, guess: Array) -> Array:
+        """The ``guess`` with loose bodies where they come to rest as if rigid. What brought them there was no slip."""
+        at = self.equilibrium
+        with at.timer("contact"):
+            guess = at.springs.rigid.at_rest(load, guess)
+            if not at.springs.idle:
+                n = 2 * at.n_local
+                at.contact.touch_down(guess[:n].reshape(-1, 2), guess[n:])
+        return guess
 
     def _solve_in_stages(self, guess: Array, afar: bool) -> bool:
         """Solve from ``guess``; where a large gamma makes that fail, on which the solution hardly depends, but with
@@ -60,30 +69,48 @@ class Recovery:
     def _solve_at_once(self, guess: Array, afar: bool) -> bool:
         """Solve from ``guess``; one from ``afar`` is too stiff for a line search, which creeps there, and may yield far
         too much: points come first that cannot yield (further). Elastic bodies at large strain are too stiff for it
-        everywhere. Where friction makes it fail, it is left out first."""
+        everywhere. Where friction makes it fail, points come first that cannot slide (any further), then secants."""
         yielding = self.equilibrium.plastic_points()
-        sliding = [pair.points for pair in self.equilibrium.contact.pairs if pair.law.has_friction]
+        rubbing = [pair.points for pair in self.equilibrium.contact.pairs if pair.law.has_friction]
         yields = self.equilibrium.comm.allreduce(len(yielding)) > 0
+        full_steps = (afar or self.equilibrium.bulk.finite) and not yields
         if yields and afar:
             guess = self._simplified(yielding, guess)
-        return self._solve_either_way(guess, full_steps=(afar or self.equilibrium.bulk.finite) and not yields) or (
-            bool(sliding) and self._solve_either_way(self._simplified(yielding * afar + sliding, guess))
-        )
+        if self._solve_either_way(guess, full_steps=full_steps, both=not rubbing):
+            return True
+        if not rubbing:
+            return False
+        guess = self._simplified(rubbing + (yielding if afar else []), guess)
+        if self._solve_by_secants(rubbing, guess):
+            return True
+        return self._solve_either_way(guess)
 
     def _simplified(self, points: list[Points], guess: Array) -> Array:
         """A rough equilibrium where these ``points`` answer by `elastic`, by full steps; the ``guess`` without one."""
         for p in points:
-            p.elastic_only = True
+            p.acting = p.material.elastic()
         if self._solve_either_way(guess, full_steps=True, goal=max(_ROUGH, self.newton.tolerance)):
             guess = self.equilibrium.state()
         for p in points:
-            p.elastic_only = False
+            p.acting = p.material
         return guess
 
-    def _solve_either_way(self, guess: Array, *, full_steps: bool = False, goal: float = 0.0) -> bool:
+    def _solve_by_secants(self, points: list[Points], guess: Array) -> bool:
+        """Solve from ``guess`` with the secant derivatives of the contact laws of these ``points``."""
+        for p in points:
+            p.acting = p.material.by_secants()
+        converged = self._solve_holding(guess, True, 0.0)
+        for p in points:
+            p.acting = p.material
+        return converged
+
+    def _solve_either_way(
+        self, guess: Array, *, full_steps: bool = False, goal: float = 0.0, both: bool = True
+    ) -> bool:
         """With a line search, then without, or the other way round with ``full_steps``, which find the right piece of a
-        problem that is nearly linear by pieces where the line search creeps: first touch, large gamma."""
-        for line_search in (not full_steps, full_steps):
+        problem that is nearly linear by pieces where the line search creeps: first touch, large gamma. The first way
+        alone unless ``both``."""
+        for line_search in (not full_steps, full_steps)[: 1 + both]:
             if self._solve_holding(guess, line_search, goal):
                 return True
             if (border := self.equilibrium.border) and border.singular is not None:
