@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -23,6 +24,7 @@ class Recovery:
     def __init__(self, newton: NewtonSolver) -> None:
         self.newton, self.equilibrium = newton, newton.equilibrium
         self.continues_gamma = False
+        self._rough = max(_ROUGH, newton.tolerance)
 
     def solve(self, load: float, guesses: Iterable[tuple[Array, bool]]) -> Newton:
         """Solve at ``load`` from one of the ``guesses`` after the other, each with whether it comes from afar; where
@@ -69,48 +71,45 @@ class Recovery:
     def _solve_at_once(self, guess: Array, afar: bool) -> bool:
         """Solve from ``guess``; one from ``afar`` is too stiff for a line search, which creeps there, and may yield far
         too much: points come first that cannot yield (further). Elastic bodies at large strain are too stiff for it
-        everywhere. Where friction makes it fail, points come first that cannot slide (any further), then secants."""
+        everywhere."""
         yielding = self.equilibrium.plastic_points()
         rubbing = [pair.points for pair in self.equilibrium.contact.pairs if pair.law.has_friction]
         yields = self.equilibrium.comm.allreduce(len(yielding)) > 0
         full_steps = (afar or self.equilibrium.bulk.finite) and not yields
         if yields and afar:
-            guess = self._simplified(yielding, guess)
-        if self._solve_either_way(guess, full_steps=full_steps, both=not rubbing):
+            guess = self._simplified(guess, yielding, "elastic")
+        if self._solve_either_way(guess, full_steps=full_steps):
             return True
-        if not rubbing:
-            return False
-        guess = self._simplified(rubbing + (yielding if afar else []), guess)
-        if self._solve_by_secants(rubbing, guess):
-            return True
-        return self._solve_either_way(guess)
+        return bool(rubbing) and self._solve_friction_in_stages(guess, rubbing, yielding if afar else [])
 
-    def _simplified(self, points: list[Points], guess: Array) -> Array:
-        """A rough equilibrium where these ``points`` answer by `elastic`, by full steps; the ``guess`` without one."""
-        for p in points:
-            p.acting = p.material.elastic()
-        if self._solve_either_way(guess, full_steps=True, goal=max(_ROUGH, self.newton.tolerance)):
+    def _solve_friction_in_stages(self, guess: Array, rubbing: list[Points], yielding: list[Points]) -> bool:
+        """Solve from ``guess`` where friction makes Newton's method fail. First no point slides or yields (any further),
+        and what slides then is found by secants. Where points have to slide, all of them do first, without friction.
+        """
+        with _acting(rubbing, "elastic"), _acting(yielding, "elastic"):
+            holds = self._solve_holding(guess, False, self._rough)
+        if holds:
             guess = self.equilibrium.state()
-        for p in points:
-            p.acting = p.material
-        return guess
+        else:
+            guess = self._simplified(guess, rubbing, "frictionless", yielding)
+            if self._solve_either_way(guess):
+                return True
+        with _acting(rubbing, "by_secants"):
+            if self._solve_holding(guess, True, 0.0):
+                return True
+        return holds and self._solve_either_way(guess)
 
-    def _solve_by_secants(self, points: list[Points], guess: Array) -> bool:
-        """Solve from ``guess`` with the secant derivatives of the contact laws of these ``points``."""
-        for p in points:
-            p.acting = p.material.by_secants()
-        converged = self._solve_holding(guess, True, 0.0)
-        for p in points:
-            p.acting = p.material
-        return converged
+    def _simplified(self, guess: Array, points: list[Points], answer: str, yielding: Sequence[Points] = ()) -> Array:
+        """A rough equilibrium by full steps where ``points`` have this ``answer`` and those ``yielding`` are elastic;
+        the ``guess`` without one."""
+        with _acting(points, answer), _acting(yielding, "elastic"):
+            found = self._solve_either_way(guess, full_steps=True, goal=self._rough)
+        return self.equilibrium.state() if found else guess
 
-    def _solve_either_way(
-        self, guess: Array, *, full_steps: bool = False, goal: float = 0.0, both: bool = True
-    ) -> bool:
+    def _solve_either_way(self, guess: Array, *, full_steps: bool = False, goal: float = 0.0) -> bool:
         """With a line search, then without, or the other way round with ``full_steps``, which find the right piece of a
-        problem that is nearly linear by pieces where the line search creeps: first touch, large gamma. The first way
-        alone unless ``both``."""
-        for line_search in (not full_steps, full_steps)[: 1 + both]:
+        problem that is nearly linear by pieces where the line search creeps: first touch, large gamma."""
+        for line_search in (not full_steps, full_steps):
             if self._solve_holding(guess, line_search, goal):
                 return True
             if (border := self.equilibrium.border) and border.singular is not None:
@@ -132,3 +131,15 @@ class Recovery:
         result.held = True
         self._solves.append(result)
         return result.converged
+
+
+@contextmanager
+def _acting(points: Sequence[Points], answer: str) -> Iterator[None]:
+    """Let these ``points`` answer as their material says by the method ``answer``, for the time being."""
+    for p in points:
+        p.acting = getattr(p.material, answer)()
+    try:
+        yield
+    finally:
+        for p in points:
+            p.acting = p.material

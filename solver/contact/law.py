@@ -47,6 +47,10 @@ class ContactLaw(Protocol):
         """A law with the same states that answers from each as if points could not slide (any further)."""
         return self
 
+    def frictionless(self) -> ContactLaw:
+        """A law with the same states that answers without shear."""
+        return self
+
     def by_secants(self) -> ContactLaw:
         """The law itself, with a derivative that leaves no point without stiffness along the surface."""
         return self
@@ -132,6 +136,10 @@ class Coulomb(ContactLaw):
     def elastic(self) -> Coulomb:
         """The law in which points that touched are ``held``."""
         return replace(self, held=True)
+
+    def frictionless(self) -> Coulomb:
+        """The law without friction."""
+        return replace(self, friction=0.0)
 
     def by_secants(self) -> Coulomb:
         """The law with ``secant`` derivatives."""
