@@ -83,8 +83,10 @@ class Recovery:
         return bool(rubbing) and self._solve_friction_in_stages(guess, rubbing, yielding if afar else [])
 
     def _solve_friction_in_stages(self, guess: Array, rubbing: list[Points], yielding: list[Points]) -> bool:
-        """Solve from ``guess`` where friction makes Newton's method fail. First no point slides or yields (any further),
-        and what slides then is found by secants. Where points have to slide, all of them do first, without friction.
+        """Solve from ``guess`` where friction makes Newton's method fail.
+
+        First no point slides or yields (any further), and secants find what slides then. Where that fails because
+        points have to slide, all of them slide first, without friction.
         """
         with _acting(rubbing, "elastic"), _acting(yielding, "elastic"):
             holds = self._solve_holding(guess, False, self._rough)
