@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from archord.solver.coarse_start import CoarseStart
 
 _AT_REST = 10.0  # times the round-off: forces that are none
+_NO_LOAD = 1e-6  # of what presses bodies on each other: resultants of a fit that no load acts on
 
 
 class System:
@@ -159,11 +160,16 @@ class System:
 
     def force_balance(self) -> float:
         """Largest resultant on a body over the largest force of an interaction or a support, or over the norm of nodal
-        ones, as of a pure moment; 0 if all are round-off."""
+        ones, as of a pure moment; 0 if all are round-off, as those of a fit without a load."""
         left = [self.equilibrium.residual_on(self.nodes_of(body)) for body in self.problem.bodies]
         forces = [np.zeros(2), *(self.contact_force(interaction.name) for interaction in self.problem.interactions)]
         forces += [self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)]
         largest = max(np.linalg.norm(forces, axis=1).max(), self.problem.symmetry * self.equilibrium.reaction_norm)
-        if largest <= _AT_REST * self.problem.symmetry * self.equilibrium.noise:
+        unbalanced = self.problem.symmetry * np.linalg.norm(left, axis=1).max()
+        round_off = self.problem.symmetry * self.equilibrium.noise
+        own = sum(float(np.abs(pair.forces).sum()) for pair in self.equilibrium.contact.pairs)
+        pressed = self.problem.symmetry * self.equilibrium.comm.allreduce(own)
+        fit_alone = unbalanced <= round_off and largest <= _NO_LOAD * pressed
+        if fit_alone or largest <= _AT_REST * round_off:
             return 0.0
-        return float(self.problem.symmetry * np.linalg.norm(left, axis=1).max() / largest)
+        return float(unbalanced / largest)

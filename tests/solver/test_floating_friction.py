@@ -32,6 +32,7 @@ def follow(system: System, targets: list[float]) -> dict[str, list]:
         found["iterations"].append(step.iterations)
         found["moved"].append(float(system.driven()[0][0]))
         found["reaction"].append(system.reaction("B"))
+        assert system.force_balance() < 1e-8
 
     march(system.load_path(), targets, target_done=done, rules=StepRules(minimum=1.0))
     return found
