@@ -42,6 +42,7 @@ class Recovery:
     def _at_rest(self, load: float, guess: Array) -> Array:
         """The ``guess`` with loose bodies where they come to rest as if rigid. What brought them there was no slip."""
         at = self.equilibrium
+        assert at.springs is not None
         with at.timer("contact"):
             guess = at.springs.rigid.at_rest(load, guess)
             if not at.springs.idle:

@@ -44,7 +44,8 @@ class Pair:
         self.start: Start = "anywhere"
         self.offset = 0.0
         self._begun: tuple[Array, Array] = np.zeros((len(x), 2)), np.zeros_like(opposite.curve.X)
-        self._touched_down, self._touched = self._begun, self.active
+        self._touched_down: tuple[Array, Array] = self._begun
+        self._touched = self.active
         self.strayed: Array = np.zeros((len(x), 2))
 
     def use_gamma(self, factor: float) -> None:

@@ -7,10 +7,12 @@ import pytest
 from mpi4py import MPI
 
 from archord.benchmarks.stability.cases import cases
+from archord.output.history import read_history
 from archord.presets.account import account_of
 from archord.solver.contact.law import Coulomb, FrictionState
 from archord.solver.stepping import StepRules, march
 from archord.solver.system import System
+from tests.output.test_restart import go_on, run
 
 
 def eye(friction: float, force: list[float], steps: list[int], comm: MPI.Comm = MPI.COMM_SELF) -> System:
@@ -53,6 +55,17 @@ def test_friction_hardly_moves_where_the_pin_first_touches():
     friction, but what friction holds while it is pressed."""
     smooth, rough = (follow(eye(mu, [300.0], [1]), [1.0, 2.0])["moved"][-1] for mu in (0.0, 0.15))
     assert rough == pytest.approx(smooth, rel=0.02)
+
+
+def test_a_run_goes_on_from_where_it_was_halted(tmp_path):
+    """Slip counts from touch-down at points that did not touch before, which the accepted state tells once more."""
+    scene = cases()["eye, pulled and let go"].scene
+    run(scene, tmp_path / "whole", copies={3: tmp_path / "halted"})
+    go_on(scene, tmp_path / "halted")
+    whole, halted = (read_history(tmp_path / name / "history.csv") for name in ("whole", "halted"))
+    assert halted["iterations"] == whole["iterations"]
+    for name in ("pull displacement", "friction_dissipation"):
+        assert halted[name] == pytest.approx(whole[name], rel=1e-6)
 
 
 def points(n: int = 200) -> tuple[np.ndarray, ...]:
