@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from pathlib import Path
+from statistics import median
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +17,10 @@ from archord.scene.file import AnyScene
 from archord.scene.scene import Scene
 
 _LOADS_SHOWN = 3
+_LONG_SILENCE = 20.0  # seconds after which a solve that has said nothing says where it is
+_LONG_STEP = 5.0  # seconds that a step takes at least which is told to be long
+_MUCH_LONGER = 20.0  # times the median of the steps before it
+_ENOUGH_STEPS = 3  # that a median is made of
 _LARGE = 50_000  # cells from which every phase before the first step is told
 
 if TYPE_CHECKING:
@@ -22,6 +28,7 @@ if TYPE_CHECKING:
 
     from archord.output.restart import Start
     from archord.output.run import Outcome
+    from archord.solver.newton import Newton
     from archord.studies.accuracy import Level
 
 Column = tuple[str, str, Callable[[Any], float]]  # heading, format, and value of a step
@@ -64,8 +71,13 @@ class Progress:
     """Reports steps as they are accepted; of a scene with an accuracy mesh after mesh, and only the steps of the last
     one, at the end."""
 
-    def __init__(self, scene: AnyScene, silent: bool) -> None:
-        self.silent, self.by_mesh, self.iterations = silent, scene.analysis.accuracy is not None, 0
+    def __init__(self, scene: AnyScene, silent: bool, verbose: bool = False) -> None:
+        self.silent, self.verbose = silent, verbose and not silent
+        self.by_mesh = scene.analysis.accuracy is not None
+        self.iterations = 0
+        self._done, self._substep = 0, 1
+        self._seconds: list[float] = []
+        self._begun = self._spoken = perf_counter()
         self.materials = scene.materials
         self.moving: Any = None
         if not silent and on_terminal():
@@ -86,7 +98,24 @@ class Progress:
     def show(self, load: float, iterations: int) -> None:
         """Show on a terminal the load that was tried last, and the Newton iterations so far."""
         self.iterations += iterations
+        self._substep += 1
         self.move(f"load {load:.6g}, {self.iterations} Newton iterations")
+
+    def iterate(self, load: float, result: Newton) -> None:
+        """Show where the present solve is: moving on a terminal; by a line of each iteration if ``verbose``, and where
+        nothing was said for long."""
+        if self.silent:
+            return
+        seconds = perf_counter() - self._begun
+        said = (
+            f"step {self._done + 1}, attempt {self._substep}, load {load:.6g}, "
+            f"iteration {len(result.residuals) - 1}, residual {result.residuals[-1]:.1e}, "
+            f"{result.active_set_changes[-1]} points changed, {seconds:.0f} s"
+        )
+        self.move(said)
+        long_silent = self.moving is None and perf_counter() - self._spoken > _LONG_SILENCE
+        if self.verbose or long_silent:
+            self.print(f"      {said}")
 
     def move(self, said: str, at_once: bool = False) -> None:
         """Show on a terminal what is being done: with the next picture, or ``at_once``."""
@@ -108,6 +137,7 @@ class Progress:
         """Print a line."""
         if not self.silent:
             print(text, flush=True)
+            self._spoken = perf_counter()
 
     def strengths(self) -> None:
         """Say where each body yields."""
@@ -139,6 +169,23 @@ class Progress:
         """Show an accepted output step."""
         cells = (f"{value(m):{form}}" for _, form, value in self.columns)
         self.print("  ".join([f"{m.step:5d}", *cells, f"{m.iterations:10d}  {m.cutbacks:8d}"]))
+        self._done, self._substep = m.step, 1
+        self._warn_of_long(m)
+        self._seconds.append(m.seconds)
+
+    def _warn_of_long(self, m: Any) -> None:
+        """Warn of a step that took much longer than the steps before it."""
+        if self.silent or len(self._seconds) < _ENOUGH_STEPS or m.seconds < _LONG_STEP:
+            return
+        usual = median(self._seconds)
+        if m.seconds > _MUCH_LONGER * usual:
+            print(
+                f"archord: warning: step {m.step} took {m.seconds:.0f} s, "
+                f"{m.seconds / usual:.0f} times the median of the steps before it: "
+                f"{m.iterations} iterations and {m.cutbacks} cutbacks; smaller steps may be quicker.",
+                file=sys.stderr,
+                flush=True,
+            )
 
 
 def solve_and_report(
@@ -148,12 +195,13 @@ def solve_and_report(
     *,
     force: bool,
     silent: bool,
+    verbose: bool = False,
     start: Start | None = None,
     begun: float | None = None,
     **options: Any,
 ) -> tuple[AnyScene, Outcome]:
     """Solve the scene that ``load`` gives rank 0 into ``folder``, claimed by ``force`` if it has to be, or go on from
-    ``start``, and report it on rank 0 unless ``silent``. Collective.
+    ``start``, and report it on rank 0 unless ``silent``, each iteration if ``verbose``. Collective.
 
     If this process is for it alone, it has ``begun`` at that time of `perf_counter`.
     """
@@ -169,8 +217,8 @@ def solve_and_report(
     from archord.report.timer import Timer
     from archord.studies.accuracy import solve_to_accuracy  # with all of dolfinx: bad input is told before
 
-    report = Progress(scene, silent or comm.rank != 0)
-    options["on_attempt"] = report.show
+    report = Progress(scene, silent or comm.rank != 0, verbose)
+    options |= {"on_attempt": report.show, "on_iteration": report.iterate}
     if report.by_mesh:
         options["on_level"] = report.level
     else:

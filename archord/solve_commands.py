@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 @flag("--restart", "continue the interrupted run in the run folder")
 @flag("--extend", "continue the run along the scene's path, which must go further")
 @quiet()
+@click.option("-v", "--verbose", is_flag=True, help="print a line for every Newton iteration, too")
 @click.pass_obj
 def solve(
     begun: float,
@@ -34,6 +35,7 @@ def solve(
     restart: bool,
     extend: bool,
     quiet: bool,
+    verbose: bool,
 ) -> int:
     """Solve a scene into a run folder. Under mpirun, all ranks work on it.
 
@@ -44,10 +46,13 @@ def solve(
 
     if restart + extend + force > 1:
         raise click.UsageError("choose one of --force, --restart and --extend")
+    if quiet and verbose:
+        raise click.UsageError("choose one of -q and -v")
+    told = {"quiet": quiet, "verbose": verbose}
     if not (restart or extend):
         refuse_folder(scene)
         folder = output or Path("runs") / scene.stem
-        return _solve(lambda: load_scene(scene, overrides), folder, begun, quiet, force=force)
+        return _solve(lambda: load_scene(scene, overrides), folder, begun, force=force, **told)
     if output is not None and scene.is_dir():
         raise click.UsageError("-o does not go with a run folder")
     folder, file = (scene, scene / "scene.toml") if scene.is_dir() else (output or Path("runs") / scene.stem, scene)
@@ -61,10 +66,10 @@ def solve(
         print(f"{planned.said}.", flush=True)
     if planned.finished:
         return 0
-    return _solve(lambda: planned.scene, folder, begun, quiet, force=True, start=planned.start)
+    return _solve(lambda: planned.scene, folder, begun, force=True, start=planned.start, **told)
 
 
-def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, quiet: bool, **options: Any) -> int:
+def _solve(load: Callable[[], AnyScene], folder: Path, begun: float, *, quiet: bool, **options: Any) -> int:
     """`solve_and_report`, with its ``options``; returns the exit code."""
     from mpi4py import MPI
 

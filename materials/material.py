@@ -77,19 +77,20 @@ class Material(Protocol):
 class Points:
     """``n`` points of a ``material``: the committed ``state``, and ``trial``, which belongs to the last strain seen.
 
-    ``yields`` tells whether they can; with ``elastic_only`` set `update` answers as if they could not (any further). A
-    contact law is a material too, of traction, derivative and state, whose strain are gap, slip and trial traction.
+    ``yields`` tells whether they can. What answers `update` is ``acting``: the material, or for the
+    time being one with the same states, such as its `elastic` one. A contact law is a material too,
+    of traction, derivative and state, whose strain are gap, slip and trial traction.
     """
 
     def __init__(self, material: Any, n: int) -> None:
         self.material, self.n = material, n
+        self.acting = material
         self.state = self.trial = material.state(n)
-        self.yields, self.elastic_only = bool(getattr(material, "yields", False)), False
+        self.yields = bool(getattr(material, "yields", False))
 
     def update(self, *strain: Array) -> tuple[Array, Array]:
         """Stress ``(n, 4)`` and consistent tangent ``(n, 3, 3)`` at ``strain`` ``(n, 3)``, from the committed state."""
-        material = self.material.elastic() if self.elastic_only else self.material
-        stress, tangent, self.trial = material.update(*strain, self.state)
+        stress, tangent, self.trial = self.acting.update(*strain, self.state)
         return stress, tangent
 
     @property

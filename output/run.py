@@ -32,6 +32,7 @@ from archord.scene.file import AnyScene
 from archord.solver.coarse_start import coarse_start
 from archord.solver.load_path import Position
 from archord.solver.mesh_order import MeshOrder
+from archord.solver.newton import Newton
 from archord.solver.stepping import Step, StepFailure, StepRules, march
 from archord.solver.system import System
 
@@ -67,13 +68,15 @@ def solve_scene(
     on_start: Callable[[System], None] = lambda system: None,
     on_step: Callable[[Any], None] = lambda record: None,
     on_attempt: Callable[[float, int], None] = lambda load, iterations: None,
+    on_iteration: Callable[[float, Newton], None] = lambda load, result: None,
 ) -> Outcome:
     """Solve ``scene`` and write everything to the existing ``folder`` (see `folder.claim_folder`). Collective.
 
     ``start``, needed on rank 0 only, continues the run in ``folder`` (see `restart`). ``on_start``, ``on_step`` and
-    ``on_attempt(load, Newton iterations)`` report progress on every rank. ``timer`` has the seconds spent before. A
-    step that cannot be solved, or a file that cannot be written, ends the run with status "stopped", Ctrl-C, SIGTERM
-    and SIGHUP with "interrupted"; what was accepted before stays. ``interrupt``, if given, is one that the caller
+    ``on_attempt(load, Newton iterations)`` report progress on every rank, and ``on_iteration(load, result)`` what the
+    present solve did so far. ``timer`` has the seconds spent before. A step that cannot be solved, or a file that
+    cannot be written, ends the run with status "stopped", Ctrl-C, SIGTERM and SIGHUP with "interrupted"; what was
+    accepted before stays. ``interrupt``, if given, is one that the caller
     heeds, too. Raises `InputError` if another process solves into ``folder``, what is there cannot be continued, or the
     scene leaves the mesh to `studies.accuracy.solve_to_accuracy`.
     """
@@ -83,6 +86,7 @@ def solve_scene(
         agreed(comm, lambda: bool(stack.enter_context(occupied(folder))))
         account = without_stale_forms(lambda: account_of(scene, comm, timer))
         system = account.system
+        system.solver.newton.watch = on_iteration
         on_start(system)
         output = _Output(folder, account, begun, start)
         status, message, received = "done", "", 0

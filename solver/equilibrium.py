@@ -254,6 +254,7 @@ class Equilibrium:
         self.contact.begin(self.displacement())
         self.evaluate()
         self._follow_pattern()
+        self.contact.begin(self.displacement())  # now that it is known which points touch
         if self.springs:
             self.springs.look()
 

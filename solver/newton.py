@@ -52,7 +52,12 @@ class Newton:
 
 
 class NewtonSolver:
-    """Newton's method for ``equilibrium``, to the tolerance and within the iterations that its problem allows."""
+    """Newton's method for ``equilibrium``, to the tolerance and within the iterations that its problem allows.
+
+    ``watch(load, result)`` is called on every rank after each residual, with what the solve did so far.
+    """
+
+    watch: Callable[[float, Newton], None] = staticmethod(lambda load, result: None)
 
     def __init__(self, equilibrium: Equilibrium) -> None:
         self.equilibrium, problem = equilibrium, equilibrium.problem
@@ -216,6 +221,7 @@ class NewtonSolver:
         reaction = max(at.reaction_norm, at.largest_reaction)
         result.active_set_changes.append(at.changes)
         result.residuals.append(float(norm / reaction if reaction > 0 else norm))
+        self.watch(at.load, result)
         if at.border and at.border.singular is not None:
             pressed = at.load > 0 and at.contact.n_active() > 0
             level = at.drives.unknown[at.border.singular]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -24,6 +25,7 @@ class Recovery:
     def __init__(self, newton: NewtonSolver) -> None:
         self.newton, self.equilibrium = newton, newton.equilibrium
         self.continues_gamma = False
+        self._rough = max(_ROUGH, newton.tolerance)
 
     def solve(self, load: float, guesses: Iterable[tuple[Array, bool]]) -> Newton:
         """Solve at ``load`` from one of the ``guesses`` after the other, each with whether it comes from afar; where
@@ -34,8 +36,7 @@ class Recovery:
         springs = self.equilibrium.springs
         for guess, afar in guesses:
             if springs is not None and (afar or not springs.idle):
-                with self.equilibrium.timer("contact"):
-                    guess, afar = springs.rigid.at_rest(load, guess), True
+                guess, afar = self._at_rest(load, guess), True
             if self._solve_in_stages(guess, afar):
                 return Newton.together(self._solves)
         at = self.equilibrium
@@ -43,6 +44,17 @@ class Recovery:
             rigid = RigidMotions(at.drives, at.contact)
             self._solve_in_stages(rigid.at_rest(load, guess), True)
         return Newton.together(self._solves)
+
+    def _at_rest(self, load: float, guess: Array) -> Array:
+        """The ``guess`` with loose bodies where they come to rest as if rigid. What brought them there was no slip."""
+        at = self.equilibrium
+        assert at.springs is not None
+        with at.timer("contact"):
+            guess = at.springs.rigid.at_rest(load, guess)
+            if not at.springs.idle:
+                n = 2 * at.n_local
+                at.contact.touch_down(guess[:n].reshape(-1, 2), guess[n:])
+        return guess
 
     def _solve_in_stages(self, guess: Array, afar: bool) -> bool:
         """Solve from ``guess``; where a large gamma makes that fail, on which the solution hardly depends, but with
@@ -66,25 +78,42 @@ class Recovery:
     def _solve_at_once(self, guess: Array, afar: bool) -> bool:
         """Solve from ``guess``; one from ``afar`` is too stiff for a line search, which creeps there, and may yield far
         too much: points come first that cannot yield (further). Elastic bodies at large strain are too stiff for it
-        everywhere. Where friction makes it fail, it is left out first."""
+        everywhere."""
         yielding = self.equilibrium.plastic_points()
-        sliding = [pair.points for pair in self.equilibrium.contact.pairs if pair.law.has_friction]
+        rubbing = [pair.points for pair in self.equilibrium.contact.pairs if pair.law.has_friction]
         yields = self.equilibrium.comm.allreduce(len(yielding)) > 0
+        full_steps = (afar or self.equilibrium.bulk.finite) and not yields
         if yields and afar:
-            guess = self._simplified(yielding, guess)
-        return self._solve_either_way(guess, full_steps=(afar or self.equilibrium.bulk.finite) and not yields) or (
-            bool(sliding) and self._solve_either_way(self._simplified(yielding * afar + sliding, guess))
-        )
+            guess = self._simplified(guess, yielding, "elastic")
+        if self._solve_either_way(guess, full_steps=full_steps):
+            return True
+        return bool(rubbing) and self._solve_friction_in_stages(guess, rubbing, yielding if afar else [])
 
-    def _simplified(self, points: list[Points], guess: Array) -> Array:
-        """A rough equilibrium where these ``points`` answer by `elastic`, by full steps; the ``guess`` without one."""
-        for p in points:
-            p.elastic_only = True
-        if self._solve_either_way(guess, full_steps=True, goal=max(_ROUGH, self.newton.tolerance)):
+    def _solve_friction_in_stages(self, guess: Array, rubbing: list[Points], yielding: list[Points]) -> bool:
+        """Solve from ``guess`` where friction makes Newton's method fail.
+
+        First no point slides or yields (any further), and secants find what slides then. Where that fails because
+        points have to slide, all of them slide first, without friction.
+        """
+        with _acting(rubbing, "elastic"), _acting(yielding, "elastic"):
+            holds = self._solve_holding(guess, False, self._rough)
+        if holds:
             guess = self.equilibrium.state()
-        for p in points:
-            p.elastic_only = False
-        return guess
+        else:
+            guess = self._simplified(guess, rubbing, "frictionless", yielding)
+            if self._solve_either_way(guess):
+                return True
+        with _acting(rubbing, "by_secants"):
+            if self._solve_holding(guess, True, 0.0):
+                return True
+        return holds and self._solve_either_way(guess)
+
+    def _simplified(self, guess: Array, points: list[Points], answer: str, yielding: Sequence[Points] = ()) -> Array:
+        """A rough equilibrium by full steps where ``points`` have this ``answer`` and those ``yielding`` are elastic;
+        the ``guess`` without one."""
+        with _acting(points, answer), _acting(yielding, "elastic"):
+            found = self._solve_either_way(guess, full_steps=True, goal=self._rough)
+        return self.equilibrium.state() if found else guess
 
     def _solve_either_way(self, guess: Array, *, full_steps: bool = False, goal: float = 0.0) -> bool:
         """With a line search, then without, or the other way round with ``full_steps``, which find the right piece of a
@@ -111,3 +140,15 @@ class Recovery:
         result.held = True
         self._solves.append(result)
         return result.converged
+
+
+@contextmanager
+def _acting(points: Sequence[Points], answer: str) -> Iterator[None]:
+    """Let these ``points`` answer as their material says by the method ``answer``, for the time being."""
+    for p in points:
+        p.acting = getattr(p.material, answer)()
+    try:
+        yield
+    finally:
+        for p in points:
+            p.acting = p.material

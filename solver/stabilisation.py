@@ -9,6 +9,8 @@ Beside a far softer body ``M`` is `_STIFFER` times its shear modulus: springs ar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -22,6 +24,7 @@ from archord.solver.contact.contact import Contact
 from archord.solver.contact.surface import RigidSurface
 from archord.solver.contact.tangent import trial_rate
 from archord.solver.drives import MOVABLE, Drives
+from archord.solver.problem import Interaction, Rigid
 
 WEAK = 1e-8  # without influence, but well above the round-off of a factorisation
 _STIFFER = 100.0  # most of M over the smallest shear modulus
@@ -55,6 +58,23 @@ class RigidMotions:
         self.levels[:, drives.unknown[moving]] = free[k:].T * drives.weight[moving]
         parts = np.abs(free[:k]).reshape(len(bodies), -1).max(axis=1, initial=0.0)
         self.loose = [body for body, part in zip(bodies, parts, strict=True) if part > _LOOSE]
+        self._links = [self._linked(interface.interaction) for interface in contact.interfaces]
+
+    def _linked(self, interaction: Interaction) -> set[str]:
+        """The names of the bodies that the ``interaction`` links; a disc has none."""
+        of = self.drives.problem.body_of
+        return {"" if isinstance(surface, Rigid) else of(surface).name for surface in interaction.surfaces}
+
+    def all_reached(self, touching: Sequence[bool]) -> bool:
+        """Whether interfaces that are ``touching`` link every loose body to one that is held, or to a disc."""
+        links = [link for link, touches in zip(self._links, touching, strict=True) if touches]
+        missing = {body.name for body in self.loose}
+        while missing:
+            reached = {name for link in links if link - missing for name in link & missing}
+            if not reached:
+                return False
+            missing -= reached
+        return True
 
     def _on_bodies(self, motions: Array, forces: Array) -> Array:
         """Work ``(k, m)`` of ``forces`` ``(m, n_owned, 2)`` on nodes along ``motions`` ``(k, n_local, 2)``."""
@@ -192,6 +212,7 @@ class Springs:
 
     def look(self) -> None:
         """See whether they are `idle`."""
-        forces = np.abs(self.forces).sum(), sum(float(np.abs(pair.forces).sum()) for pair in self._contact.pairs)
-        pulled, pressed = self.comm.allreduce(np.array(forces))
-        self.idle = bool(pulled + np.abs(self.on_levels).sum() < _LITTLE * pressed)
+        pressed = [sum(float(np.abs(pair.forces).sum()) for pair in i.pairs) for i in self._contact.interfaces]
+        pulled, *pressed = self.comm.allreduce(np.array([np.abs(self.forces).sum(), *pressed]))
+        little = pulled + np.abs(self.on_levels).sum() < _LITTLE * sum(pressed)
+        self.idle = bool(little and self.rigid.all_reached([force > 0 for force in pressed]))

@@ -21,6 +21,7 @@ import numpy as np
 
 from archord.benchmarks.case import Case, Expected, paper_joint, quantities, varied
 from archord.benchmarks.persson import persson_joint, theory
+from archord.benchmarks.stability.eye import drawn_eye
 from archord.scene.file import AnyScene, parse_any
 from archord.scene.scene import Scene
 
@@ -94,12 +95,14 @@ def _joint(keys: dict[str, Any]) -> Scene:
 
 
 def _problem(keys: dict[str, Any]) -> AnyScene:
-    """The scene of a case's ``keys``, its ``blocks``, if there are any, drawn as a mesh file."""
+    """The scene of a case's ``keys``, its ``blocks`` or its ``eye``, if there is one, drawn as a mesh file."""
     load = keys["load"]
     if cycles := keys.pop("cycles", None):
         load |= {name: value * cycles for name, value in load.items() if isinstance(value, list)}
     if blocks := keys.pop("blocks", None):
         keys["mesh"] = keys.get("mesh", {}) | {"file": str(_drawn(json.dumps(blocks), keys.pop("triangles", False)))}
+    if edges := keys.pop("eye", None):
+        keys["mesh"] = {"file": str(drawn_eye(edges))}
     return parse_any(keys)
 
 

@@ -63,6 +63,13 @@ class Contact:
         for pair in self.pairs if self.has_friction else []:
             pair.begin(u, pair.opposite.curve_displacement(u))
 
+    def touch_down(self, u: Array, levels: Array) -> None:
+        """Count slip from this rank's displacements ``u`` ``(n, 2)`` and the drives' ``levels`` ``(d,)`` on, at points
+        that did not touch in the accepted state: bodies came there without load. Collective."""
+        self.move(levels)
+        for pair in self.pairs if self.has_friction else []:
+            pair.touch_down(u, pair.opposite.curve_displacement(u))
+
     def search(self) -> None:
         """Forget where the pairs were: the next evaluation searches them over whole surfaces."""
         for pair in self.pairs:

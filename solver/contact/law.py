@@ -9,7 +9,7 @@ sides agree on it, whatever the angle at which they met, and what turns with the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -44,7 +44,15 @@ class ContactLaw(Protocol):
         ...
 
     def elastic(self) -> ContactLaw:
-        """A law with the same states that answers from each without friction."""
+        """A law with the same states that answers from each as if points could not slide (any further)."""
+        return self
+
+    def frictionless(self) -> ContactLaw:
+        """A law with the same states that answers without shear."""
+        return self
+
+    def by_secants(self) -> ContactLaw:
+        """The law itself, with a derivative that leaves no point without stiffness along the surface."""
         return self
 
     def dissipation(self, state: State) -> Array | float:
@@ -82,9 +90,16 @@ class Coulomb(ContactLaw):
     many steps does not creep. Where that leaves the cone the shear comes back to it at the same pressure, and the
     elastic slip becomes what gives this shear: a return map with gamma for its stiffness. It is zero at points that do
     not touch.
+
+    If ``held``, points that touched stick, whatever their shear, and others slide without friction: an elastic
+    predictor. With ``secant`` the derivative by the trial shear is shear over trial shear at points that slide, and the
+    shear does not follow the pressure there. Newton's method then is the fixed-point iteration of Kacanov (1959):
+    slower, but bodies that only friction keeps from turning keep a stiffness.
     """
 
     friction: float
+    held: bool = False
+    secant: bool = False
     has_friction = True
     unilateral = True
 
@@ -97,22 +112,38 @@ class Coulomb(ContactLaw):
         touches = ~(trial[:, 0] <= 0)
         pressure = np.where(touches, trial[:, 0], 0.0)
         sticking = np.where(touches, trial[:, 1] - gamma[:, 1] * state.elastic_slip, 0.0)
-        sign, beyond = np.sign(sticking), np.abs(sticking) - self.friction * pressure
-        slides = beyond > 0
-        shear = np.where(slides, sign * self.friction * pressure, sticking)
-        moved = np.where(slides, sign * beyond / gamma[:, 1], 0.0)
+        touched = state.pressure > 0
+        friction = np.where(touched, self.friction, 0.0) if self.held else self.friction
+        most = friction * pressure
+        sign, size = np.sign(sticking), np.abs(sticking)
+        slides = size > most
+        if self.held:
+            slides &= ~touched
+        shear = np.where(slides, sign * most, sticking)
+        moved = np.where(slides, sign * (size - most) / gamma[:, 1], 0.0)
         derivative = np.zeros((len(trial), 2, 2))
         derivative[:, 0, 0], derivative[:, 1, 1] = touches, touches & ~slides
-        derivative[:, 1, 0] = np.where(slides, sign * self.friction, 0.0)
-        lost = 0.5 * self.friction * (state.pressure + pressure) * np.abs(moved)
+        if self.secant:
+            derivative[slides, 1, 1] = most[slides] / size[slides]
+        else:
+            derivative[:, 1, 0] = np.where(slides, sign * friction, 0.0)
+        lost = 0.5 * friction * (state.pressure + pressure) * np.abs(moved)
         new = FrictionState(
             np.where(touches, state.elastic_slip + slip + moved, 0.0), pressure, state.dissipated + lost
         )
         return np.stack([pressure, shear], axis=1), derivative, new
 
     def elastic(self) -> Coulomb:
+        """The law in which points that touched are ``held``."""
+        return replace(self, held=True)
+
+    def frictionless(self) -> Coulomb:
         """The law without friction."""
-        return Coulomb(0.0)
+        return replace(self, friction=0.0)
+
+    def by_secants(self) -> Coulomb:
+        """The law with ``secant`` derivatives."""
+        return replace(self, secant=True)
 
     def dissipation(self, state: State) -> Array:
         """Work done against friction so far per area ``(m,)``."""

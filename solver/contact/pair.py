@@ -44,6 +44,8 @@ class Pair:
         self.start: Start = "anywhere"
         self.offset = 0.0
         self._begun: tuple[Array, Array] = np.zeros((len(x), 2)), np.zeros_like(opposite.curve.X)
+        self._touched_down: tuple[Array, Array] = self._begun
+        self._touched = self.active
         self.strayed: Array = np.zeros((len(x), 2))
 
     def use_gamma(self, factor: float) -> None:
@@ -80,11 +82,12 @@ class Pair:
         if self.law.slides and not self.moves:
             self.opening[:, 0] += (self.separation * n).sum(1)
         if self.law.has_friction:
-            own, before = self._begun
-            step = self._in_frame(self._relative(displacement - own, motion - before))
-            P, (rise, self.opening[:, 1]) = self.projection, step.T
-            drift = np.einsum("ma,mai->mi", P.slope, (motion - before)[P.nodes])
-            self.strayed = np.stack([rise, self._in_frame(drift)[:, 1]], axis=1)
+            own, nodes = self._moved_in_step(displacement, motion)
+            P = self.projection
+            rise, slip = self._in_frame(own - np.einsum("ma,mai->mi", P.shape, nodes)).T
+            self.opening[:, 1] = slip
+            drift = self._in_frame(np.einsum("ma,mai->mi", P.slope, nodes))[:, 1]
+            self.strayed = np.stack([rise, drift], axis=1)
         self.trial = self._in_frame(self.stress_vector) - self.gamma * self.opening
         if self.law.has_friction:  # what has no partner has no history
             self.trial[~self.projection.found, 0] = -1.0
@@ -93,6 +96,22 @@ class Pair:
     def begin(self, u: Array, motion: Array) -> None:
         """Count the slip of laws that rub from ``u`` and ``motion`` on, as `evaluate` takes them."""
         self._begun = self.surface.displacement(u), motion
+        self._touched_down = self._begun
+        self._touched = self.active.copy()
+
+    def touch_down(self, u: Array, motion: Array) -> None:
+        """Count the slip of points that did not touch when the step began from ``u`` and ``motion`` on instead."""
+        self._touched_down = self.surface.displacement(u), motion
+
+    def _moved_in_step(self, displacement: Array, motion: Array) -> tuple[Array, Array]:
+        """How far points ``(m, 2)`` and the nodes of their partners ``(m, k, 2)`` have moved since slip counts."""
+        nodes, new = self.projection.nodes, ~self._touched
+        own, before = self._begun
+        own_down, down = self._touched_down
+        return (
+            displacement - np.where(new[:, None], own_down, own),
+            motion[nodes] - np.where(new[:, None, None], down[nodes], before[nodes]),
+        )
 
     def _in_frame(self, vectors: Array) -> Array:
         """Components ``(m, 2)`` along normal and tangent."""
