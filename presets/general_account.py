@@ -25,6 +25,7 @@ from archord.presets.measures import (
     distortion_doubts,
     energy_balance,
     headed,
+    told_of_facets,
     work_doubts,
 )
 from archord.presets.problem import as_input_error, general_problem, require_mirrored
@@ -155,7 +156,8 @@ class GeneralAccount:
             if name in tied:
                 continue
             touching = int((profile.in_contact > 0).sum())
-            if 0 < touching < _FEW_FACETS:
+            pressed = told_of_facets(*self._pressures(name, m, before))
+            if pressed and 0 < touching < _FEW_FACETS:
                 facets = "facet" if touching == 1 else "facets"
                 text = f"only {touching} {facets} of {name!r} in contact; smaller elements would resolve it"
                 said.append(Doubt(text, -touching))
@@ -214,7 +216,14 @@ class GeneralAccount:
     def work_doubts(self, steps: Sequence[Record]) -> list[str]:
         """See `work_doubts`, with the same steps."""
         fit = self.scene.path.fit_steps if self.scene.fits else 0
-        return work_doubts(steps, fit, contact=bool(self.scene.interaction))
+        contact = bool(self.scene.interaction)
+        return work_doubts(steps, fit, contact=contact, round_off=self.system.energy_noise())
+
+    def _pressures(self, surface: str, m: Record, before: Sequence[Record]) -> tuple[float, list[float]]:
+        """The largest pressure of the interaction of this ``surface`` in the step ``m``, and in the steps ``before``."""
+        part = next(part for part in self.scene.interaction if surface in part.surfaces)
+        column = f"{part.name} largest pressure"
+        return m[column], [earlier[column] for earlier in before]
 
     def _largest_force(self, steps: Sequence[Record]) -> float:
         """The largest force of a support or an interaction in these ``steps``."""

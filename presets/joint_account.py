@@ -23,6 +23,7 @@ from archord.presets.measures import (
     distortion_doubts,
     energy_balance,
     headed,
+    told_of_facets,
     work_doubts,
 )
 from archord.report.doubts import Doubt
@@ -173,7 +174,8 @@ class JointAccount:
         if self.scene.joint.is_ring and m.contact_area and not on_axis:
             said.append(AWAY)
         touching = max(1, min(int((p.in_contact > 0).sum()) for p in profiles.values()))
-        if m.contact_area and touching < _FEW_FACETS:
+        pressed = m.contact_area > 0 and told_of_facets(m.p0, [earlier.p0 for earlier in before])
+        if pressed and touching < _FEW_FACETS:
             facets = "facet" if touching == 1 else "facets"
             text = f"only {touching} {facets} in contact; a smaller element_size would resolve it"
             said.append(Doubt(text, -touching))
@@ -218,7 +220,7 @@ class JointAccount:
 
     def work_doubts(self, steps: Sequence[Measures]) -> list[str]:
         """See `work_doubts`, with the same steps."""
-        return work_doubts(steps, fit=int(self.scene.joint.dR < 0))
+        return work_doubts(steps, fit=int(self.scene.joint.dR < 0), round_off=self.system.energy_noise())
 
 
 def _largest(place: str, k: int, m: Measures) -> float:

@@ -21,6 +21,8 @@ LARGE_STRAIN = 0.05
 LARGE = 'analysis.strain = "large" is for that'
 _PLASTIC = 0.5  # PEEQ over the strain from which the strain is that of yielding
 _OTHER_UNIT = 3e5  # ratio of moduli: MPa for Pa is a million, steel on soft rubber 2e5
+_LEFT = 1e-3  # of the largest pressure of a run, what is left of it after unloading
+_NOTHING = 1e-4  # of the largest energy, as of a press fit, beside which loads that do less work do none
 _FAR_TURN = 0.2  # angle at which linear rotations stretch lengths by 2 %
 ENERGIES = ("elastic_energy", "plastic_dissipation", "friction_dissipation")
 
@@ -142,6 +144,12 @@ def dissipated(m: Measures | Record) -> float:
     return m.plastic_dissipation + m.friction_dissipation
 
 
+def told_of_facets(pressure: float, before: Sequence[float]) -> bool:
+    """Whether a warning of few facets in contact is worth a word under this largest ``pressure``, after those
+    ``before``: what unloading leaves of a contact decides on nothing."""
+    return pressure > _LEFT * max(before, default=0.0)
+
+
 def headed(name: str, unit: str) -> str:
     """The heading of a column, with its unit if it has one."""
     return f"{name} [{unit}]" if unit else name
@@ -149,7 +157,7 @@ def headed(name: str, unit: str) -> str:
 
 def energy_balance(steps: Sequence[Measures | Record], fit: int = 0, *, contact: bool = True) -> float | None:
     """How far work and stored and dissipated energy of the last of the ``steps`` are apart, over the largest work, of a
-    step in ``contact`` if that can be: without one it is round-off.
+    step in ``contact`` if that can be: without one it is round-off, as is work beside a far larger energy.
 
     Bodies that are pressed into each other in the first ``fit`` steps store energy by work that nobody counted: there
     all count from the last of these steps on, and the result is None where there is no other.
@@ -162,12 +170,20 @@ def _imbalances(steps: Sequence[Measures | Record], fit: int, *, contact: bool) 
     """The `energy_balance` of every step from the last one of the ``fit`` on."""
     missing = [m.work - m.elastic_energy - dissipated(m) for m in steps]
     work = max((abs(m.work) for m in steps if m.contact_area or not contact), default=0.0)
+    stored = max((m.elastic_energy + dissipated(m) for m in steps), default=0.0)
+    work = max(work, _NOTHING * stored)
     before = missing[fit - 1] if 0 < fit <= len(steps) else 0.0
     return [abs(lost - before) / work if work else 0.0 for lost in missing[fit:]]
 
 
-def work_doubts(steps: Sequence[Measures | Record], fit: int = 0, *, contact: bool = True) -> list[str]:
-    """A warning where the work of a step differs from what is stored and dissipated by a hundredth of the largest."""
+def work_doubts(
+    steps: Sequence[Measures | Record], fit: int = 0, *, contact: bool = True, round_off: float = 0.0
+) -> list[str]:
+    """A warning where the work of a step differs from what is stored and dissipated by a hundredth of the largest, and
+    by more than the energy that is ``round_off``."""
+    largest = max((abs(m.work) for m in steps), default=0.0)
+    if largest <= round_off:
+        return []
     off = max(_imbalances(steps, fit, contact=contact), default=0.0)
     if off <= _OFF:
         return []

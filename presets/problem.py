@@ -183,6 +183,26 @@ class _Builder:
                     f"the load {load.name!r} moves {load.on!r} by {farthest:g}, but the whole mesh is {size:.4g} "
                     f"large: a displacement of at most {most:.4g} is solved; are they in the same unit?"
                 )
+        self._require_near_turns(ends, most)
+
+    def _require_near_turns(self, ends: Array, most: float) -> None:
+        """Raise ValueError for a coupling that turns about a held point so far away that all the mesh within ``ends``,
+        the largest x and y and the smallest with the other sign, moves by more than ``most``."""
+        points = {coupling.name: np.array(coupling.point) for coupling in self.scene.coupling}
+        held = {(s.on, freedom) for s in self.scene.support for freedom in s.fixed}
+        held |= {(load.on, load.direction) for load in self.scene.load if load.kind == "displacement"}
+        for load in self.scene.load:
+            if load.kind != "displacement" or load.direction != "rotation":
+                continue
+            beside = np.maximum(points[load.on] - ends[:2], -ends[2:] - points[load.on])
+            x, y = np.maximum(beside, 0.0)
+            arms = [arm for axis, arm in (("x", y), ("y", x)) if (load.on, axis) in held]
+            moved = max(map(abs, load.stages)) * max(arms, default=0.0)
+            if moved > most:
+                raise ValueError(
+                    f"the load {load.name!r} turns {load.on!r} about a point so far away that it moves by {moved:.4g}, "
+                    f"but a displacement of at most {most:.4g} is solved; are they in the same unit?"
+                )
 
     def _load(self, load: parts.Load) -> None:
         """A pressure; a force spread over cells; or what moves a set, a reference point or a disc."""

@@ -154,6 +154,12 @@ class System:
         stored, dissipated = self.problem.symmetry * self.comm.allreduce(parts)
         return float(stored), float(dissipated)
 
+    def energy_noise(self) -> float:
+        """Energy of the whole that is round-off: of a noise in the forces along the largest displacement. Collective."""
+        u = np.abs(self.equilibrium.u.x.array).max(initial=0.0)
+        largest = self.comm.allreduce(u, op=MPI.MAX)
+        return float(self.problem.symmetry * self.equilibrium.noise * largest)
+
     def friction_dissipation(self) -> float:
         """Work done against friction so far, on the whole."""
         return self.problem.symmetry * self.comm.allreduce(self.contact.dissipated())
@@ -182,13 +188,16 @@ class System:
         return reduce(Distortion.joined, found)
 
     def force_balance(self, before: float = 0.0) -> float:
-        """Largest resultant on a body over the largest force of an interaction or a support, or over the norm of nodal
-        ones, as of a pure moment, or over the largest force ``before``; 0 if all are round-off."""
+        """Largest resultant on a body over the largest force: of a support, of an interaction, as the sum of the sizes
+        of its points' forces, the norm of nodal ones, as of a pure moment, or the force ``before``; 0 if all are
+        round-off."""
         left = [self.equilibrium.residual_on(self.nodes_of(body)) for body in self.problem.bodies]
-        forces = [np.zeros(2), *(self.contact_force(interaction.name) for interaction in self.problem.interactions)]
+        forces = [np.zeros(2)]
         forces += [self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)]
+        of_supports = np.linalg.norm(forces, axis=1).max()
         nodal = max(self.equilibrium.reaction_norm, self.equilibrium.largest_reaction)
-        largest = max(np.linalg.norm(forces, axis=1).max(), self.problem.symmetry * nodal, before)
+        on_part = max(nodal, self.contact.largest_pressed())
+        largest = max(of_supports, self.problem.symmetry * on_part, before)
         if largest <= _AT_REST * self.problem.symmetry * self.equilibrium.noise:
             return 0.0
         return float(self.problem.symmetry * np.linalg.norm(left, axis=1).max() / largest)

@@ -137,6 +137,10 @@ class Contact:
         """Moment of that force about ``point``, anticlockwise, over all ranks."""
         return next(i for i in self.interfaces if name in ("", i.interaction.name)).moment(np.asarray(point))
 
+    def largest_pressed(self) -> float:
+        """Sum of the sizes of the points' forces of the interaction where it is largest, over all ranks; 0 without."""
+        return max((interface.pressed() for interface in self.interfaces), default=0.0)
+
     def force_on_drives(self) -> Array:
         """Contact force ``(d,)`` along the rates of rigid surfaces, over all ranks; a single zero without any."""
         first = [(i.surfaces[0], i) for i in self.interfaces]

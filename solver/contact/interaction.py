@@ -114,6 +114,12 @@ class Interface:
         crossed = [a[:, :1] * f[:, 1:] - a[:, 1:] * f[:, :1] for a, f in zip(arms, forces, strict=True)]
         return float(self._summed(crossed)[0])
 
+    def pressed(self) -> float:
+        """Sum of the sizes of the contact forces of all points, over all ranks: what a fit presses with, too, of which
+        the resultant is zero."""
+        sizes = [np.linalg.norm(pair.forces, axis=1).sum() for pair in self.pairs]
+        return self.pairs[0].surface.comm.allreduce(float(sum(sizes)))
+
     def _summed(self, on_own: Sequence[Array]) -> Array:
         """What the points of each pair get from the other surface ``(m, k)``, summed over those of the second."""
         signs = [1 if pair.surface is self.surfaces[1] else -1 for pair in self.pairs]

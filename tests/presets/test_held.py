@@ -206,3 +206,17 @@ def test_a_displacement_beyond_the_mesh_is_refused_before_the_solve(squares):
 def test_friction_in_per_cent_is_asked_about(squares, friction, asked):
     warnings = fit(squares, friction=friction).warnings()
     assert [warning.endswith("is it in per cent? Then give 0.15") for warning in warnings] == [True][:asked]
+
+
+def test_a_turn_about_a_held_point_moves_no_farther_than_the_mesh_is_large(squares):
+    """A turn about a point that may move turns about the facets, wherever the point lies."""
+    far = {
+        "coupling": [{"name": "arm", "facets": "upper t", "point": [1005.0, 20.0]}],
+        "load": [{"name": "turn", "on": "arm", "direction": "rotation", "displacement": 0.05}],
+    }
+    held = {"name": "pivot", "on": "arm", "fixed": ["x", "y"]}
+    base = {"name": "base", "on": "lower b", "fixed": ["x", "y"]}
+    free = {"name": "pivot", "on": "arm", "fixed": ["x"]}
+    account(squares, support=[base, free], **far)
+    with pytest.raises(InputError, match="the load 'turn' turns 'arm' about a point so far away that it moves by 49"):
+        account(squares, support=[base, held], **far)

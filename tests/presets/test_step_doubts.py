@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from archord.presets.general_account import GeneralAccount
-from archord.presets.measures import Measures, distortion_doubts, work_doubts
+from archord.presets.measures import Measures, distortion_doubts, told_of_facets, work_doubts
 from archord.scene.file import parse_any
 from archord.solver.stepping import Step, march
 
@@ -88,6 +88,25 @@ def test_work_that_the_energies_do_not_bear_out_is_told():
     (said,) = work_doubts([slid, replace(slid, friction_dissipation=12.0)])
     assert "differ by 20 % of the largest work" in said
     assert work_doubts([replace(slid, work=10.0, friction_dissipation=8.0)], fit=1) == []
+
+
+def test_work_that_is_round_off_is_not_told():
+    """Of loads that move nothing beside a press fit, and of a body that turns without a strain."""
+    zeros = dict.fromkeys(Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0)
+    fit = Measures(**zeros | {"elastic_energy": 100.0, "contact_area": 1.0})
+    loaded = replace(fit, elastic_energy=100.0 + 1e-7, work=1e-12)
+    assert work_doubts([fit, loaded], fit=1) == []
+    assert work_doubts([fit, replace(fit, elastic_energy=100.1, work=0.05)], fit=1) != []
+    turned = Measures(**zeros | {"elastic_energy": 2e-12, "work": 1e-12})
+    assert work_doubts([turned], contact=False) != []
+    assert work_doubts([turned], contact=False, round_off=1e-10) == []
+
+
+def test_facets_that_unloading_leaves_in_contact_are_not_told():
+    """They carry nothing. The first step that touches on few facets is told, however little it carries."""
+    assert told_of_facets(1e-9, [])
+    assert told_of_facets(1.0, [100.0])
+    assert not told_of_facets(1e-10, [100.0, 50.0])
 
 
 def test_forces_after_unloading_balance_to_the_largest_force_of_the_run():

@@ -257,6 +257,19 @@ def fitted(interference, overlap, **options) -> System:
     return solve(Problem(mesh, bodies, [fit], supports, fit=True, symmetry=4.0, **options), [0.5, 1.0])
 
 
+def test_forces_balance_to_the_forces_that_a_fit_presses_with():
+    """They are the pressure on the whole circle, whatever their resultant: zero where nothing but the fit loads it."""
+    system = fitted(0.02, 0.0)
+    pair = system.contact.pair_of(system.sides["housing inner"])
+    pressed = float(pair.pressure.mean()) * 2 * np.pi * 14.0
+    assert 4 * system.contact.largest_pressed() == pytest.approx(pressed, rel=5e-3)
+    rng = np.random.default_rng(0)
+    system.equilibrium.u.x.array[:] += 1e-7 * rng.random(len(system.equilibrium.u.x.array))
+    system.equilibrium.evaluate()
+    left = [4 * np.linalg.norm(system.equilibrium.residual_on(system.nodes_of(b))) for b in system.problem.bodies]
+    assert system.force_balance() == pytest.approx(max(left) / pressed, rel=5e-3)
+
+
 def test_a_press_fit_is_lames():
     """Fit pressure and displacements of two rings, given as an interference and drawn as an overlap."""
     pressures = []
