@@ -29,6 +29,7 @@ _AT_ONCE = 2_000_000  # pairs of points and pieces
 _POLYGONAL = 1e-3  # of the clearance: sagitta from which corners of straight sides show in the pressure
 _COARSE = 0.05  # of the clearance: sagitta of straight sides that spoils it
 _STRAIGHT = np.cos(0.5)  # of the angle up to which two facets are of one line
+_NO_CELL = "look whether a cell is missing there"
 _LEFT_OUT = "look whether they are missing"
 _MOTIONS = ("x", "y", "rotation")
 _HELD = 1e-8  # singular value over the largest one, below which a motion is free
@@ -266,7 +267,8 @@ def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
 
 
 def holes(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
-    """A warning of holes in a ``body`` of these ``cells`` that have the sides of one cell, none in a facet set."""
+    """Warnings of holes in a ``body`` of these ``cells`` that have the sides of one cell, none in a facet set, and of
+    nodes in which its boundary meets itself."""
     ends = outer_sides(mesh.cells[cells])[0][:, :2]
     nodes, place = np.unique(ends, return_inverse=True)
     place = place.reshape(-1, 2)
@@ -281,7 +283,11 @@ def holes(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
     if small.any():
         at = _at(mesh.x[ends[loop == np.flatnonzero(small)[0]]].mean(axis=(0, 1)))
         found = f"{small.sum()} holes of the size of one cell, as at {at}"
-        yield f"the body {body!r} has {found}: look whether a cell is missing there"
+        yield f"the body {body!r} has {found}: {_NO_CELL}"
+    pinched = nodes[np.bincount(place.ravel()) > 2]
+    if len(pinched):
+        at = _at(mesh.x[pinched[0]])
+        yield f"the boundary of the body {body!r} meets itself in {len(pinched)} nodes, as at {at}: {_NO_CELL}"
 
 
 def facets_within(mesh: PlaneMesh, name: str) -> Iterator[str]:

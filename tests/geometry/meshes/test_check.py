@@ -122,6 +122,14 @@ def test_a_hole_of_one_cell_is_warned_of(n, warned):
     assert all("'body' has 1 holes of the size of one cell, as at (0.5, 0.5)" in text for text in said)
 
 
+def test_a_boundary_that_meets_itself_is_warned_of():
+    """A cell at the corner is missing, and one in the middle."""
+    x, cells = grid(3, 3)
+    cells = np.delete(cells, [0, 4], axis=0)
+    (said,) = check(MPI.COMM_SELF, (x, cells, {"0": np.arange(len(cells))}, {}), {"body": "0"})
+    assert said.startswith("the boundary of the body 'body' meets itself in 1 nodes, as at (0.333333, 0.333333)")
+
+
 def test_a_body_of_one_cell_has_no_hole():
     x, cells = grid(1, 1)
     assert check(MPI.COMM_SELF, (x, cells, {"0": np.arange(1)}, {}), {"body": "0"}) == []
