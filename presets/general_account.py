@@ -45,6 +45,7 @@ _ALONE = 0.1  # of the same at the end, where no force pushes the bodies that sp
 _LOST = "nothing holds what the loads move"
 _CHECK = "let more of the loads press it against others, or look whether its E has the unit of the others"
 NEVER = "no surfaces ever touched: no load presses any of them together"
+PARTED = "no surfaces touch from step {} on, though the loads displace farther: look which way they move"
 
 
 class GeneralAccount:
@@ -206,7 +207,23 @@ class GeneralAccount:
         touching = [part for part in self.scene.interaction if part.law != "tied"]
         if self.system.stabilisation_energy > _ALONE * _largest_work(steps)[1]:
             return f"{_LOST}: no contact carries {self.system.hardest_held!r}; hold it by a support, {_CHECK}", []
-        return "", [NEVER] if touching and not any(m.contact_area for m in steps) else []
+        if not touching:
+            return "", []
+        met = [m.step for m in steps if m.contact_area]
+        if not met:
+            return "", [NEVER]
+        parted = met[-1] < steps[-1].step and self._farther(steps, met[-1])
+        return "", [PARTED.format(met[-1] + 1)] if parted else []
+
+    def _farther(self, steps: Sequence[Record], last: int) -> bool:
+        """Whether a load displaces farther after the step number ``last`` than up to it."""
+        names = [f"{load.name} displacement" for load in self.scene.load if load.displacement is not None]
+        for name in names:
+            before = max(abs(m[name]) for m in steps if m.step <= last)
+            after = max(abs(m[name]) for m in steps if m.step > last)
+            if after > before:
+                return True
+        return False
 
     def energy_balance(self, steps: Sequence[Record]) -> float | None:
         """See `energy_balance`; where interferences arise first, from the end of their stage on."""
@@ -220,7 +237,7 @@ class GeneralAccount:
         return work_doubts(steps, fit, contact=contact, round_off=self.system.energy_noise())
 
     def _pressures(self, surface: str, m: Record, before: Sequence[Record]) -> tuple[float, list[float]]:
-        """The largest pressure of the interaction of this ``surface`` in the step ``m``, and in the steps ``before``."""
+        """The largest pressure of the interaction of this ``surface`` in the step ``m``, and ``before``."""
         part = next(part for part in self.scene.interaction if surface in part.surfaces)
         column = f"{part.name} largest pressure"
         return m[column], [earlier[column] for earlier in before]

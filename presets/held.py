@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain, combinations
+from itertools import chain, combinations, product
 
 import numpy as np
 from mpi4py import MPI
 
-from archord.geometry.meshes.check import check_mesh, free_motions
+from archord.geometry.meshes.check import check_mesh, facets_within, free_motions, gaps
 from archord.geometry.meshes.fenicsx import gathered
 from archord.geometry.meshes.plane_mesh import PlaneMesh
 from archord.materials.material import Array
@@ -40,12 +40,60 @@ def check(scene: ProblemScene, problem: Problem) -> list[str]:
     whole = gathered(mesh)
     owner = {name: problem.body_of(name).name for part in scene.interaction for name in part.surfaces}
     failure = ""
+    doubts = list[str]()
     if whole is not None:
-        faults = chain(_shared(scene, whole), _loose(scene, whole, cells, owner))
+        faults = chain(_shared(scene, whole), _half_loaded(scene, whole), _loose(scene, whole, cells, owner))
         failure = next(faults, "")
-    if failure := mesh.mesh.comm.bcast(failure):
+        doubts = [*_half_held(scene, whole), *_moved_in_contact(scene, whole)]
+        for name in sorted({*owner, *_moved(scene), *_spread(scene)}):
+            doubts += gaps(whole, name)
+    failure, doubts = mesh.mesh.comm.bcast((failure, doubts))
+    if failure:
         raise ValueError(failure)
-    return warnings
+    return warnings + doubts
+
+
+def _spread(scene: ProblemScene) -> set[str]:
+    """The facet sets along which something is spread: a pressure, or the force of a distributing coupling."""
+    found = {load.on for load in scene.load if load.kind == "pressure"}
+    return found | {c.facets for c in scene.coupling if c.kind == "distributing"}
+
+
+def _moved(scene: ProblemScene) -> dict[str, str]:
+    """The sets whose nodes move as is prescribed, and what prescribes it."""
+    found = {c.facets: c.name for c in scene.coupling if c.kind == "rigid"}
+    found |= {load.on: load.name for load in scene.load if load.kind != "pressure"}
+    return found | {support.on: support.name for support in scene.support}
+
+
+def _half_loaded(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+    """What is said of facets inside a body along which a load is to be spread."""
+    for name in sorted(_spread(scene)):
+        for said in facets_within(whole, name):
+            yield f"{said}, where nothing can load them: give it those of the boundary alone"
+
+
+def _half_held(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+    """Warnings of facets inside a body in a set whose other facets are on the boundary."""
+    for name in sorted(_moved(scene)):
+        for said in facets_within(whole, name):
+            yield f"{said}: look whether its elements are numbered as the set takes them"
+
+
+def _moved_in_contact(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+    """Warnings of sets with a prescribed motion that have some facets of a surface in contact, and others."""
+    smooth = [part for part in scene.interaction if part.law != "tied"]
+    surfaces = [(part.name, name) for part in smooth for name in part.surfaces]
+    for (on, by), (part, surface) in product(_moved(scene).items(), surfaces):
+        there = np.isin(whole.tags, whole.facet_sets.get(on, ()))
+        touching = np.isin(whole.tags, whole.facet_sets[surface])
+        both = there & touching
+        if both.any() and (there & ~touching).any() and (touching & ~there).any():
+            x, y = whole.x[whole.edges[both][0, :2]].mean(axis=0)
+            yield (
+                f"the set {on!r} of {by!r} has {both.sum()} facets of the surface {surface!r} of {part!r}, as at "
+                f"({x:.6g}, {y:.6g}), which it moves whatever they touch: look whether they belong to both"
+            )
 
 
 def _shared(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:

@@ -156,8 +156,9 @@ def headed(name: str, unit: str) -> str:
 
 
 def energy_balance(steps: Sequence[Measures | Record], fit: int = 0, *, contact: bool = True) -> float | None:
-    """How far work and stored and dissipated energy of the last of the ``steps`` are apart, over the largest work, of a
-    step in ``contact`` if that can be: without one it is round-off, as is work beside a far larger energy.
+    """How far work and stored and dissipated energy of the last of the ``steps`` are apart, over the largest work;
+    0 where there can be ``contact`` and nothing ever touched, when all of it is round-off, as is work beside a far
+    larger energy.
 
     Bodies that are pressed into each other in the first ``fit`` steps store energy by work that nobody counted: there
     all count from the last of these steps on, and the result is None where there is no other.
@@ -169,7 +170,9 @@ def energy_balance(steps: Sequence[Measures | Record], fit: int = 0, *, contact:
 def _imbalances(steps: Sequence[Measures | Record], fit: int, *, contact: bool) -> list[float]:
     """The `energy_balance` of every step from the last one of the ``fit`` on."""
     missing = [m.work - m.elastic_energy - dissipated(m) for m in steps]
-    work = max((abs(m.work) for m in steps if m.contact_area or not contact), default=0.0)
+    if contact and not any(m.contact_area for m in steps):
+        return [0.0] * len(missing[fit:])
+    work = max((abs(m.work) for m in steps), default=0.0)
     stored = max((m.elastic_energy + dissipated(m) for m in steps), default=0.0)
     work = max(work, _NOTHING * stored)
     before = missing[fit - 1] if 0 < fit <= len(steps) else 0.0

@@ -50,7 +50,7 @@ def as_input_error(scene: ProblemScene) -> Iterator[None]:
     except ValueError as error:
         source, said = scene.mesh.file or "mesh.shape", str(error)
         said = said if said.startswith(source) else f"{source}: {said}"
-        raise InputError(said if said.endswith((".", "?")) else f"{said}.") from None
+        raise InputError(said if said.endswith(".") else f"{said}.") from None
 
 
 def scene_mesh(scene: ProblemScene, comm: MPI.Comm) -> TaggedMesh:
@@ -181,7 +181,7 @@ class _Builder:
             if abs(farthest) > most:
                 raise ValueError(
                     f"the load {load.name!r} moves {load.on!r} by {farthest:g}, but the whole mesh is {size:.4g} "
-                    f"large: a displacement of at most {most:.4g} is solved; are they in the same unit?"
+                    f"large: a displacement of at most {most:.4g} is solved; look whether both have the same unit"
                 )
         self._require_near_turns(ends, most)
 

@@ -208,7 +208,7 @@ class Problem:
         tags = self.mesh.tags_behind(facets)
         found = [body for body in self.bodies if tags & set(self.mesh.cell_tags(body.cells or body.name))]
         if not found:
-            raise ValueError(f"the facet set {facets!r} is of no body; is one missing?")
+            raise ValueError(f"the facet set {facets!r} is of no body: give that body, too")
         if len(found) > 1 or not tags <= set(self.mesh.cell_tags(found[0].cells or found[0].name)):
             raise ValueError(f"the facet set {facets!r} belongs to {len(tags)} cell sets, a surface to one body")
         return found[0]

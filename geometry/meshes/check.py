@@ -21,12 +21,16 @@ from archord.geometry.meshes.tagged_mesh import TaggedMesh, tags_of
 _FLAT = 1e-9  # smallest over largest jacobian of a cell that has collapsed
 _DISTORTED = 0.02  # smallest over largest jacobian of a cell that is told of; refused are those below -0.02, as the
 # corner of a curved cell with two sides on one arc, which is flat, comes out a little below zero
+_THIN = 0.005  # area over the square of the longest side, below which a cell is told of
 _SAME = 1e-9  # of the mesh's size: distance of nodes that ought to be one
 _INTO = 0.02, 1e-3  # of a side: how deep bodies may overlap by their sides being straight, or curved
 _PIECES = 8  # of a side, as a polygon
 _AT_ONCE = 2_000_000  # pairs of points and pieces
 _POLYGONAL = 1e-3  # of the clearance: sagitta from which corners of straight sides show in the pressure
 _COARSE = 0.05  # of the clearance: sagitta of straight sides that spoils it
+_STRAIGHT = np.cos(0.5)  # of the angle up to which two facets are of one line
+_NO_CELL = "look whether a cell is missing there"
+_LEFT_OUT = "look whether they are missing"
 _MOTIONS = ("x", "y", "rotation")
 _HELD = 1e-8  # singular value over the largest one, below which a motion is free
 
@@ -120,6 +124,22 @@ def distorted(mesh: PlaneMesh) -> list[str]:
     ]
 
 
+def thin(mesh: PlaneMesh) -> list[str]:
+    """A warning of cells that are far longer than wide, as with one node that lies far off."""
+    sides = sides_of(mesh.cells)[:, :2].reshape(len(mesh.cells), -1, 2)
+    lengths = np.linalg.norm(mesh.x[sides[:, :, 1]] - mesh.x[sides[:, :, 0]], axis=2)
+    roundness = areas(mesh) / lengths.max(axis=1) ** 2
+    bad = np.flatnonzero(roundness < _THIN)
+    if not len(bad):
+        return []
+    worst = bad[np.argmin(roundness[bad])]
+    ratio = 1 / roundness[worst]
+    return [
+        f"{len(bad)} cells are far longer than wide, the worst at {_in(mesh, worst)} by about {ratio:.2g}: look "
+        "whether their nodes are where they belong"
+    ]
+
+
 def areas(mesh: PlaneMesh) -> Array:
     """Area ``(n,)`` of each cell."""
     J, w = _jacobians(mesh)
@@ -155,8 +175,9 @@ def check_mesh(
                 _sagitta(mesh, pair, straight)
         checks += [iter(straight[_COARSE]), _overlaps(mesh, inside, overlap)]
         found = next((said for check in checks for said in check), "")
-        warnings = distorted(mesh) + straight[_POLYGONAL]
-        warnings += [said for body, cells in inside.items() for said in cracks(mesh, body, cells)]
+        warnings = distorted(mesh) + thin(mesh) + straight[_POLYGONAL]
+        for body, cells in inside.items():
+            warnings += [*cracks(mesh, body, cells), *holes(mesh, body, cells)]
     found, warnings = tagged.mesh.comm.bcast((found, warnings))
     if found:
         raise ValueError(found)
@@ -193,12 +214,11 @@ def parts(cells: np.ndarray) -> np.ndarray:
 
 
 def _of_surface(mesh: PlaneMesh, inside: Mapping[str, np.ndarray], name: str) -> Iterator[str]:
-    edges, (outer, _) = mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])], outer_sides(mesh.cells)
+    edges = mesh.edges[np.isin(mesh.tags, mesh.facet_sets[name])]
     owners = [body for body, cells in inside.items() if np.isin(edges, mesh.cells[cells]).any()]
     if len(owners) > 1:
         yield f"the facet set {name!r} is of the bodies {' and '.join(map(repr, owners))}; a surface is of one"
-    _, which = distinct_edges(np.concatenate([outer, edges])[:, :2])
-    if not np.isin(which[len(outer) :], which[: len(outer)]).all():
+    if not _outside(mesh, edges).all():
         yield f"the facet set {name!r} lies inside the body {owners[0]!r}; a surface is on a boundary"
 
 
@@ -244,6 +264,69 @@ def cracks(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
     if len(pairs):
         at = _at(mesh.x[nodes[pairs[0, 0]]])
         yield f"the body {body!r} has {len(pairs)} pairs of nodes at the same place, as at {at}: a crack, if not merged"
+
+
+def holes(mesh: PlaneMesh, body: str, cells: np.ndarray) -> Iterator[str]:
+    """Warnings of holes in a ``body`` of these ``cells`` that have the sides of one cell, none in a facet set, and of
+    nodes in which its boundary meets itself."""
+    ends = outer_sides(mesh.cells[cells])[0][:, :2]
+    nodes, place = np.unique(ends, return_inverse=True)
+    place = place.reshape(-1, 2)
+    joined = coo_matrix((np.ones(len(ends)), place.T), shape=(len(nodes), len(nodes)))
+    loop = connected_components(joined, directed=False)[1][place[:, 0]]
+    outermost = loop[np.argmax(mesh.x[ends, 0].max(axis=1))]
+    corners = sides_of(mesh.cells[:1]).shape[0]
+    _, which = distinct_edges(np.concatenate([ends, mesh.edges[:, :2]]))
+    named = np.isin(which[: len(ends)], which[len(ends) :])
+    small = (np.bincount(loop) == corners) & (np.bincount(loop, weights=named) == 0)
+    small[outermost] = False
+    if small.any():
+        at = _at(mesh.x[ends[loop == np.flatnonzero(small)[0]]].mean(axis=(0, 1)))
+        found = f"{small.sum()} holes of the size of one cell, as at {at}"
+        yield f"the body {body!r} has {found}: {_NO_CELL}"
+    pinched = nodes[np.bincount(place.ravel()) > 2]
+    if len(pinched):
+        at = _at(mesh.x[pinched[0]])
+        yield f"the boundary of the body {body!r} meets itself in {len(pinched)} nodes, as at {at}: {_NO_CELL}"
+
+
+def facets_within(mesh: PlaneMesh, name: str) -> Iterator[str]:
+    """What is said of a facet set of which a part is inside the bodies, where the rest is on their boundary."""
+    edges = mesh.edges[np.isin(mesh.tags, mesh.facet_sets.get(name, ()))]
+    within = ~_outside(mesh, edges)
+    if within.any() and not within.all():
+        at = _at(mesh.x[edges[within][0, :2]].mean(axis=0))
+        yield f"the facet set {name!r} has {within.sum()} of its {len(edges)} facets inside a body, as at {at}"
+
+
+def gaps(mesh: PlaneMesh, name: str) -> Iterator[str]:
+    """A warning of single facets on the boundary that no set has, though those at both of their ends are of sets, one
+    of them of ``name`` and in line with them."""
+    outer = outer_sides(mesh.cells)[0][:, :2]
+    _, which = distinct_edges(np.concatenate([mesh.edges[:, :2], outer]))
+    of_none = outer[~np.isin(which[len(mesh.edges) :], which[: len(mesh.edges)])]
+    between = of_none[np.isin(of_none, mesh.edges[:, :2]).all(axis=1)]
+    inside = np.isin(mesh.tags, mesh.facet_sets.get(name, ()))
+    along = {int(node): mesh.x[b] - mesh.x[a] for a, b in mesh.edges[inside, :2] for node in (a, b)}
+    missing = [edge for edge in between if _goes_on(mesh, edge, along)]
+    if missing:
+        at = _at(mesh.x[missing[0]].mean(axis=0))
+        yield f"the facet set {name!r} leaves out {len(missing)} single facets that no set has, as at {at}: {_LEFT_OUT}"
+
+
+def _goes_on(mesh: PlaneMesh, edge: np.ndarray, along: Mapping[int, Array]) -> bool:
+    """Whether an ``edge`` meets facets, which have directions ``along`` them, and turns little there."""
+    direction = mesh.x[edge[1]] - mesh.x[edge[0]]
+    others = [along[node] for node in edge.tolist() if node in along]
+    cosines = [abs(o @ direction) / np.linalg.norm(o) / np.linalg.norm(direction) for o in others]
+    return max(cosines, default=0.0) > _STRAIGHT
+
+
+def _outside(mesh: PlaneMesh, edges: np.ndarray) -> np.ndarray:
+    """Whether each of the ``edges`` ``(k, b)`` is on the boundary of the mesh."""
+    outer, _ = outer_sides(mesh.cells)
+    _, which = distinct_edges(np.concatenate([outer, edges])[:, :2])
+    return np.isin(which[len(outer) :], which[: len(outer)])
 
 
 def _sagitta(mesh: PlaneMesh, pair: Sequence[str | float], said: dict[float, list[str]]) -> None:

@@ -64,7 +64,7 @@ def test_two_squares_are_no_fault(squares):
             {"support": [{"name": "base", "on": "lower b", "fixed": ["x", "y"]}]},
             "nothing holds the body 'upper': it is free in x; add a ..support...$",
         ),
-        ({"body": [{"name": "lower"} | STEEL]}, "the facet set .upper .. is of no body; is one missing.$"),
+        ({"body": [{"name": "lower"} | STEEL]}, "the facet set .upper .. is of no body: give that body, too[.]$"),
         ({"interaction": [{"name": "c", "surfaces": ["lower t", "upper bb"]}]}, "'upper bb' .did you mean 'upper b'"),
         ({"units": {"length": "mm"}, "mesh": {"scale": 0.001}}, "large; is it in metres"),
         ({"load": [{"name": "p", "on": "top", "direction": "y", "displacement": 1.0}]}, "there is no .* 'top'"),

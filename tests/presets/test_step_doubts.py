@@ -109,6 +109,16 @@ def test_facets_that_unloading_leaves_in_contact_are_not_told():
     assert not told_of_facets(1e-10, [100.0, 50.0])
 
 
+def test_the_work_after_the_contact_opened_counts():
+    """A fit that opened: only the work of its stage counted, which is none, and it differed by 1e24 per cent."""
+    zeros = dict.fromkeys(Measures.__dataclass_fields__.keys() - {"peeq", "friction_dissipation"}, 0.0)
+    fit = Measures(**zeros | {"work": -1e-25, "contact_area": 1.0, "elastic_energy": 1.0})
+    opened = Measures(**zeros | {"work": -2.0})
+    (said,) = work_doubts([fit, opened], fit=1)
+    assert "differ by 50 % of the largest work" in said
+    assert work_doubts([replace(fit, contact_area=0.0)]) == []
+
+
 def test_forces_after_unloading_balance_to_the_largest_force_of_the_run():
     """What a solve leaves is a part of that force, not of the little that is left of it."""
     account = lug([0.1, 1e-6])

@@ -137,6 +137,9 @@ def _merge(path: Path, found: Path, said: Path) -> NoReturn:
     """Write the mesh that gmsh has of ``path`` to ``found``, or to ``said`` why there is none, and end the process."""
     status = 1
     try:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for stream in (1, 2):  # where the C library tells of a damaged heap
+            os.dup2(nowhere, stream)
         for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT):
             signal.signal(number, signal.SIG_DFL)  # PETSc's handler would end all ranks
         with own_gmsh() as gmsh:

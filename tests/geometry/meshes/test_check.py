@@ -112,6 +112,29 @@ def test_a_crack_is_warned_of():
     assert said.startswith("the body 'body' has 1 pairs of nodes at the same place, as at (0.5, 0)")
 
 
+@pytest.mark.parametrize(("n", "warned"), [(3, 1), (4, 0)])
+def test_a_hole_of_one_cell_is_warned_of(n, warned):
+    """One of the cells in the middle is missing, or two are."""
+    x, cells = grid(n, 3)
+    cells = np.delete(cells, [n + 1, 2 * n - 2], axis=0)
+    said = check(MPI.COMM_SELF, (x, cells, {"0": np.arange(len(cells))}, {}), {"body": "0"})
+    assert len(said) == warned
+    assert all("'body' has 1 holes of the size of one cell, as at (0.5, 0.5)" in text for text in said)
+
+
+def test_a_boundary_that_meets_itself_is_warned_of():
+    """A cell at the corner is missing, and one in the middle."""
+    x, cells = grid(3, 3)
+    cells = np.delete(cells, [0, 4], axis=0)
+    (said,) = check(MPI.COMM_SELF, (x, cells, {"0": np.arange(len(cells))}, {}), {"body": "0"})
+    assert said.startswith("the boundary of the body 'body' meets itself in 1 nodes, as at (0.333333, 0.333333)")
+
+
+def test_a_body_of_one_cell_has_no_hole():
+    x, cells = grid(1, 1)
+    assert check(MPI.COMM_SELF, (x, cells, {"0": np.arange(1)}, {}), {"body": "0"}) == []
+
+
 def disc(n, radius, m=2):
     """Quadrilaterals of a ring of straight sides inside the ``radius``, or outside if ``m`` is negative."""
     x, cells = grid(n, abs(m))
