@@ -220,7 +220,7 @@ class GeneralAccount:
         return work_doubts(steps, fit, contact=contact, round_off=self.system.energy_noise())
 
     def _pressures(self, surface: str, m: Record, before: Sequence[Record]) -> tuple[float, list[float]]:
-        """The largest pressure of the interaction of this ``surface`` in the step ``m``, and in the steps ``before``."""
+        """The largest pressure of the interaction of a ``surface`` in the step ``m``, and in those ``before``."""
         part = next(part for part in self.scene.interaction if surface in part.surfaces)
         column = f"{part.name} largest pressure"
         return m[column], [earlier[column] for earlier in before]
