@@ -155,7 +155,7 @@ class System:
         return float(stored), float(dissipated)
 
     def energy_noise(self) -> float:
-        """Energy of the whole that is round-off: of a noise in the forces along the largest displacement. Collective."""
+        """Energy of the whole that is round-off, of noise in forces along the largest displacement. Collective."""
         u = np.abs(self.equilibrium.u.x.array).max(initial=0.0)
         largest = self.comm.allreduce(u, op=MPI.MAX)
         return float(self.problem.symmetry * self.equilibrium.noise * largest)
