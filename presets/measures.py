@@ -174,9 +174,9 @@ def _imbalances(steps: Sequence[Measures | Record], fit: int, *, contact: bool) 
         return [0.0] * len(missing[fit:])
     work = max((abs(m.work) for m in steps), default=0.0)
     stored = max((m.elastic_energy + dissipated(m) for m in steps), default=0.0)
-    work = max(work, _NOTHING * stored)
+    scale = max(work, _NOTHING * stored)
     before = missing[fit - 1] if 0 < fit <= len(steps) else 0.0
-    return [abs(lost - before) / work if work else 0.0 for lost in missing[fit:]]
+    return [abs(lost - before) / scale if work else 0.0 for lost in missing[fit:]]
 
 
 def work_doubts(
