@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from archord.output.disk import new_name
 from archord.output.user_file import check_target, writing
 from archord.postprocess.fields import Fields
 from archord.postprocess.pictures.pictures import panels_of
@@ -47,16 +46,13 @@ def write_report(run: Run, target: Path, *, force: bool = False) -> Path:
     check_target(target, force=force)
     # all is drawn before the file is begun: what a run lacks is told first
     figures = list(_pages_of(run))
-    new = new_name(target)
-    try:
-        with writing(target):
-            with PdfPages(new, metadata={"Title": f"archord: {run.folder}", "Creator": f"archord {VERSION}"}) as pages:
-                for number, figure in enumerate(figures, 1):
-                    _foot(figure, run, number, len(figures))
-                    pages.savefig(figure)
-            new.replace(target)
-    finally:
-        new.unlink(missing_ok=True)
+    with (
+        writing(target) as new,
+        PdfPages(new, metadata={"Title": f"archord: {run.folder}", "Creator": f"archord {VERSION}"}) as pages,
+    ):
+        for number, figure in enumerate(figures, 1):
+            _foot(figure, run, number, len(figures))
+            pages.savefig(figure)
     return target
 
 
