@@ -20,7 +20,7 @@ from archord.scene.file import ABSENT, AnyScene
 from archord.scene.keys import toml_value
 from archord.scene.parts import Mesh
 from archord.scene.problem import GIVEN, LIVE, ProblemScene
-from archord.scene.scene import Checked, plain
+from archord.scene.scene import plain
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -78,7 +78,7 @@ def _scene_of(given: Any) -> AnyScene:
         return load_scene(given)
     if isinstance(given, Mapping):
         return scene_file.parse_any(plain(given))
-    if not isinstance(given, Checked):
+    if not isinstance(given, AnyScene):
         said = "scene must be a scene, a scene file or its table"
         raise InputError(f"archord.solve: {said}, not {shortened(repr(given))}.")
     return given

@@ -136,8 +136,8 @@ def margins(
             raise InputError(f"{name} {value:g}: must be a positive number.")
     lugs = _lugs_of(run)
     if plate not in lugs:
-        said = "is for a clevis, and this run is one of a lug" if "" in lugs else "must be inner or outer"
-        raise InputError(f"--plate {plate!r}: {said}.")
+        fault = "is for a clevis, and this run is one of a lug" if "" in lugs else "must be inner or outer"
+        raise InputError(f"--plate {plate!r}: {fault}.")
     lug = lugs[plate]
     strengths = _strengths(run, lug.body, proof, tensile)
     applied = {"yield": load, "ultimate": load * factor}
