@@ -72,16 +72,28 @@ def Problem(
     return ProblemScene(**sections)
 
 
+def _scene_of(given: Any) -> AnyScene:
+    """A scene that is one already, a file with one, or the table of such a file. Raises `InputError`."""
+    if isinstance(given, (str, Path)):
+        return load_scene(given)
+    if isinstance(given, Mapping):
+        return scene_file.parse_any(plain(given))
+    if not isinstance(given, AnyScene):
+        said = "scene must be a scene, a scene file or its table"
+        raise InputError(f"archord.solve: {said}, not {shortened(repr(given))}.")
+    return given
+
+
 def solve(
-    scene: AnyScene | str | Path,
+    scene: AnyScene | str | Path | Mapping[str, Any],
     folder: str | Path,
     *,
     force: bool = False,
     progress: bool = False,
     comm: MPI.Comm | None = None,
 ) -> Run:
-    """Solve ``scene`` (or the scene file of that name) into ``folder``, and give back the run. Collective over ``comm``
-    (all ranks).
+    """Solve ``scene`` (or the scene file of that name, or the table of such a file) into ``folder``, and give back the
+    run. Collective over ``comm`` (all ranks).
 
     An occupied folder is refused without ``force``. ``progress`` reports steps on rank 0 as ``archord solve`` does. Of
     a run that could not reach its end (status "stopped") the logger "archord" warns. Raises `InputError` on all ranks,
@@ -91,7 +103,7 @@ def solve(
 
     from archord.progress import solve_and_report
 
-    checked: Callable[[], AnyScene] = partial(load_scene, scene) if isinstance(scene, (str, Path)) else lambda: scene
+    checked: Callable[[], AnyScene] = partial(_scene_of, scene)
     comm = MPI.COMM_WORLD if comm is None else comm
     _, outcome = solve_and_report(checked, Path(folder), comm, force=force, silent=not progress)
     if outcome.status == "interrupted":

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from archord.output.disk import naming
-from archord.report.readable import require_file
+from archord.report.readable import json_of, require_file
 from archord.scene.errors import InputError
 
 SEALED = ("scene.toml", "history.csv", "mesh.npz", "contact.h5", "fields.h5")
@@ -86,7 +86,7 @@ def read_report(path: Path) -> Any:
     """What the run.json ``path`` holds, without its own seal. Raises `OSError`, `ValueError` if it is no JSON, and
     `ChangedError` if it was changed after it was written."""
     text = require_file(path).read_bytes().decode()
-    report = json.loads(text)
+    report = json_of(text)
     if not isinstance(report, dict) or "sha256" not in report:
         return report
     del report["sha256"]

@@ -1,4 +1,4 @@
-"""Margins of safety of a lug: what a run found beside the usual sections of a hand calculation.
+"""Margins of safety of lugs: what a run found beside the usual sections of a hand calculation.
 
 Margins are ``MS = allowable / applied - 1``. Forces are those of the whole lug, as in history.csv:
 per unit thickness where the scene has none. The applied force is ``load`` for the yield margins and
@@ -12,6 +12,9 @@ diameter ``d``, or a bushing pressed in (``d = D``), and the proof strength or t
     shear-out     2 (e - D/2 cos 40 deg) t f / sqrt(3)    Bruhn 1973, chapter D1
 
 By finite elements the allowable is the largest force that the run had reached when the PEEQ of the lug passed a limit.
+
+Each plate of a clevis is such a lug. Its forces are those of the whole clevis there: ``t`` is the thickness of the
+inner plate, and of both outer plates together.
 """
 
 from __future__ import annotations
@@ -60,7 +63,7 @@ class Check:
 @dataclass(frozen=True)
 class Margins:
     """The ``checks`` of a lug under a ``load``, the ``strengths`` that the hand formulas used, with a word on each, and
-    ``notes``: what is assumed, and what the run cannot tell."""
+    ``notes``: what is assumed, and what the run cannot tell. ``plate`` is the plate of a clevis, "" for a lug."""
 
     load: float
     factor: float
@@ -69,6 +72,7 @@ class Margins:
     strengths: dict[str, tuple[float, str]]
     checks: list[Check]
     notes: list[str]
+    plate: str = ""
 
     def weakest(self, kind: str, by: str) -> Check | None:
         """The check of this ``kind`` and origin with the smallest allowable."""
@@ -76,10 +80,29 @@ class Margins:
         return min(found, key=lambda check: check.allowable) if found else None
 
 
+@dataclass(frozen=True)
+class _Lug:
+    """One lug of a run: its ``shape``, its ``body``, the load that pulls it, the ``thickness`` of all plates of its
+    kind, and what its column of forces is multiplied by for the force on the whole, in the ``unit``."""
+
+    shape: LugShape
+    body: Any
+    pull: str
+    thickness: float
+    factor: float
+    unit: str
+
+
+def plates_of(run: Run) -> list[str]:
+    """What `margins` takes for ``plate``: the plates of a clevis, "" alone for a lug. Raises `InputError`."""
+    return list(_lugs_of(run))
+
+
 def margins(
     run: Run,
     load: float,
     *,
+    plate: str = "",
     factor: float = 1.0,
     proof: float | None = None,
     tensile: float | None = None,
@@ -91,9 +114,11 @@ def margins(
     Parameters
     ----------
     run : Run
-        a run of a [lug], or of a general scene on the shape of one
+        a run of a [lug] or a [clevis], or of a general scene on the shape of one
     load : float
-        force on the whole lug, positive, in the unit of history.csv
+        force on the whole lug, positive, in the unit of history.csv; on a whole clevis in its unit of force
+    plate : str
+        "inner" or "outer" of a clevis
     factor : float
         what the load is multiplied by for the ultimate margins, 1.5 if it is a limit load
     proof, tensile : float, optional
@@ -109,26 +134,30 @@ def margins(
     for name, value in given.items():
         if value is not None and not (math.isfinite(value) and value > 0):
             raise InputError(f"{name} {value:g}: must be a positive number.")
-    lug, pull, plate = _lug_of(run)
-    strengths = _strengths(run, plate, proof, tensile)
+    lugs = _lugs_of(run)
+    if plate not in lugs:
+        fault = "is for a clevis, and this run is one of a lug" if "" in lugs else "must be inner or outer"
+        raise InputError(f"--plate {plate!r}: {fault}.")
+    lug = lugs[plate]
+    strengths = _strengths(run, lug.body, proof, tensile)
     applied = {"yield": load, "ultimate": load * factor}
     checks = [
         Check(kind, "hand", name, allowable, applied[kind])
         for kind, (strength, _) in strengths.items()
-        for name, allowable in by_hand(lug, strength, run.scene.thickness).items()
+        for name, allowable in by_hand(lug.shape, strength, lug.thickness).items()
     ]
-    notes = [
-        f"bearing by hand is {_BEARING:g} times the strength on the diameter of the {'hole' if lug.wall else 'pin'}"
-    ]
-    if plate.yield_stress is None:
+    bears = "hole" if lug.shape.wall else "pin"
+    notes = [f"bearing by hand is {_BEARING:g} times the strength on the diameter of the {bears}"]
+    if lug.body.yield_stress is None:
         notes.append("the lug of this run is elastic: it has no yield, and no margins by finite elements")
     else:
-        last = _end_of_curve(plate) if ultimate_peeq is None else ultimate_peeq
-        force, peeq = (np.asarray(run.columns[name]) for name in (f"{pull} force", f"{plate.name} peeq_max"))
+        last = _end_of_curve(lug.body) if ultimate_peeq is None else ultimate_peeq
+        force = np.asarray(run.columns[f"{lug.pull} force"]) * lug.factor
+        peeq = np.asarray(run.columns[f"{lug.body.name} peeq_max"])
         found, said = _by_elements(force, peeq, applied, yield_peeq, last)
         checks += found
         notes += said
-    return Margins(load, factor, run.units[f"{pull} force"], run.scene.units.stress, strengths, checks, notes)
+    return Margins(load, factor, lug.unit, run.scene.units.stress, strengths, checks, notes, plate)
 
 
 def _by_elements(
@@ -232,31 +261,57 @@ def _end_of_curve(plate: Solid) -> float | None:
     return last if table and last > 0 else None
 
 
-def _lug_of(run: Run) -> tuple[LugShape, str, Any]:
-    """The lug's shape, the name of the load that pulls it, and its body. Raises `InputError`."""
+def _lugs_of(run: Run) -> dict[str, _Lug]:
+    """The lugs of a run: the inner and the outer plate of a clevis, or "". Raises `InputError` for other runs, and
+    where no load pulls."""
     shape = getattr(getattr(run.scene, "mesh", None), "shape", None)
-    if getattr(shape, "kind", "") != "lug":
-        raise InputError(
-            f"{run.folder}: is no run of a [lug], whose sections the hand formulas know "
-            "(of a [clevis] solve each plate as one)."
-        )
+    kind = getattr(shape, "kind", "")
+    if kind not in ("lug", "clevis"):
+        raise InputError(f"{run.folder}: is no run of a [lug] or a [clevis], whose sections the hand formulas know.")
+    run.number(None)
+    lugs = {"": _lug_of(run)} if kind == "lug" else {name: _plate_of(run, name) for name in ("inner", "outer")}
+    for lug in lugs.values():
+        if max(run.columns[f"{lug.pull} force"]) <= 0:
+            raise InputError(
+                f"{run.folder}: the pin never pulls at the lug's end: the force of {lug.pull!r} is never above 0."
+            )
+    return lugs
+
+
+def _lug_of(run: Run) -> _Lug:
+    """The lug of a run of a [lug]. Raises `InputError`."""
     pulls = [load.name for load in run.scene.load if load.direction == "x"]
     if len(pulls) != 1 or len(run.scene.load) != 1:
         names = ", ".join(load.name for load in run.scene.load)
         raise InputError(f"{run.folder}: is loaded by {names}; the hand formulas are for one load along the lug, in x.")
-    run.number(None)
-    if max(run.columns[f"{pulls[0]} force"]) <= 0:
-        raise InputError(
-            f"{run.folder}: the pin never pulls at the lug's end: the force of {pulls[0]!r} is never above 0."
-        )
-    plate = next(body for body in run.scene.body if (body.cells or body.name) == "lug")
-    return run.scene.mesh.shape, pulls[0], plate
+    unit = run.units[f"{pulls[0]} force"]
+    return _Lug(run.scene.mesh.shape, _body_of(run, "lug"), pulls[0], run.scene.thickness, 1.0, unit)
+
+
+def _plate_of(run: Run, name: str) -> _Lug:
+    """The inner or the outer plate of a run of a [clevis]; its columns of forces are per unit of its thickness. Raises
+    `InputError`."""
+    pull, shape = f"{name} pull", run.scene.mesh.shape
+    drawn = getattr(shape, name)
+    if {load.name for load in run.scene.load} != {"inner pull", "outer pull"}:
+        raise InputError(f"{run.folder}: margins of a clevis are for its loads 'inner pull' and 'outer pull' alone.")
+    if drawn.thickness is None:
+        raise InputError(f"{run.folder}: mesh.shape.{name}.thickness is missing, which margins need; solve it again.")
+    number = {"inner": 1, "outer": 2}[name]
+    together = number * drawn.thickness
+    lug = LugShape(radius=shape.radius, clearance=shape.clearance, **drawn.outline(shape))
+    return _Lug(lug, _body_of(run, name), pull, together, together, run.scene.units.force_of(1.0))
+
+
+def _body_of(run: Run, cells: str) -> Any:
+    return next(body for body in run.scene.body if (body.cells or body.name) == cells)
 
 
 def margin_text(found: Margins) -> str:
     """The margins as tables, with the assumptions."""
     ultimate = f", ultimate load {found.load * found.factor:g} {found.unit}" if found.factor != 1 else ""
-    lines = [f"load {found.load:g} {found.unit}{ultimate}; MS = allowable / applied - 1"]
+    title = f"{found.plate} plate: " if found.plate else ""
+    lines = [f"{title}load {found.load:g} {found.unit}{ultimate}; MS = allowable / applied - 1"]
     for kind, (strength, source) in found.strengths.items():
         name = {"yield": "proof strength", "ultimate": "tensile strength"}[kind]
         lines.append(f"{name} {strength:.6g} {found.stress}: {source}")

@@ -186,7 +186,8 @@ def cost_of(run: Run) -> Iterable[tuple[str, str]]:
     for name in ("totals", "error_estimates", "seconds"):
         values = (f"{key} {value:.3g}" for key, value in run.summary.get(name, {}).items() if value is not None)
         yield name.replace("_", " "), ", ".join(values).replace("_", " ")
-    yield "memory", f"{max(run.summary.get('peak_memory') or [0]) / 1e6:.0f} MB at most on a rank"
+    if memory := run.summary.get("peak_memory"):  # none before the end of a run
+        yield "memory", f"{max(memory) / 1e6:.0f} MB at most on a rank"
     yield "versions", ", ".join(f"{key} {value}" for key, value in run.summary["versions"].items())
     for warning in first_of_each_kind(run.warnings):
         yield "warning", warning

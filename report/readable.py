@@ -4,9 +4,11 @@ opened."""
 from __future__ import annotations
 
 import errno
+import json
 import os
 import stat
 from pathlib import Path
+from typing import Any
 
 _SHARE = 0.5  # of the machine's memory, which an array of a file may take
 _WHAT = (
@@ -36,3 +38,11 @@ def require_memory(size: float) -> None:
         raise ValueError(
             f"claims an array of {size / gigabytes:.3g} GB, more than half of the machine's {memory / gigabytes:.3g} GB"
         )
+
+
+def json_of(text: str) -> Any:
+    """What the JSON ``text`` holds. Raises ValueError, also where it is nested deeper than Python can read."""
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("is nested too deeply") from None

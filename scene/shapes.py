@@ -153,6 +153,12 @@ class ClevisPlate(PlateOutline, Solid):
     thickness: Positive = key("thickness of this plate", "length", example=10.0)
 
 
+class DrawnPlate(PlateOutline):
+    """The outline of one plate of a clevis, and what a margin of safety needs beside it."""
+
+    thickness: Positive | None = key("thickness of the plate, for its margins of safety", "length", default=None)
+
+
 class Clevis(Shape):
     """A pin through one inner and two outer plates, and how finely they are meshed."""
 
@@ -168,8 +174,8 @@ class Clevis(Shape):
 class ClevisShape(Clevis):
     """A clevis with what a preset says elsewhere."""
 
-    inner: PlateOutline
-    outer: PlateOutline
+    inner: DrawnPlate
+    outer: DrawnPlate
     pin: PinPart = "half"
     kind: Literal["clevis"] = "clevis"
 
@@ -350,7 +356,7 @@ class ClevisScene(Preset):
         overlap = max(-self.clevis.clearance, 0.0)
         bodies: dict[str, Solid] = {}
         for (name, plate), share in zip(self._plates.items(), (1.0, 0.5), strict=True):
-            shape[name] = plate.outline(self.clevis)
+            shape[name] = plate.outline(self.clevis) | {"thickness": plate.thickness}
             surfaces = [f"{name} pin", f"{name} hole"]
             contact = {"name": f"pin in {name}", "surfaces": surfaces, "overlap": overlap}
             place = {"diameter": f"{name} flat"}.get(self.load.at, f"{name} centre")

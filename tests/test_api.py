@@ -10,6 +10,7 @@ import pytest
 
 import archord
 from archord.progress import Progress
+from archord.scene.errors import InputError
 from archord.scene.parts import Mesh
 
 SCENE = str(Path(__file__).parents[1] / "scenes" / "elastic_pin.toml")
@@ -90,6 +91,18 @@ def test_solve_gives_the_run_on_every_rank(tmp_path, comm):
         archord.load(folder / "x")
     with pytest.raises(archord.InputError, match=r"is not a run folder: scene\.toml is missing\."):
         archord.load(folder.parent)
+
+
+def test_solve_takes_the_table_of_a_scene_and_refuses_what_is_none(tmp_path):
+    joint = {"radius": 10.0, "relative_clearance": 0.01, "relative_element_size": 0.2}
+    metal = {"E": 210000.0, "nu": 0.3}
+    table = {"joint": joint, "pin": metal, "block": metal, "load": {"displacement": 0.2, "steps": 1}}
+    assert archord.solve(table, tmp_path / "run").status == "done"
+    with pytest.raises(InputError, match=r"joint\.radius = -1"):
+        archord.solve(table | {"joint": joint | {"radius": -1.0}}, tmp_path / "bad")
+    with pytest.raises(InputError, match=r"archord.solve: scene must be a scene, a scene file or its table, not \[1\]"):
+        archord.solve([1], tmp_path / "bad")
+    assert not (tmp_path / "bad").exists()
 
 
 def test_a_run_that_stops_is_given_back_with_a_warning(tmp_path, caplog):

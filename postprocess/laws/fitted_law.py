@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from archord.postprocess.laws.chord_laws import plastic_winkler
 from archord.postprocess.laws.general.joint import Array, LawJoint
 from archord.postprocess.laws.law import ROUND_OFF, LawRangeWarning, LawState, rising_root
+from archord.report.readable import json_of
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -83,7 +84,7 @@ class FittedLaw(BaseModel):
     @classmethod
     def from_json(cls, text: str) -> FittedLaw:
         """The law in ``text``, written by ``archord fit --json``. Raises ValueError."""
-        data = json.loads(text)
+        data = json_of(text)
         return cls.model_validate(data.get("law", data) if isinstance(data, dict) else data)
 
     def to_python(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,11 +47,15 @@ def write_report(run: Run, target: Path, *, force: bool = False) -> Path:
     check_target(target, force=force)
     # all is drawn before the file is begun: what a run lacks is told first
     figures = list(_pages_of(run))
-    about = {"Title": f"archord: {run.folder}", "Creator": f"archord {VERSION}"}
-    with writing(target) as new, PdfPages(new, metadata=about) as pages:
+    # in memory: on a full disk PdfPages fails once more as it closes, with an error of its own
+    report = BytesIO()
+    metadata = {"Title": f"archord: {run.folder}", "Creator": f"archord {VERSION}"}
+    with PdfPages(report, metadata=metadata) as pages:
         for number, figure in enumerate(figures, 1):
             _foot(figure, run, number, len(figures))
             pages.savefig(figure)
+    with writing(target) as new:
+        new.write_bytes(report.getvalue())
     return target
 
 

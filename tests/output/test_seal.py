@@ -71,6 +71,7 @@ DAMAGES = [
     (_flip_a_bit("history.csv"), "history.csv: "),
     (_edit_the_scene, f"scene.toml: {_BY_SUM}"),
     (_flip_a_bit("run.json"), "run.json: cannot be read as the report of a run"),
+    (lambda run: (run / "run.json").write_text("[" * 100_000), "run.json: cannot be read as the report of a run"),
     (lambda run: os.truncate(run / "run.json", 900), "run.json: cannot be read as the report of a run"),
 ]
 

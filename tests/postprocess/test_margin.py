@@ -152,9 +152,46 @@ def test_what_has_no_margin_is_refused(runs, capsys, name, asked, said):
     assert said in capsys.readouterr().err
 
 
+def test_plates_of_a_clevis_have_the_margins_of_lugs_under_their_share(tmp_path, capsys):
+    """The inner plate under P, and an outer plate under P/2: forces of both are told as those of the whole."""
+    plates = {
+        "inner": {"thickness": 5.0, "width": 40.0},
+        "outer": {"thickness": 4.0, "width": 44.0, "edge_distance": 21.0},
+    }
+    metals = {"inner": {"hardening": CURVE}, "outer": {"hardening": [[0.0, 300.0]]}}
+    plane = {"analysis": {"plane": "stress"}, "pin": STEEL}
+    around = {"radius": 10.0, "clearance": 0.1} | COARSE
+    sections = {name: STEEL | metals[name] | plates[name] for name in plates}
+    load = {"load": {"force": 20000.0, "steps": 2}}
+    scenes = {"clevis": parse_any({"clevis": around} | sections | plane | load)}
+    for name, number in (("inner", 1), ("outer", 2)):
+        outline = dict(plates[name])
+        thickness = number * outline.pop("thickness")
+        alone = {"lug": around | outline, "plate": STEEL | metals[name]} | load | plane
+        alone["analysis"] = plane["analysis"] | {"thickness": thickness}
+        scenes[name] = parse_any(alone)
+    folders = solved(scenes, tmp_path)
+    for name in plates:
+        found = margins(Run(folders["clevis"]), 15000.0, plate=name)
+        lug = margins(Run(folders[name]), 15000.0)
+        assert (found.plate, found.unit, found.strengths) == (name, "N", lug.strengths)
+        for check, expected in zip(found.checks, lug.checks, strict=True):
+            assert (check.kind, check.name, check.bound) == (expected.kind, expected.name, expected.bound)
+            tolerance = 1e-12 if check.by == "hand" else 0.02  # the meshes differ
+            assert check.allowable == pytest.approx(expected.allowable, rel=tolerance)
+    clevis = str(folders["clevis"])
+    assert command(["margin", clevis, "--load", "15000"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.index("inner plate: load 15000 N") < printed.index("outer plate: load 15000 N")
+    assert command(["margin", clevis, "--load", "15000", "--proof", "400"]) == 2
+    assert "--proof: is the strength of one plate" in capsys.readouterr().err
+    assert command(["margin", clevis, "--load", "15000", "--proof", "400", "--plate", "outer"]) == 0
+    assert command(["margin", str(folders["inner"]), "--load", "1", "--plate", "outer"]) == 2
+
+
 def test_runs_of_other_problems_are_refused(tmp_path):
     shape = {"radius": 10.0, "relative_clearance": 0.01, "relative_element_size": 0.2}
     joint = {"joint": shape, "pin": STEEL, "block": STEEL, "load": {"displacement": 0.2, "steps": 1}}
     run = Run(solved({"joint": parse_any(joint)}, tmp_path)["joint"])
-    with pytest.raises(InputError, match=r"is no run of a \[lug\]"):
+    with pytest.raises(InputError, match=r"is no run of a \[lug\] or a \[clevis\]"):
         margins(run, 1.0)

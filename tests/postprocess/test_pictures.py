@@ -15,6 +15,7 @@ from archord.postprocess.run import Run
 from archord.postprocess.tables import run_text
 from archord.report.figure import new_figure
 from tests.output.run_files import rewrite_report
+from tests.output.test_user_file import full_disk
 from tests.postprocess.test_probe import solved
 
 
@@ -133,20 +134,16 @@ def test_a_report_is_a_pdf_of_two_or_three_pages(unloaded, runs, tmp_path, refus
     assert "cannot be written" in refused(["report", str(bare), "-o", str(tmp_path / "no" / "x.pdf")])
 
 
-def test_a_report_that_fails_keeps_the_old_one(unloaded, tmp_path, monkeypatch):
-    """Whatever goes wrong while it is written."""
-    from matplotlib.backends import backend_pdf
-
+def test_a_report_that_fails_keeps_the_old_one(unloaded, tmp_path, refused):
+    """On a full disk, wherever in the file that is."""
     target = tmp_path / "x.pdf"
     target.write_text("old")
-
-    def full(self, figure):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(backend_pdf.PdfPages, "savefig", full)
-    assert command(["report", str(unloaded.folder), "-o", str(target), "--force"]) == 2
-    assert target.read_text() == "old"
-    assert [path.name for path in tmp_path.iterdir()] == ["x.pdf"]
+    for room in (0, 3000, 50_000):
+        with full_disk(room):
+            said = refused(["report", str(unloaded.folder), "-o", str(target), "--force"])
+        assert f"{target}: cannot be written: File too large." in said
+        assert target.read_text() == "old"
+        assert [path.name for path in tmp_path.iterdir()] == ["x.pdf"]
 
 
 def test_the_command_is_a_public_function(unloaded, tmp_path):

@@ -75,3 +75,12 @@ def test_a_long_history_is_thinned_and_a_killed_run_shown_as_far_as_it_came(runs
     assert f"40 of 100 rows; {copy}/history.csv has all of them" in printed
     shown = [line.split()[0] for line in printed.splitlines() if line.split() and line.split()[0].isdigit()]
     assert (len(shown), shown[0], shown[39]) == (41, "1", "100")
+
+
+def test_a_run_that_was_killed_has_no_memory_to_tell(runs, tmp_path, capsys):
+    """run.json has it from the end of a run on; "0 MB" would be wrong."""
+    killed = shutil.copytree(runs["coarse"], tmp_path / "killed")
+    for known, said in (([2e8], True), ([], False)):
+        rewrite_report(killed, peak_memory=known)
+        assert command(["show", str(killed), "--no-pictures"]) == 0
+        assert ("MB at most on a rank" in capsys.readouterr().out) == said

@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from archord.postprocess.laws.general.joint import Array
+from archord.report.readable import json_of
 
 _ITERATIONS = 6  # of Newton's method for the logarithmic law: quadratic, from a guess that is good to some per cent
 _INSIDE = 1 + 1e-9  # of the last node, but for round-off
@@ -223,7 +224,7 @@ class JointCurve:
     def from_json(cls, text: str) -> JointCurve:
         """The curve in ``text``. Raises ValueError if it is none."""
         try:
-            data = json.loads(text)
+            data = json_of(text)
             given: dict[str, Any] = {
                 f.name: np.array(data[f.name], float) if f.type == "Array" else data[f.name]
                 for f in fields(cls)
