@@ -21,6 +21,7 @@ _FAR = 0.1  # of the size of a surface: drawn farther behind another one, it doe
 _APART = 0.01  # of the same: a gap between tied surfaces that is told of
 _ALIKE = 2.0  # ratio of a drawn overlap and an interference, up to which they mean the same fit
 _ADDS = 0.1  # of an interference: a drawn gap or overlap that changes the fit
+_BENT = 0.01  # of the length of an edge: how far it may depart from a line and be straight
 _ALONG = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
 
 
@@ -44,7 +45,7 @@ def check(scene: ProblemScene, problem: Problem) -> list[str]:
     if whole is not None:
         faults = chain(_shared(scene, whole), _half_loaded(scene, whole), _loose(scene, whole, cells, owner))
         failure = next(faults, "")
-        doubts = [*_half_held(scene, whole), *_moved_in_contact(scene, whole)]
+        doubts = [*_half_held(scene, whole), *_moved_in_contact(scene, whole), *_stiffened(scene, whole)]
         for name in sorted({*owner, *_moved(scene), *_spread(scene)}):
             doubts += gaps(whole, name)
     failure, doubts = mesh.mesh.comm.bcast((failure, doubts))
@@ -78,6 +79,22 @@ def _half_held(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
     for name in sorted(_moved(scene)):
         for said in facets_within(whole, name):
             yield f"{said}: look whether its elements are numbered as the set takes them"
+
+
+def _stiffened(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:
+    """Warnings of forces on edges that are not straight: an edge under a force moves by one displacement, which keeps
+    its shape along the force."""
+    for load in scene.load:
+        if load.kind != "force" or load.on not in whole.facet_sets:
+            continue
+        x = whole.x[np.unique(whole.edges[np.isin(whole.tags, whole.facet_sets[load.on])][:, :2])]
+        extents = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
+        if extents[1] > _BENT * extents[0]:
+            yield (
+                f"the force {load.name!r} moves all of {load.on!r} by one displacement in {load.direction}, and "
+                "that edge is not straight: it keeps its shape as if it were stiff; a pressure, a distributing "
+                "coupling, or the force on the body's cells leaves it free"
+            )
 
 
 def _moved_in_contact(scene: ProblemScene, whole: PlaneMesh) -> Iterator[str]:

@@ -189,8 +189,8 @@ class _Builder:
         """Raise ValueError for a coupling that turns about a held point so far away that all the mesh within ``ends``,
         the largest x and y and the smallest with the other sign, moves by more than ``most``."""
         points = {coupling.name: np.array(coupling.point) for coupling in self.scene.coupling}
-        held = {(s.on, freedom) for s in self.scene.support for freedom in s.fixed}
-        held |= {(load.on, load.direction) for load in self.scene.load if load.kind == "displacement"}
+        held = {(s.on, str(freedom)) for s in self.scene.support for freedom in s.fixed}
+        held |= {(load.on, str(load.direction)) for load in self.scene.load if load.kind == "displacement"}
         for load in self.scene.load:
             if load.kind != "displacement" or load.direction != "rotation":
                 continue

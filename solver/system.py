@@ -192,7 +192,7 @@ class System:
         of its points' forces, the norm of nodal ones, as of a pure moment, or the force ``before``; 0 if all are
         round-off."""
         left = [self.equilibrium.residual_on(self.nodes_of(body)) for body in self.problem.bodies]
-        forces = [np.zeros(2)]
+        forces: list[Array] = [np.zeros(2)]
         forces += [self.reaction(name) for name in dict.fromkeys(s.name for s in self.problem.supports)]
         of_supports = np.linalg.norm(forces, axis=1).max()
         nodal = max(self.equilibrium.reaction_norm, self.equilibrium.largest_reaction)

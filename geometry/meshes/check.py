@@ -176,8 +176,8 @@ def check_mesh(
         checks += [iter(straight[_COARSE]), _overlaps(mesh, inside, overlap)]
         found = next((said for check in checks for said in check), "")
         warnings = distorted(mesh) + thin(mesh) + straight[_POLYGONAL]
-        for body, cells in inside.items():
-            warnings += [*cracks(mesh, body, cells), *holes(mesh, body, cells)]
+        for body, within in inside.items():
+            warnings += [*cracks(mesh, body, within), *holes(mesh, body, within)]
     found, warnings = tagged.mesh.comm.bcast((found, warnings))
     if found:
         raise ValueError(found)
@@ -317,7 +317,7 @@ def gaps(mesh: PlaneMesh, name: str) -> Iterator[str]:
 def _goes_on(mesh: PlaneMesh, edge: np.ndarray, along: Mapping[int, Array]) -> bool:
     """Whether an ``edge`` meets facets, which have directions ``along`` them, and turns little there."""
     direction = mesh.x[edge[1]] - mesh.x[edge[0]]
-    others = [along[node] for node in edge.tolist() if node in along]
+    others = [along[int(node)] for node in edge if int(node) in along]
     cosines = [abs(o @ direction) / np.linalg.norm(o) / np.linalg.norm(direction) for o in others]
     return max(cosines, default=0.0) > _STRAIGHT
 

@@ -220,3 +220,34 @@ def test_a_turn_about_a_held_point_moves_no_farther_than_the_mesh_is_large(squar
     account(squares, support=[base, free], **far)
     with pytest.raises(InputError, match="the load 'turn' turns 'arm' about a point so far away that it moves by 49"):
         account(squares, support=[base, held], **far)
+
+
+def test_a_force_on_a_bent_edge_is_told_to_stiffen_it(tmp_path):
+    """It moves by one displacement. A force on a straight edge changes nothing that it does not say."""
+    path = str(tmp_path / "disc.msh")
+    gmsh.initialize()
+    gmsh.option.setNumber("General.Terminal", 0)
+    ring, _ = gmsh.model.occ.cut(
+        [(2, gmsh.model.occ.addRectangle(-20, -20, 0, 40, 40))],
+        [(2, gmsh.model.occ.addDisk(0, 0, 0, 10, 10))],
+    )
+    gmsh.model.occ.synchronize()
+    edges = {line: gmsh.model.occ.getCenterOfMass(1, line) for _, line in gmsh.model.getBoundary(ring, oriented=False)}
+    gmsh.model.addPhysicalGroup(2, [tag for _, tag in ring], name="plate")
+    for name, (x, y) in {"bore": (0, 0), "left": (-20, 0), "right": (20, 0)}.items():
+        line = next(line for line, at in edges.items() if abs(at[0] - x) + abs(at[1] - y) < 1e-6)
+        gmsh.model.addPhysicalGroup(1, [line], name=name)
+    gmsh.model.mesh.generate(2)
+    gmsh.write(path)
+    gmsh.finalize()
+    parts = {
+        "body": [{"name": "plate"} | STEEL],
+        "interaction": [],
+        "support": [{"name": "clamp", "on": "left", "fixed": ["x", "y"]}],
+    }
+    said = {
+        on: account(path, **parts, load=[{"name": "pull", "on": on, "direction": "x", "force": 1.0}]).warnings()
+        for on in ("right", "bore")
+    }
+    assert said["right"] == []
+    assert said["bore"][0].startswith("the force 'pull' moves all of 'bore' by one displacement in x, and that edge is")
