@@ -18,8 +18,8 @@ import h5py
 import numpy as np
 
 from archord.geometry.basis import Array
-from archord.output.disk import replace_file
-from archord.output.step_file import all_arrays, hdf5_in_memory, image, put
+from archord.output.files.disk import replace_file
+from archord.output.files.step_file import all_arrays, hdf5_in_memory, image, put
 from archord.presets.measures import Work
 from archord.report.readable import require_file
 from archord.report.version import VERSION

@@ -15,10 +15,10 @@ from archord.geometry.basis import Array
 from archord.geometry.meshes.second_order import SecondOrder
 from archord.geometry.patch_recovery import PatchRecovery
 from archord.materials.material import COMPONENTS
-from archord.output.disk import replace_file
-from archord.output.step_file import StepFile, step_name
+from archord.output.files.disk import replace_file
+from archord.output.files.step_file import StepFile, step_name
+from archord.output.files.vtkhdf import VtkHdf, times
 from archord.output.vtk_grid import BodyGrid
-from archord.output.vtkhdf import VtkHdf, times
 from archord.solver.contact.pair import Pair
 from archord.solver.mesh_order import Arrays, MeshOrder
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from archord.output.files.seal import faults_of
 from archord.output.history import fault_of_history, read_history
-from archord.output.seal import faults_of
 from archord.scene.file import AnyScene, load_scene, resolved
 
 

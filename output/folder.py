@@ -9,8 +9,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from archord.output.disk import new_name
-from archord.output.seal import read_report
+from archord.output.files.disk import new_name
+from archord.output.files.seal import read_report
 from archord.scene.errors import InputError
 
 FILES = ("scene.toml", "history.csv", "fields.vtkhdf", "fields.xdmf", "fields.h5", "contact.h5", "run.json")

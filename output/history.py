@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from archord.output.disk import replace_file
+from archord.output.files.disk import replace_file
 
 if TYPE_CHECKING:
     from archord.presets.account import Column

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
-from archord.output.disk import replace_file
+from archord.output.files.disk import replace_file
 from archord.output.folder import MESH
 from archord.scene.file import AnyScene, resolved
 from archord.scene.problem import LIVE, ProblemScene

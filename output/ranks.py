@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from archord.output.disk import WriteError
+from archord.output.files.disk import WriteError
 from archord.scene.errors import InputError
 
 Result = TypeVar("Result")

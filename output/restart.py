@@ -12,9 +12,9 @@ import numpy as np
 
 from archord.output import checkpoint as checkpoints
 from archord.output.checkpoint import Checkpoint
+from archord.output.files.seal import TABLES, fault_of, read_report, require_intact
 from archord.output.finished import history_fault
 from archord.output.folder import CHECKPOINT
-from archord.output.seal import TABLES, fault_of, read_report, require_intact
 from archord.presets.account import record_type
 from archord.report.readable import require_file
 from archord.scene.errors import InputError

@@ -16,14 +16,14 @@ from archord.kernels.interrupt import Interrupt, Interrupted
 from archord.kernels.stale_jit import without_stale_forms
 from archord.output.checkpoint import halt, resume
 from archord.output.checkpoint import write as write_checkpoint
-from archord.output.disk import WriteError, replace_file
+from archord.output.files.disk import WriteError, replace_file
+from archord.output.files.step_file import StepFile
 from archord.output.folder import CHECKPOINT, clear, occupied
 from archord.output.history import write_history
 from archord.output.own_mesh import given_mesh, mesh_in_use, scene_text, write_mesh
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run_json import Report, peak_memory
-from archord.output.step_file import StepFile
 from archord.presets.account import Account, account_of
 from archord.presets.edge import EdgeProfile
 from archord.presets.measures import Work

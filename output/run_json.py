@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from archord.kernels.compat import versions
-from archord.output.disk import replace_file
-from archord.output.seal import report_text, seals_of
+from archord.output.files.disk import replace_file
+from archord.output.files.seal import report_text, seals_of
 from archord.presets.account import Account
 from archord.presets.joint_account import APART
 from archord.presets.measures import WORK_OFF

@@ -8,7 +8,7 @@ import numpy as np
 from archord.geometry.basis import Array, bulk_quadrature, cell_kind, lagrange_element, tabulate
 from archord.geometry.meshes.plane_mesh import in_vtk_order
 from archord.materials.elasticity import mean_stress, von_mises
-from archord.output.vtkhdf import LAGRANGE, VERTEX, Grid
+from archord.output.files.vtkhdf import LAGRANGE, VERTEX, Grid
 from archord.solver.mesh_order import Arrays, MeshOrder
 
 

@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 
 from archord.materials.material import Array
-from archord.output.seal import require_intact
-from archord.output.step_file import step_name
+from archord.output.files.seal import require_intact
+from archord.output.files.step_file import step_name
 from archord.presets.arc import ArcProfile
 from archord.presets.edge import OF_FRICTION, PER_STEP, SurfaceProfile
 from archord.scene.errors import InputError

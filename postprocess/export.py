@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from archord.materials.material import Array
+from archord.output.files.vtkhdf import LINE, SECOND_ORDER, Arrays, Grid, VtkHdf, times
 from archord.output.folder import claim_folder
 from archord.output.user_file import check_target, writing
-from archord.output.vtkhdf import LINE, SECOND_ORDER, Arrays, Grid, VtkHdf, times
 from archord.postprocess.run import Run
 
 _DATA_OF_ARC = ("pressure", "raw_pressure", "gap", "angle", "s")

@@ -14,7 +14,7 @@ import numpy as np
 
 from archord.materials.elasticity import principal_stresses, von_mises
 from archord.materials.material import COMPONENTS, Array
-from archord.output.step_file import all_arrays, step_name
+from archord.output.files.step_file import all_arrays, step_name
 from archord.postprocess.arc import opened
 from archord.scene.errors import InputError
 from archord.scene.keys import toml_value

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
+from archord.output.files.seal import ChangedError, read_report, require_intact
 from archord.output.folder import is_sweep
 from archord.output.history import fault_of_history, read_history
-from archord.output.seal import ChangedError, read_report, require_intact
 from archord.postprocess.arc import read_contact
 from archord.postprocess.curve import CURVES, RunCurve
 from archord.postprocess.fields import BODIES, Fields, read_fields, read_points

@@ -18,11 +18,11 @@ from typing import Any
 from mpi4py import MPI
 
 from archord.kernels.interrupt import Interrupt, Interrupted
-from archord.output.disk import WriteError, replace_file
+from archord.output.files.disk import WriteError, replace_file
+from archord.output.files.seal import read_report, report_text
 from archord.output.ranks import agreed
 from archord.output.restart import Start
 from archord.output.run import Outcome, solve_scene
-from archord.output.seal import read_report, report_text
 from archord.postprocess.convergence import Curve, mesh_error, step_error
 from archord.presets.joint_account import UNSEEN
 from archord.scene.errors import InputError

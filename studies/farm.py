@@ -23,7 +23,7 @@ from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
 
 from archord.kernels.interrupt import Interrupt
-from archord.output.disk import replace_file
+from archord.output.files.disk import replace_file
 from archord.output.folder import claim_folder
 from archord.output.ranks import arrived_before
 from archord.output.restart import plan_restart

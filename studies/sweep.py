@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from archord.output.disk import replace_file
+from archord.output.files.disk import replace_file
 from archord.output.finished import fault_of_run
 from archord.output.folder import occupied, report_of
 from archord.report.readable import require_file

@@ -16,8 +16,8 @@ from mpi4py import MPI
 
 from archord.benchmarks.case import Case, Expected, matches, quantities, side_by_side
 from archord.benchmarks.stability.cases import FILE, FINE, Values, cases
+from archord.output.files.step_file import all_arrays
 from archord.output.history import read_history
-from archord.output.step_file import all_arrays
 from archord.report.files import write_report
 from archord.report.table import Table
 from archord.scene.errors import InputError

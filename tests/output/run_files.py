@@ -11,11 +11,11 @@ import numpy as np
 from mpi4py import MPI
 
 from archord.output import checkpoint
+from archord.output.files.seal import read_report, report_text
+from archord.output.files.step_file import all_arrays
 from archord.output.folder import claim_folder
 from archord.output.history import read_history
 from archord.output.run import solve_scene
-from archord.output.seal import read_report, report_text
-from archord.output.step_file import all_arrays
 from archord.scene.file import load_scene
 from archord.scene.scene import Scene
 

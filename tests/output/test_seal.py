@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from archord.cli import run as command
+from archord.output.files.seal import read_report
 from archord.output.history import read_history
 from archord.output.restart import plan_restart
-from archord.output.seal import read_report
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from tests.output.run_files import rewrite_report

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from archord.output.disk import WriteError, replace_file
+from archord.output.files.disk import WriteError, replace_file
+from archord.output.files.step_file import StepFile
 from archord.output.history import read_history
 from archord.output.ranks import agreed
 from archord.output.run import solve_scene
-from archord.output.step_file import StepFile
 from archord.scene.errors import InputError
 from tests.output.run_files import accepted_steps
 from tests.solver.solving import scene

@@ -8,9 +8,9 @@ import pytest
 from mpi4py import MPI
 
 import archord
-from archord.output import vtkhdf
+from archord.output.files import vtkhdf
+from archord.output.files.vtkhdf import LAGRANGE, VERTEX, Grid, VtkHdf, times
 from archord.output.run import solve_scene
-from archord.output.vtkhdf import LAGRANGE, VERTEX, Grid, VtkHdf, times
 from archord.postprocess.run import Run
 from archord.scene.errors import InputError
 from tests.output.test_step_file import file_size_limit

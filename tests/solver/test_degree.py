@@ -6,8 +6,8 @@ import pytest
 
 from archord.geometry.curve import lagrange
 from archord.geometry.meshes.second_order import SecondOrder
+from archord.output.files.step_file import step_name
 from archord.output.run import solve_scene
-from archord.output.step_file import step_name
 from tests.solver.parts import DR
 from tests.solver.solving import scene, solve
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from archord.output.files.seal import report_text
 from archord.output.folder import report_of
 from archord.output.ranks import agreed
-from archord.output.seal import report_text
 from archord.studies.cases import Case, read_sweep
 from archord.studies.farm import solve_case, solve_cases
 from archord.studies.sweep import CASES, of_case, open_cases, result_of

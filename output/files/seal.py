@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from archord.output.disk import naming
+from archord.output.files.disk import naming
 from archord.report.readable import json_of, require_file
 from archord.scene.errors import InputError
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from archord.output.disk import replace_file
+from archord.output.files.disk import replace_file
 from archord.scene.errors import InputError
 
 Arrays = dict[str, np.ndarray]

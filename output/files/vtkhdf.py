@@ -19,7 +19,7 @@ from typing import BinaryIO
 import h5py
 import numpy as np
 
-from archord.output.disk import naming, new_name
+from archord.output.files.disk import naming, new_name
 from archord.scene.errors import InputError
 
 Arrays = dict[str, np.ndarray]
