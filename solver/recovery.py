@@ -83,10 +83,10 @@ class Recovery:
         rubbing = [pair.points for pair in self.equilibrium.contact.pairs if pair.law.has_friction]
         yields = self.equilibrium.comm.allreduce(len(yielding)) > 0
         full_steps = (afar or self.equilibrium.bulk.finite) and not yields
-        if yields and afar:
-            guess = self._simplified(guess, yielding, "elastic")
-        if self._solve_either_way(guess, full_steps=full_steps):
+        near = self._simplified(guess, yielding, "elastic") if yields and afar else guess
+        if self._solve_either_way(near, full_steps=full_steps):
             return True
+        # from the guess itself: where friction has failed already, bodies may have come apart
         return bool(rubbing) and self._solve_friction_in_stages(guess, rubbing, yielding if afar else [])
 
     def _solve_friction_in_stages(self, guess: Array, rubbing: list[Points], yielding: list[Points]) -> bool:
